@@ -1,0 +1,68 @@
+"""A recording: what entered the plant, what came out, and under which conditions.
+
+Sampling: `response[k]` and `position[k]` are taken at t_k just before `command[k]` is written, which is held
+until t_(k+1). A plant with direct feedthrough therefore answers `command[k-1]`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from equalizer.signals.signal import FloatArray, Signal
+
+
+class Hold(Enum):
+    """How the command moves between its samples."""
+
+    ZERO_ORDER = "zero-order"
+    BAND_LIMITED = "band-limited"
+    LINEAR = "linear"
+
+
+SEGMENT_KINDS = (
+    "multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest",
+)  # fmt: skip
+SEGMENT_ROLES = ("fit", "test", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Samples start (included) to stop (excluded) of one kind of excitation. Outside all segments is rest."""
+
+    start: int
+    stop: int
+    kind: str
+    amplitude: float = 0.0
+    """Peak of the excitation in the command's unit."""
+    period: int = 0
+    """Samples per period; 0 = not periodic."""
+    role: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """One recording of a device. All signals share rate and length."""
+
+    device: str
+    command: Signal
+    """(n, m): what entered the plant, virtual spring included."""
+    response: Signal
+    """(n, p)"""
+    position: Signal | None = None
+    """(n, d)"""
+    excitation: Signal | None = None
+    """(n, m): the part of the command that was decided beforehand, where a feedback adds to it."""
+    time_s: FloatArray | None = None
+    """(n,): time stamps where the device kept them."""
+    hold: Hold = Hold.ZERO_ORDER
+    segments: tuple[Segment, ...] = ()
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    """JSON values: place, sensor and its frame, feedback, grip, operator, provenance."""
+
+    @property
+    def sample_rate_hz(self) -> float:
+        return self.response.sample_rate_hz
+
+    def __len__(self) -> int:
+        return len(self.response)

@@ -1,0 +1,52 @@
+"""A signal: samples that know their rate, quantity, unit and channels. Immutable."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """Samples of shape (n, channels): time first, always. SI units once inside the program."""
+
+    samples: FloatArray
+    sample_rate_hz: float
+    quantity: str
+    """One word for all channels: "force", "acceleration", "position", "torque", "angle", ..."""
+    unit: str
+    channels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        samples = np.ascontiguousarray(self.samples, dtype=np.float64)
+        if samples.ndim != 2:
+            raise ValueError(f"samples must have shape (n, channels), not {samples.shape}")
+        if samples.shape[1] != len(self.channels):
+            raise ValueError(f"{samples.shape[1]} columns of samples but {len(self.channels)} channel names")
+        if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0):
+            raise ValueError(f"sample_rate_hz must be a positive number, not {self.sample_rate_hz}")
+        if samples.flags.writeable:
+            samples = samples.copy() if samples is self.samples else samples
+            samples.flags.writeable = False
+        object.__setattr__(self, "samples", samples)
+
+    def __len__(self) -> int:
+        return int(self.samples.shape[0])
+
+    @property
+    def duration_s(self) -> float:
+        return len(self) / self.sample_rate_hz
+
+    def times_s(self) -> FloatArray:
+        return np.arange(len(self), dtype=np.float64) / self.sample_rate_hz
+
+    def part(self, start: int, stop: int) -> Self:
+        """Samples start (included) to stop (excluded)."""
+        return replace(self, samples=self.samples[start:stop])
+
+    def rotated(self, rotation: FloatArray) -> Self:
+        """Each sample v becomes rotation @ v. rotation: (channels, channels), orthogonal."""
+        return replace(self, samples=self.samples @ np.asarray(rotation, dtype=np.float64).T)

@@ -1,0 +1,92 @@
+"""Settings of the apparatus that every protocol shares: directions, spring, limits.
+
+Axes are those of the device: x toward the operator, y to the right, z up, origin at the centre of the workspace.
+"""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from protocols.staircase_rule import STRICT
+
+Plane = Literal["xy", "yz", "zx"]
+
+
+@dataclass(frozen=True, config=STRICT)
+class TestDirections:
+    """Two orthogonal directions in a plane, mirrored about the linkage's line of symmetry in that plane.
+
+    Direction 1 lies 45° counter-clockwise of the line, direction 2 as far clockwise: orthogonal, because that is
+    the easiest pair to tell apart and so the most conservative limit.
+    """
+
+    __test__ = False  # a test direction is not a test
+
+    plane: Annotated[
+        Plane,
+        Field(description="The plane of both directions. Default 'yz', the frontal plane, seen by the participant."),
+    ] = "yz"
+    symmetry_deg: Annotated[
+        float,
+        Field(
+            ge=-180,
+            le=180,
+            description="Angle of the line of symmetry in the plane, from its first axis. Default 90: with one "
+            "leg upright the linkage mirrors left and right about the vertical.",
+        ),
+    ] = 90.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class SpringSettings:
+    """A weak virtual spring about the centre, which keeps the handle where the linkage is symmetric."""
+
+    natural_frequency_hz: Annotated[
+        float, Field(ge=0, le=10, description="With the device's own mass at the handle; 0 = no spring.")
+    ] = 3.5
+    damping_n_s_per_m: Annotated[
+        float,
+        Field(ge=0, le=20, description="Virtual damping beside it; the device's own is enough by default."),
+    ] = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class SafetySettings:
+    """Limits that the safety layer keeps at every tick, whatever the rest of the program does."""
+
+    stimulus_cap_n: Annotated[
+        float,
+        Field(gt=0, le=3.0, description="Norm of the stimulus force, spring not counted; 3 N at the most."),
+    ]
+    total_cap_n: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=6.0,
+            description="Norm of the whole command, spring included; direction is kept at the cap.",
+        ),
+    ]
+    longest_trial_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=600,
+            description="A stimulus is released after this time, answered or not; such a trial is void.",
+        ),
+    ] = 120.0
+    watchdog_s: Annotated[
+        float,
+        Field(
+            ge=0.05,
+            le=5,
+            description="The force fades to zero when the program gives no sign of life for so long.",
+        ),
+    ] = 0.5
+    release_s: Annotated[float, Field(gt=0, le=1, description="Duration of that fade.")] = 0.05
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.total_cap_n < self.stimulus_cap_n:
+            raise ValueError("total_cap_n must not be below stimulus_cap_n")
+        return self

@@ -1,0 +1,111 @@
+"""The device port: all that the rest of the program may ask of a device.
+
+Every call and every answer is a value, so that a real device's 1 kHz loop can live in a process of its own.
+`hold` has no end because a participant feels a trial as long as wanted.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from study.session.limits import Limits
+from study.session.stimulus import HeldStimulus
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    name: str
+    simulated: bool
+    sample_rate_hz: float
+    max_force_n: float
+    effective_mass_kg: float
+    """At the handle, centre of the workspace: what the virtual spring's natural frequency refers to."""
+    details: str = ""
+    """Serial number, firmware, or the simulation's parameter set."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceSettings:
+    """What holds from opening to closing: limits, spring, and how much of each stimulus is kept."""
+
+    limits: Limits
+    spring_frequency_hz: float
+    """Natural frequency of the centring spring with the device's effective mass; 0 = no spring."""
+    spring_damping_n_s_per_m: float
+    keep_s: float
+    hand_on_handle: bool
+    """Whether a hand holds the handle. A simulated device then carries a simulated hand."""
+
+
+class Fault(Enum):
+    """Why the device let go by itself. Each ends a trial."""
+
+    NONE = "none"
+    NOT_A_NUMBER = "a command or a position was not a number"
+    STALLED = "the program gave no sign of life, so the force was faded out"
+    HELD_TOO_LONG = "the stimulus was held longer than the protocol allows"
+    STOPPED = "the emergency stop was pressed"
+    LOST = "the device stopped answering"
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What the safety layer counted since `hold` or `play`, in ticks."""
+
+    fault: Fault
+    ticks: int
+    missed_ticks: int
+    stimulus_clipped: int
+    """The stimulus itself was above its cap."""
+    total_clipped: int
+    """Stimulus and spring together were above the total cap (a lean on the spring)."""
+    slew_limited: int
+    sensor_clipped: int
+    peak_command_n: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    """What the device did between `hold` and `release`, or during `play`."""
+
+    recording: Recording | None
+    """For `hold`: the steady part, whole loops, at most `DeviceSettings.keep_s` long.
+    None if it never became steady."""
+    health: Health
+
+
+class Device(Protocol):
+    """A device behind its safety layer. Opened by `study.devices.opening.open_device`, closed by `close`."""
+
+    @property
+    def info(self) -> DeviceInfo: ...
+
+    def hold(self, stimulus: HeldStimulus) -> None:
+        """Fade in and repeat until `release`. Returns at once."""
+        ...
+
+    def keep_alive(self) -> None:
+        """A sign of life. Without one for `watchdog_s` the force fades to zero and the fault is STALLED."""
+        ...
+
+    def fault(self) -> Fault:
+        """The fault that ended the present stimulus, if any. Cheap: may be asked at every key press."""
+        ...
+
+    def release(self) -> Played:
+        """Fade out, wait until the device is still, and say what happened."""
+        ...
+
+    def play(self, commands: Signal) -> Played:
+        """Play once through: identification and recordings. Returns when it is over."""
+        ...
+
+    def stop(self) -> None:
+        """Emergency stop: no force from the next tick on, until the device is opened again."""
+        ...
+
+    def close(self) -> None:
+        """Let go and disconnect. Never raises; may be called twice."""
+        ...

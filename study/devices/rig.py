@@ -1,0 +1,59 @@
+"""The rig port: a bare device, without limits. Only the safety layer (`study.devices.safe`) may drive one.
+
+A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits, `write` (held until t_(k+1)).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.signal import FloatArray
+from study.devices.device import DeviceInfo
+
+POSITION = slice(0, 3)
+"""Where a reading holds the encoders' position of the handle, m."""
+ACCELERATION = slice(3, 6)
+"""The accelerometer's reading, m/s², in the device's axes as mounted, zeroed at rest."""
+TRUE_ACCELERATION = slice(6, 9)
+"""The handle's true acceleration, m/s²: known for a simulated device only, NaN for others."""
+SENSOR_CLIPPED = 9
+"""1 if a channel of the accelerometer was at its limit, else 0."""
+READING_SIZE = 10
+
+
+class Rig(Protocol):
+    """Driven tick by tick from Python: a real or a scripted device."""
+
+    @property
+    def info(self) -> DeviceInfo: ...
+
+    def sense(self) -> FloatArray:
+        """A reading, shape (READING_SIZE,). Raises `study.errors.DeviceError` when the device is gone."""
+        ...
+
+    def write(self, force_n: FloatArray) -> None:
+        """Command a force, shape (3,), x, y, z; held until the next one."""
+        ...
+
+    def close(self) -> None:
+        """Force off, disconnect. Never raises."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompiledRig:
+    """A simulated device whose two halves of a tick are compiled, so that whole blocks run without Python."""
+
+    info: DeviceInfo
+    state: FloatArray
+    """Changed in place by `advance`."""
+    parameters: FloatArray
+    noise: npt.NDArray[np.uint64]
+    """State of the sensor's random numbers, changed in place by `sense`."""
+    sense: Callable[..., Any]
+    """sense(state, parameters, noise, reading): fills reading, shape (READING_SIZE,)."""
+    advance: Callable[..., Any]
+    """advance(state, parameters, force_n): holds force_n, shape (3,), for one tick."""

@@ -1,0 +1,44 @@
+"""One kind of error for screen and command line: what happened, what was saved, what to do now."""
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """Exit codes of `hapteq`, a contract with those who script it."""
+
+    DONE = 0
+    ERROR = 1
+    WRONG_USE = 2
+    DEVICE = 3
+    INTERRUPTED = 130
+
+
+class StudyError(Exception):
+    """An error that a person can act on.
+
+    `happened` and `do_now` are whole sentences; `saved` says what is safe, where anything was at stake.
+    """
+
+    exit_code = ExitCode.ERROR
+
+    def __init__(self, title: str, happened: str, do_now: str, saved: str = "") -> None:
+        super().__init__(title)
+        self.title = title
+        self.happened = happened
+        self.saved = saved
+        self.do_now = do_now
+
+    def __str__(self) -> str:
+        return " ".join(part for part in (f"{self.title}.", self.happened, self.saved, self.do_now) if part)
+
+
+class WrongUseError(StudyError):
+    """The command line asked for something that cannot be."""
+
+    exit_code = ExitCode.WRONG_USE
+
+
+class DeviceError(StudyError):
+    """The device cannot be used, or stopped working."""
+
+    exit_code = ExitCode.DEVICE

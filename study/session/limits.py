@@ -1,0 +1,57 @@
+"""The limits of a sitting, from its protocol: what the safety layer keeps at every tick."""
+
+import math
+from dataclasses import dataclass
+
+from protocols.apparatus import SafetySettings
+from protocols.recording_protocol import RecordingProtocol, SineSegment
+from protocols.study_protocol import StudyProtocol
+
+SPRING_SLEW_N_PER_S = 100.0
+"""Room for the centring spring: 150 N/m pulled away at 0.6 m/s, faster than a hand moves in a trial."""
+
+SLEW_MARGIN = 1.05
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    stimulus_cap_n: float
+    total_cap_n: float
+    slew_n_per_s: float
+    longest_hold_s: float
+    watchdog_s: float
+    release_s: float
+
+
+def limits_of_study(protocol: StudyProtocol) -> Limits:
+    """Slew just above the steepest stimulus: the highest frequency at the cap, while it fades."""
+    stimulus = protocol.stimulus
+    fastest_hz = max(*stimulus.frequencies_hz, *protocol.training.frequencies_hz, 0.0)
+    fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
+    return _limits(protocol.safety, _slew(fastest_hz, protocol.staircase.cap_n, fade_s))
+
+
+def limits_of_recording(protocol: RecordingProtocol) -> Limits:
+    """Slew just above the steepest excitation of this recording."""
+    slews = [
+        _slew(max(s.frequencies_hz) if isinstance(s, SineSegment) else s.to_hz, s.amplitude_n, protocol.fade_s)
+        for s in protocol.segments
+    ]
+    return _limits(protocol.safety, max(slews))
+
+
+def _slew(frequency_hz: float, amplitude_n: float, fade_s: float) -> float:
+    """Bound of |d/dt (fade(t) A sin(2 pi f t))|: the fade's own slope is at most pi / (2 fade_s)."""
+    steepest = amplitude_n * (2 * math.pi * frequency_hz + math.pi / (2 * fade_s))
+    return SLEW_MARGIN * steepest + SPRING_SLEW_N_PER_S
+
+
+def _limits(safety: SafetySettings, slew_n_per_s: float) -> Limits:
+    return Limits(
+        stimulus_cap_n=safety.stimulus_cap_n,
+        total_cap_n=safety.total_cap_n,
+        slew_n_per_s=slew_n_per_s,
+        longest_hold_s=safety.longest_trial_s,
+        watchdog_s=safety.watchdog_s,
+        release_s=safety.release_s,
+    )

@@ -1,0 +1,75 @@
+"""From a level to a force that can be held: one loop of whole periods along one of the two directions."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.equalizer import Equalizer
+from protocols.apparatus import TestDirections
+from protocols.study_protocol import StimulusSettings
+
+AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}
+
+
+@dataclass(frozen=True, slots=True)
+class HeldStimulus:
+    """A force to be held: one loop of whole periods, repeated, with a fade at either end."""
+
+    loop: Signal
+    """(n, 3) in N, axes x, y, z, at the device's rate."""
+    fade_in_s: float
+    fade_out_s: float
+    fade_shape: str
+    """"raised_cosine" or "linear"."""
+
+
+def direction_vector(directions: TestDirections, direction: int) -> FloatArray:
+    """Unit vector (3,) of direction 1 or 2: 45° to either side of the line of symmetry."""
+    if direction not in (1, 2):
+        raise ValueError(f"there are directions 1 and 2, not {direction}")
+    angle = math.radians(direction_angle_deg(directions, direction))
+    first, second = AXES[directions.plane]
+    vector = np.zeros(3)
+    vector[first], vector[second] = math.cos(angle), math.sin(angle)
+    return vector
+
+
+def direction_angle_deg(directions: TestDirections, direction: int) -> float:
+    """Angle in the plane, from its first axis towards its second."""
+    return directions.symmetry_deg + (45.0 if direction == 1 else -45.0)
+
+
+def loop_length(frequency_hz: float, sample_rate_hz: float) -> int:
+    """Samples of the shortest loop of whole periods; frequencies are whole tenths of a hertz."""
+    rate, frequency = round(sample_rate_hz * 10), round(frequency_hz * 10)
+    return rate // math.gcd(rate, frequency)
+
+
+def held_stimulus(
+    settings: StimulusSettings,
+    unit_vector: FloatArray,
+    frequency_hz: float,
+    amplitude: float,
+    equalizer: Equalizer,
+    sample_rate_hz: float,
+) -> HeldStimulus:
+    """The stimulus of one trial. `amplitude` carries the onset's polarity in its sign; its unit is what the
+    equalizer takes: N without one, m/s² with one. unit_vector: (3,)."""
+    n = loop_length(frequency_hz, sample_rate_hz)
+    phase = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(n)
+    force = equalizer.takes == "force"
+    wanted = Signal(
+        samples=amplitude * np.sin(phase)[:, None] * unit_vector,
+        sample_rate_hz=sample_rate_hz,
+        quantity=equalizer.takes,
+        unit="N" if force else "m/s^2",
+        channels=("fx", "fy", "fz") if force else ("ax", "ay", "az"),
+    )
+    return HeldStimulus(
+        loop=equalizer.periodic(wanted),
+        fade_in_s=settings.fade_in_s,
+        fade_out_s=settings.fade_out_s,
+        fade_shape=settings.fade_shape,
+    )
