@@ -15,9 +15,11 @@ class Signal:
 
     samples: FloatArray
     sample_rate_hz: float
-    quantity: str
-    """One word for all channels: "force", "acceleration", "position", "torque", "angle", ..."""
-    unit: str
+    quantity: str | tuple[str, ...]
+    """One word for all channels ("force", "acceleration", "position", "torque", "angle", ...), or one per channel
+    where they differ. Equal words are folded into one, so a mixed signal never equals a plain word."""
+    unit: str | tuple[str, ...]
+    """Likewise."""
     channels: tuple[str, ...]
 
     def __post_init__(self) -> None:
@@ -26,6 +28,8 @@ class Signal:
             raise ValueError(f"samples must have shape (n, channels), not {samples.shape}")
         if samples.shape[1] != len(self.channels):
             raise ValueError(f"{samples.shape[1]} columns of samples but {len(self.channels)} channel names")
+        object.__setattr__(self, "quantity", _folded("quantity", self.quantity, len(self.channels)))
+        object.__setattr__(self, "unit", _folded("unit", self.unit, len(self.channels)))
         if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0):
             raise ValueError(f"sample_rate_hz must be a positive number, not {self.sample_rate_hz}")
         if samples.flags.writeable:
@@ -35,6 +39,16 @@ class Signal:
 
     def __len__(self) -> int:
         return int(self.samples.shape[0])
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """One per channel."""
+        return (self.quantity,) * len(self.channels) if isinstance(self.quantity, str) else self.quantity
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """One per channel."""
+        return (self.unit,) * len(self.channels) if isinstance(self.unit, str) else self.unit
 
     @property
     def duration_s(self) -> float:
@@ -49,4 +63,14 @@ class Signal:
 
     def rotated(self, rotation: FloatArray) -> Self:
         """Each sample v becomes rotation @ v. rotation: (channels, channels), orthogonal."""
+        if not (isinstance(self.quantity, str) and isinstance(self.unit, str)):
+            raise ValueError(f"channels of different quantities cannot be rotated into each other: {self.quantity}")
         return replace(self, samples=self.samples @ np.asarray(rotation, dtype=np.float64).T)
+
+
+def _folded(name: str, words: str | tuple[str, ...], channels: int) -> str | tuple[str, ...]:
+    if isinstance(words, str):
+        return words
+    if len(words) != channels:
+        raise ValueError(f"{len(words)} words of {name} for {channels} channels; one for all, or one per channel")
+    return words[0] if len(set(words)) == 1 else tuple(words)

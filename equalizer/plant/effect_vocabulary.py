@@ -1,0 +1,104 @@
+"""Names of physical effects that a model may lack: a vocabulary shared with every file, data alone.
+
+What an effect does is written elsewhere, one physics per file; here is only what it is called, where it sits and
+which numbers it has. Meanings: `gap` is the total play, `width` half the dead band, `gain` a factor (1 = none),
+`degrees` the total rotation angle, `ppm` > 0 takes the response at t (1 + ppm 1e-6), `per_m` is M (1 + per_m x);
+`total` and the hum's `amplitude` are those of the largest channel.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+Place = Literal["mechanism", "hand", "actuator", "sensor"]
+PLACES: tuple[Place, ...] = get_args(Place)
+
+RESPONSE = "response"
+"""Stands for the response's unit, in `EffectParameter.unit`."""
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    name: str
+    unit: str
+    """SI, of a translational model; with RESPONSE for the response's own."""
+    rotational_unit: str
+
+    def unit_in(self, rotational: bool, response_unit: str) -> str:
+        """The unit in a model whose response is in `response_unit`."""
+        unit = self.rotational_unit if rotational else self.unit
+        if unit == f"1/{RESPONSE}^2":
+            return f"1/({response_unit})^2"
+        return response_unit if unit == RESPONSE else unit
+
+
+@dataclass(frozen=True, slots=True)
+class EffectName:
+    name: str
+    place: Place
+    parameters: tuple[EffectParameter, ...]
+    """The main one first."""
+
+    @property
+    def main(self) -> EffectParameter:
+        return self.parameters[0]
+
+
+def _number(name: str, unit: str, rotational: str = "") -> EffectParameter:
+    return EffectParameter(name, unit, rotational or unit)
+
+
+def _level(name: str) -> EffectParameter:
+    return _number(name, "N", "N m")
+
+
+def _stiffness(name: str) -> EffectParameter:
+    return _number(name, "N/m", "N m/rad")
+
+
+def _damping(name: str) -> EffectParameter:
+    return _number(name, "N s/m", "N m s/rad")
+
+
+def _mass(name: str) -> EffectParameter:
+    return _number(name, "kg", "kg m^2")
+
+
+EFFECT_NAMES: tuple[EffectName, ...] = (
+    EffectName("coulomb_friction", "mechanism", (_level("level"),)),
+    EffectName("asymmetric_friction", "mechanism", (_level("level_positive"), _level("level_negative"))),
+    EffectName(
+        "stribeck_friction", "mechanism", (_level("coulomb"), _level("static"), _number("speed", "m/s", "rad/s"))
+    ),
+    EffectName("presliding_hysteresis", "mechanism", (_level("level"), _stiffness("stiffness"))),
+    EffectName("viscous_damping", "mechanism", (_damping("damping"),)),
+    EffectName("quadratic_damping", "mechanism", (_number("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
+    EffectName("hardening_stiffness", "mechanism", (_number("k3", "N/m^3", "N m/rad^3"),)),
+    EffectName("asymmetric_stiffness", "mechanism", (_number("k2", "N/m^2", "N m/rad^2"),)),
+    EffectName("constant_force", "mechanism", (_level("force"),)),
+    EffectName("cogging", "mechanism", (_level("amplitude"), _number("pitch", "m", "rad"))),
+    EffectName("backlash", "mechanism", (_number("gap", "m", "rad"),)),
+    EffectName("end_stop", "mechanism", (_number("position", "m", "rad"), _stiffness("stiffness"))),
+    EffectName("pose_dependent_inertia", "mechanism", (_number("per_m", "1/m", "1/rad"),)),
+    EffectName("extra_mode", "mechanism", (_number("frequency", "Hz"), _mass("mass"), _number("damping_ratio", "1"))),
+    EffectName("added_mass", "mechanism", (_mass("mass"),)),
+    EffectName("hand_impedance", "hand", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
+    EffectName("time_varying_grip", "hand", (_number("rate_hz", "Hz"), _number("depth", "1"))),
+    EffectName("force_saturation", "actuator", (_level("limit"),)),
+    EffectName("force_deadband", "actuator", (_level("width"),)),
+    EffectName("slew_limit", "actuator", (_number("rate", "N/s", "N m/s"),)),
+    EffectName("amplifier_lag", "actuator", (_number("time_constant", "s"),)),
+    EffectName("transport_delay", "actuator", (_number("delay", "s"),)),
+    EffectName("force_gain", "actuator", (_number("gain", "1"),)),
+    EffectName("sensor_lag", "sensor", (_number("bandwidth", "Hz"),)),
+    EffectName("sensor_clipping", "sensor", (_number("limit", RESPONSE),)),
+    EffectName("sensor_misalignment", "sensor", (_number("degrees", "deg"),)),
+    EffectName("sensor_gain", "sensor", (_number("gain", "1"),)),
+    EffectName("sensor_nonlinearity", "sensor", (_number("cubic", f"1/{RESPONSE}^2"),)),
+    EffectName("sensor_drift", "sensor", (_number("total", RESPONSE),)),
+    EffectName("quantization", "sensor", (_number("step", RESPONSE),)),
+    EffectName("mains_hum", "sensor", (_number("amplitude", RESPONSE), _number("frequency", "Hz"))),
+    EffectName("clock_drift", "sensor", (_number("ppm", "ppm"),)),
+    EffectName("lost_samples", "sensor", (_number("fraction", "1"),)),
+)
+
+EFFECTS_BY_NAME: dict[str, EffectName] = {effect.name: effect for effect in EFFECT_NAMES}

@@ -1,0 +1,149 @@
+"""A discrete linear model fitted to recordings: x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k]."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.signals.units import UnknownUnitError, parse_unit
+
+
+class IdentifiedModelError(ValueError):
+    """A model that contradicts itself. `problems`: one sentence each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentifiedModel:
+    """Sampled as recordings are: y[k] is taken just before u[k] is written, so D is zero for a causal device.
+
+    Raises IdentifiedModelError when built from what cannot be. An unstable model can be built: see `spectral_radius`.
+    """
+
+    A: FloatArray
+    """(n, n)"""
+    B: FloatArray
+    """(n, m)"""
+    C: FloatArray
+    """(p, n)"""
+    D: FloatArray
+    """(p, m)"""
+    sample_rate_hz: float
+    band_hz: tuple[float, float]
+    """Where the fit was made; the model says nothing outside."""
+    input_unit: str | tuple[str, ...]
+    """SI; one for all channels, or one per channel."""
+    output_unit: str | tuple[str, ...]
+    input_channels: tuple[str, ...]
+    output_channels: tuple[str, ...]
+    delay_samples: float = 0.0
+    """For information: A, B, C, D include the delay."""
+    place_m: tuple[float, float, float] | None = None
+    """Where in the workspace the handle was; None = not known."""
+    covariance: FloatArray | None = None
+    """(k, k), of `parameters`."""
+    samples: FloatArray | None = None
+    """(draws, k): draws of `parameters` from their uncertainty."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("A", "B", "C", "D", "covariance", "samples"):
+            if getattr(self, name) is not None:
+                matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
+                matrix.flags.writeable = False
+                object.__setattr__(self, name, matrix)
+        problems = tuple(_problems(self))
+        if problems:
+            raise IdentifiedModelError(problems)
+
+    @property
+    def order(self) -> int:
+        return int(self.A.shape[0])
+
+    @property
+    def parameters(self) -> FloatArray:
+        """(k,): the entries of A, B, C, D one after the other, each row by row."""
+        return np.concatenate([matrix.ravel() for matrix in (self.A, self.B, self.C, self.D)])
+
+    def with_parameters(self, parameters: FloatArray) -> Self:
+        """The same model with other numbers, shape (k,), in the order of `parameters`."""
+        shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]
+        stops = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
+        parts = np.split(np.asarray(parameters, dtype=np.float64), stops)
+        A, B, C, D = (part.reshape(shape) for part, shape in zip(parts, shapes, strict=True))
+        return replace(self, A=A, B=B, C=C, D=D)
+
+    @property
+    def spectral_radius(self) -> float:
+        """Below 1 the model is stable."""
+        return float(np.abs(np.linalg.eigvals(self.A)).max()) if self.order else 0.0
+
+
+def _problems(model: IdentifiedModel) -> Iterator[str]:
+    shape_problems = tuple(_shape_problems(model))
+    yield from shape_problems
+    yield from _channel_problems("input", model.input_channels, model.input_unit, model.B.shape[-1])
+    yield from _channel_problems("output", model.output_channels, model.output_unit, model.C.shape[0])
+    rate, (low, high) = model.sample_rate_hz, model.band_hz
+    if not (np.isfinite(rate) and rate > 0):
+        yield f"sample_rate_hz is {rate}; it must be a positive number"
+    elif not 0 <= low < high <= rate / 2:
+        yield f"band_hz is {low:g} to {high:g}; it must rise within 0 and half the sample rate, {rate / 2:g} Hz"
+    if not (np.isfinite(model.delay_samples) and model.delay_samples >= 0):
+        yield f"delay_samples is {model.delay_samples}; it must be a number that is not negative"
+    if model.place_m is not None and not (len(model.place_m) == 3 and np.isfinite(model.place_m).all()):
+        yield f"place_m is {model.place_m}; it must be three numbers, x, y, z in metres"
+    if not shape_problems:
+        yield from _uncertainty_problems(model)
+
+
+def _shape_problems(model: IdentifiedModel) -> Iterator[str]:
+    n, m, p = model.A.shape[0], model.B.shape[-1], model.C.shape[0]
+    for name, shape in {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}.items():
+        matrix: FloatArray = getattr(model, name)
+        if matrix.shape != shape:
+            yield f"{name} has shape {matrix.shape}, but {shape} goes with order {n}, {m} inputs and {p} outputs"
+        elif not np.isfinite(matrix).all():
+            yield f"{name} holds values that are not finite numbers"
+
+
+def _channel_problems(side: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int) -> Iterator[str]:
+    if len(channels) != count:
+        yield f"{side}_channels names {len(channels)} channels, but the matrices have {count}"
+    if len(set(channels)) != len(channels):
+        yield f"{side}_channels names a channel twice: {', '.join(channels)}"
+    units = (unit,) if isinstance(unit, str) else unit
+    if len(units) not in (1, count):
+        yield f"{side}_unit holds {len(units)} units for {count} channels; one for all, or one per channel"
+    for text in units:
+        try:
+            parsed = parse_unit(text)
+        except UnknownUnitError as error:
+            yield f"{side}_unit: {error}"
+        else:
+            if parsed.si != text:
+                yield f"{side}_unit is '{text}'; a model is in SI units, here {parsed.si}"
+
+
+def _uncertainty_problems(model: IdentifiedModel) -> Iterator[str]:
+    k = model.parameters.size
+    covariance, samples = model.covariance, model.samples
+    if covariance is not None:
+        if covariance.shape != (k, k):
+            yield f"covariance has shape {covariance.shape}, but the {k} entries of A, B, C, D need ({k}, {k})"
+        elif not np.isfinite(covariance).all():
+            yield "covariance holds values that are not finite numbers"
+        elif not np.allclose(covariance, covariance.T, rtol=1e-6, atol=1e-12 * float(np.abs(covariance).max())):
+            yield "covariance is not symmetric"
+        elif (np.diag(covariance) < 0).any():
+            yield "covariance has a negative variance on its diagonal"
+    if samples is not None:
+        if samples.ndim != 2 or samples.shape[1] != k or not len(samples):
+            yield f"samples has shape {samples.shape}, but must be (draws, {k}): the entries of A, B, C, D per draw"
+        elif not np.isfinite(samples).all():
+            yield "samples holds values that are not finite numbers"

@@ -1,0 +1,182 @@
+"""A mechanical model: masses, dampers and springs that a force drives and a sensor sees, with known effects added.
+
+M a + D v + K q = B u, y = C q (or its rate of change, by `quantity`); plus sensor, actuator and effects.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.signals.signal import FloatArray
+
+DERIVATIVE_OF_QUANTITY = {
+    "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
+}  # fmt: skip
+"""What a model's response may be, as the order of the coordinates' time derivative."""
+
+
+class MechanicalModelError(ValueError):
+    """A model that contradicts itself or the format. `problems`: one sentence each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, slots=True)
+class SensorLimits:
+    """0 = none."""
+
+    bandwidth_hz: float = 0.0
+    """One pole per channel, discrete at the sample rate: y += (1 - exp(-2 pi f / rate)) (x - y)."""
+    range: float = 0.0
+    """Largest magnitude that is read, in the response's SI unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorLimits:
+    """0 = none."""
+
+    delay_s: float = 0.0
+    bandwidth_hz: float = 0.0
+    limit: float = 0.0
+    """Largest force (N) or torque (N m) per channel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """One standard deviation of what was calibrated, at each driven axis; None = not stated.
+
+    Rotational models: kg m^2, N m s/rad, N m/rad.
+    """
+
+    mass_kg: float | None = None
+    damping_n_s_per_m: float | None = None
+    stiffness_n_per_m: float | None = None
+    modes: float | None = None
+    """Relative, of modal frequencies and masses."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelEffect:
+    """One entry of the vocabulary with its numbers."""
+
+    kind: str
+    axis: str | None
+    """The command's or response's axis or channel name; None where all share it."""
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MechanicalModel:
+    """Raises MechanicalModelError when built from what cannot be."""
+
+    name: str
+    quantity: str
+    """Of the response; a key of DERIVATIVE_OF_QUANTITY."""
+    mass: FloatArray
+    """(n, n), kg or kg m^2; symmetric and positive definite."""
+    damping: FloatArray
+    """(n, n), N s/m or N m s/rad"""
+    stiffness: FloatArray
+    """(n, n), N/m or N m/rad"""
+    input: FloatArray
+    """(n, m)"""
+    output: FloatArray
+    """(p, n); the same rows give the position where a position is recorded."""
+    sensor: SensorLimits = SensorLimits()
+    actuator: ActuatorLimits = ActuatorLimits()
+    effects: tuple[ModelEffect, ...] = ()
+    tolerance: Tolerance | None = None
+    rotational: bool = False
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "damping", "stiffness", "input", "output"):
+            matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
+            matrix.flags.writeable = False
+            object.__setattr__(self, name, matrix)
+        problems = tuple(_problems(self))
+        if problems:
+            raise MechanicalModelError(problems)
+
+    @property
+    def coordinates(self) -> int:
+        return int(self.mass.shape[0])
+
+    @property
+    def inputs(self) -> int:
+        return int(self.input.shape[1])
+
+    @property
+    def outputs(self) -> int:
+        return int(self.output.shape[0])
+
+
+def nearest(word: str, allowed: tuple[str, ...]) -> str:
+    """A suggestion to append to an error, or nothing."""
+    close = get_close_matches(word, allowed, n=1)
+    return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def _problems(model: MechanicalModel) -> Iterator[str]:
+    if model.quantity not in DERIVATIVE_OF_QUANTITY:
+        yield f"model.quantity is '{model.quantity}'; allowed are {', '.join(DERIVATIVE_OF_QUANTITY)}"
+    yield from _matrix_problems(model)
+    for place, limits in (("sensor", model.sensor), ("actuator", model.actuator), ("tolerance", model.tolerance)):
+        for name in () if limits is None else limits.__dataclass_fields__:
+            value = getattr(limits, name)
+            if value is not None and not (np.isfinite(value) and value >= 0):
+                yield f"{place}.{name} is {value}; it must be a number that is not negative"
+    for number, effect in enumerate(model.effects, start=1):
+        for problem in effect_problems(effect):
+            yield f"effect {number}: {problem}"
+
+
+def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
+    n = model.mass.shape[0]
+    shapes = {
+        "mass": (n, n), "damping": (n, n), "stiffness": (n, n),
+        "input": (n, *model.input.shape[1:2]), "output": (model.output.shape[0], n),
+    }  # fmt: skip
+    sound = True
+    for name, shape in shapes.items():
+        matrix: FloatArray = getattr(model, name)
+        if matrix.ndim != 2 or matrix.shape != shape or 0 in matrix.shape:
+            wanted = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
+            yield f"model.{name} has shape {matrix.shape}, but must have {wanted}: mass is {n} rows high"
+            sound = False
+        elif not np.isfinite(matrix).all():
+            yield f"model.{name} holds values that are not finite numbers"
+            sound = False
+    if sound:
+        yield from _mass_problems(model.mass)
+
+
+def _mass_problems(mass: FloatArray) -> Iterator[str]:
+    if not np.allclose(mass, mass.T, rtol=1e-6, atol=1e-9 * float(np.abs(mass).max())):
+        yield "model.mass is not symmetric; inertia acts alike both ways, so m[i][j] must equal m[j][i]"
+    elif (lowest := float(np.linalg.eigvalsh(mass)[0])) <= 0:
+        yield f"model.mass is not positive definite (its lowest eigenvalue is {lowest:.3g}); every motion needs a mass"
+
+
+def effect_problems(effect: ModelEffect) -> Iterator[str]:
+    """What contradicts the vocabulary."""
+    known = EFFECTS_BY_NAME.get(effect.kind)
+    if known is None:
+        names = tuple(EFFECTS_BY_NAME)
+        yield f"unknown kind '{effect.kind}'{nearest(effect.kind, names)}; allowed are {', '.join(names)}"
+        return
+    names = tuple(parameter.name for parameter in known.parameters)
+    for name, value in effect.parameters.items():
+        if name not in names:
+            yield f"{effect.kind} has no parameter '{name}'{nearest(name, names)}; allowed are {', '.join(names)}"
+        elif not np.isfinite(value):
+            yield f"{effect.kind}.{name} is {value}; it must be a finite number"
+    missing = [f"{part.name} ({part.unit})" for part in known.parameters if part.name not in effect.parameters]
+    if missing:
+        yield f"{effect.kind} lacks {', '.join(missing)}"

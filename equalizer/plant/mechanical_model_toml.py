@@ -1,0 +1,190 @@
+"""Mechanical models as TOML text, both ways."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from equalizer.plant.mechanical_model import (
+    ActuatorLimits,
+    MechanicalModel,
+    MechanicalModelError,
+    ModelEffect,
+    SensorLimits,
+    Tolerance,
+    nearest,
+)
+from equalizer.signals.signal import FloatArray
+
+MATRICES = ("mass", "damping", "stiffness", "input", "output")
+_MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
+_TABLES = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
+
+Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
+
+
+def parse_mechanical_model(text: str) -> MechanicalModel:
+    """Raises MechanicalModelError with every problem found, in words."""
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise MechanicalModelError((f"this is not TOML: {error}",)) from error
+    problems: list[str] = _unknown_keys(document, _TABLES, "")
+    model = _table(document, "model", problems)
+    problems += _unknown_keys(model, _MODEL_KEYS, "model.")
+    matrices = {name: _matrix(model, name, problems) for name in MATRICES}
+    words = {name: _word(model, name, problems) for name in ("name", "quantity")}
+    sensor = _numbers(document, "sensor", SensorLimits, problems)
+    actuator = _numbers(document, "actuator", ActuatorLimits, problems)
+    tolerance = _numbers(document, "tolerance", Tolerance, problems) if "tolerance" in document else None
+    effects = _effects(document.get("effect", []), problems)
+    rotational = model.get("rotational", document.get("rotational", False))
+    if not isinstance(rotational, bool):
+        problems.append(f"rotational is {rotational!r}; it must be true or false")
+    if problems:
+        raise MechanicalModelError(tuple(problems))
+    return MechanicalModel(
+        name=words["name"],
+        quantity=words["quantity"],
+        mass=matrices["mass"],
+        damping=matrices["damping"],
+        stiffness=matrices["stiffness"],
+        input=matrices["input"],
+        output=matrices["output"],
+        sensor=sensor,
+        actuator=actuator,
+        effects=effects,
+        tolerance=tolerance,
+        rotational=rotational,
+        provenance=_table(document, "provenance", problems),
+    )
+
+
+def mechanical_model_toml(model: MechanicalModel) -> str:
+    """Text that `parse_mechanical_model` reads back to the same numbers."""
+    lines = ["[model]", f"name = {_value(model.name)}", f"quantity = {_value(model.quantity)}"]
+    if model.rotational:
+        lines.append("rotational = true")
+    for name in MATRICES:
+        rows = [f"  {_value(row)}," for row in getattr(model, name).tolist()]
+        lines += [f"{name} = [", *rows, "]"]
+    lines += _section("[sensor]", asdict(model.sensor))
+    lines += _section("[actuator]", asdict(model.actuator))
+    for effect in model.effects:
+        lines += _section("[[effect]]", {"kind": effect.kind, "axis": effect.axis, **effect.parameters})
+    if model.tolerance is not None:
+        lines += _section("[tolerance]", asdict(model.tolerance))
+    if model.provenance:
+        lines += _section("[provenance]", model.provenance)
+    return "\n".join(lines) + "\n"
+
+
+def _unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:
+    return [
+        f"unknown key '{prefix}{key}'{nearest(key, allowed)}; allowed are {', '.join(allowed)}"
+        for key in table
+        if key not in allowed
+    ]
+
+
+def _table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        problems.append(f"{name} must be a table: [{name}]")
+        return {}
+    if name == "model" and not table:
+        problems.append("the table [model] is missing")
+    return table
+
+
+def _word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
+    word = table.get(name)
+    if not isinstance(word, str) or not word:
+        problems.append(f"model.{name} {'is missing' if word is None else f'is {word!r}'}; it must be a text")
+    return word
+
+
+def _matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatArray:
+    rows = table.get(name)
+    if rows is None:
+        problems.append(f"model.{name} is missing")
+    elif not (isinstance(rows, list) and rows and all(isinstance(row, list) for row in rows)):
+        problems.append(f"model.{name} must be a list of rows, as in [[1, 0], [0, 1]]")
+    elif len({len(row) for row in rows}) != 1:
+        problems.append(f"model.{name} has rows of different lengths: {', '.join(str(len(row)) for row in rows)}")
+    elif wrong := [value for row in rows for value in row if not _is_number(value)]:
+        problems.append(f"model.{name} holds {wrong[0]!r}, which is not a number")
+    else:
+        return np.array(rows, dtype=np.float64)
+    return np.empty((0, 0))
+
+
+def _numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], problems: list[str]) -> Numbers:
+    table = _table(document, name, problems)
+    allowed = tuple(part.name for part in fields(kind))
+    problems += _unknown_keys(table, allowed, f"{name}.")
+    known = {key: value for key, value in table.items() if key in allowed}
+    for key, value in known.items():
+        if not _is_number(value):
+            problems.append(f"{name}.{key} is {value!r}; it must be a number")
+    return kind(**{key: float(value) for key, value in known.items() if _is_number(value)})
+
+
+def _effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
+    if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
+        problems.append("effects are written as tables: [[effect]]")
+        return ()
+    found = []
+    for number, entry in enumerate(entries, start=1):
+        numbers = {key: value for key, value in entry.items() if key not in ("kind", "axis")}
+        wrong = [f"{key} = {value!r}" for key, value in numbers.items() if not _is_number(value)]
+        if wrong:
+            problems.append(f"effect {number} holds {', '.join(wrong)}; parameters are numbers")
+        if not isinstance(entry.get("kind"), str):
+            problems.append(f"effect {number} has no kind")
+        if not isinstance(entry.get("axis", ""), str):
+            problems.append(f"effect {number}: axis is {entry['axis']!r}; it must be a text, or left out for all axes")
+        found.append(ModelEffect(str(entry.get("kind")), entry.get("axis") or None, numbers))
+    return () if problems else tuple(_as_floats(effect) for effect in found)
+
+
+def _as_floats(effect: ModelEffect) -> ModelEffect:
+    return ModelEffect(effect.kind, effect.axis, {key: float(value) for key, value in effect.parameters.items()})
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _section(heading: str, table: Mapping[str, Any]) -> list[str]:
+    return ["", heading, *(f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None)]
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
+
+
+def _text(text: str) -> str:
+    """A basic string: control characters, quotes and backslashes escaped, all else as it is."""
+    return '"' + re.sub(r'[\x00-\x1f\x7f"\\]', lambda match: f"\\u{ord(match[0]):04x}", text) + '"'
+
+
+def _value(value: Any) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return _text(value)
+        case int():
+            return str(value)
+        case float():
+            return repr(float(value))
+        case list() | tuple():
+            return f"[{', '.join(_value(part) for part in value if part is not None)}]"
+        case Mapping():
+            parts = (f"{_key(key)} = {_value(part)}" for key, part in value.items() if part is not None)
+            return f"{{ {', '.join(parts)} }}" if value else "{}"
+    raise TypeError(f"a value of type {type(value).__name__} cannot be written as TOML: {value!r}")

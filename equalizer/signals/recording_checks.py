@@ -1,0 +1,102 @@
+"""What makes a recording consistent, and what an analysis may ask of it beyond that."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+
+
+class MissingSamplesError(ValueError):
+    """An analysis met NaN where it needs every sample."""
+
+
+def recording_problems(recording: Recording) -> tuple[str, ...]:
+    """Sentences, one for everything that contradicts the format. Empty = consistent. NaN counts as missing, not as
+    wrong: `require_finite` is for those who cannot use it."""
+    found = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]
+    if recording.time_s is not None:
+        found.extend(_time_problems(recording.time_s, len(recording)))
+    return tuple(found)
+
+
+def signals_of(recording: Recording) -> dict[str, Signal]:
+    """Those that the recording has, by the names of the format."""
+    every = {
+        "command": recording.command,
+        "response": recording.response,
+        "position": recording.position,
+        "excitation": recording.excitation,
+    }
+    return {name: signal for name, signal in every.items() if signal is not None}
+
+
+def require_finite(
+    recording: Recording, what_for: str, signals: Sequence[str] = ("command", "response", "position", "excitation")
+) -> None:
+    """Raises MissingSamplesError, with the first place and the number, if any of the signals misses samples."""
+    for name, signal in signals_of(recording).items():
+        missing = np.argwhere(~np.isfinite(signal.samples)) if name in signals else np.empty((0, 2))
+        if len(missing):
+            row, column = (int(index) for index in missing[0])
+            raise MissingSamplesError(
+                f"{what_for} needs every sample, but {name} misses {len(missing)} (the first at sample {row} of "
+                f"channel '{signal.channels[column]}'); leave out the segments with gaps, or record again"
+            )
+
+
+def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]:
+    for number, segment in enumerate(segments, start=1):
+        for problem in _problems_of_segment(segment, samples):
+            yield f"segment {number} {problem}"
+    ordered = sorted(enumerate(segments, start=1), key=lambda numbered: numbered[1].start)
+    for (first, one), (second, other) in pairwise(ordered):
+        if other.start < one.stop:
+            yield f"segments {first} and {second} overlap (one stops at {one.stop}, the other starts at {other.start})"
+
+
+def _problems_of_segment(segment: Segment, samples: int) -> Iterator[str]:
+    if not 0 <= segment.start < segment.stop:
+        yield f"goes from {segment.start} to {segment.stop}; start must be at least 0 and below stop"
+    elif segment.stop > samples:
+        yield f"stops at {segment.stop}, but the recording has {samples} samples"
+    if segment.kind not in SEGMENT_KINDS:
+        yield f"has the unknown kind '{segment.kind}'; allowed are {', '.join(SEGMENT_KINDS)}"
+    if segment.role not in SEGMENT_ROLES:
+        yield f"has the unknown role '{segment.role}'; allowed are fit, test, or empty"
+    if not (np.isfinite(segment.amplitude) and segment.amplitude >= 0):
+        yield f"has the amplitude {segment.amplitude}; it must be a number that is not negative"
+    if segment.period < 0:
+        yield f"has the period {segment.period}; it counts samples, and 0 means not periodic"
+
+
+def _signal_problems(recording: Recording) -> Iterator[str]:
+    if len(recording) == 0:
+        yield "response holds no samples"
+    for name, signal in signals_of(recording).items():
+        if len(signal) != len(recording):
+            yield f"{name} has {len(signal)} samples, but response has {len(recording)}; all must be equally long"
+        if signal.sample_rate_hz != recording.sample_rate_hz:
+            yield f"{name} is at {signal.sample_rate_hz:g} Hz, but response at {recording.sample_rate_hz:g} Hz"
+        if not signal.channels:
+            yield f"{name} has no channels"
+        if len(set(signal.channels)) != len(signal.channels):
+            yield f"{name} names a channel twice: {', '.join(signal.channels)}"
+        if np.isinf(signal.samples).any():
+            yield f"{name} holds infinite values; a missing sample is NaN"
+    if recording.excitation is not None and recording.excitation.channels != recording.command.channels:
+        yield (
+            f"excitation has the channels {', '.join(recording.excitation.channels)}, but command has "
+            f"{', '.join(recording.command.channels)}; excitation is the part of the command decided beforehand"
+        )
+
+
+def _time_problems(time_s: FloatArray, samples: int) -> Iterator[str]:
+    if time_s.shape != (samples,):
+        yield f"time_s has shape {time_s.shape}, but must be ({samples},), one stamp per sample"
+    elif not np.isfinite(time_s).all():
+        yield "time_s holds values that are not numbers; leave it out if the stamps are not known"
+    elif (np.diff(time_s) <= 0).any():
+        yield f"time_s does not grow at sample {int(np.argmax(np.diff(time_s) <= 0)) + 1}"

@@ -1,0 +1,169 @@
+"""Units written in ASCII and what they are in SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `g` (standard gravity)."""
+
+import math
+import re
+from dataclasses import dataclass
+
+Dimension = tuple[int, ...]
+"""Exponents of kg, m, s, A, K, rad. The angle counts, or N m and N m/rad could not be told apart."""
+
+
+class UnknownUnitError(ValueError):
+    """A unit that cannot be read, or that does not fit its quantity."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What a unit means: a value in it, times `factor`, is in `si`."""
+
+    si: str
+    factor: float
+    dimension: Dimension
+
+
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
+_PREFIXABLE: dict[str, Dimension] = {
+    "N": (1, 1, -2, 0, 0, 0),
+    "m": (0, 1, 0, 0, 0, 0),
+    "s": (0, 0, 1, 0, 0, 0),
+    "rad": (0, 0, 0, 0, 0, 1),
+    "V": (1, 2, -3, -1, 0, 0),
+    "A": (0, 0, 0, 1, 0, 0),
+    "Hz": (0, 0, -1, 0, 0, 0),
+    "Pa": (1, -1, -2, 0, 0, 0),
+    "J": (1, 2, -2, 0, 0, 0),
+    "W": (1, 2, -3, 0, 0, 0),
+    "K": (0, 0, 0, 0, 1, 0),
+    "ohm": (1, 2, -3, -2, 0, 0),
+    "T": (1, 0, -2, -1, 0, 0),
+}
+_FIXED: dict[str, Unit] = {
+    "1": Unit("1", 1.0, (0, 0, 0, 0, 0, 0)),
+    "%": Unit("1", 1e-2, (0, 0, 0, 0, 0, 0)),
+    "kg": Unit("kg", 1.0, (1, 0, 0, 0, 0, 0)),
+    "min": Unit("s", 60.0, (0, 0, 1, 0, 0, 0)),
+    "deg": Unit("rad", math.pi / 180, (0, 0, 0, 0, 0, 1)),
+    "rev": Unit("rad", 2 * math.pi, (0, 0, 0, 0, 0, 1)),
+    "rpm": Unit("rad/s", 2 * math.pi / 60, (0, 0, -1, 0, 0, 1)),
+    "g": Unit("m/s^2", 9.80665, (0, 1, -2, 0, 0, 0)),
+}
+KNOWN_UNITS = ("deg", "g", "rpm", "rev", "min", "%")
+"""Accepted beside SI; `g` is standard gravity, never a gram."""
+
+ALLOWED = (
+    "allowed are SI symbols in ASCII (N, N m, m, rad, m/s, m/s^2, rad/s^2, V, A, kg, s, Hz, 1 ...; "
+    f"prefixes n u m c k M) and {', '.join(KNOWN_UNITS)}"
+)
+
+QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
+    "force": ("N", "N m"),
+    "torque": ("N m",),
+    "position": ("m", "rad"),
+    "displacement": ("m", "rad"),
+    "angle": ("rad",),
+    "velocity": ("m/s", "rad/s"),
+    "speed": ("m/s", "rad/s"),
+    "acceleration": ("m/s^2", "rad/s^2"),
+    "voltage": ("V",),
+    "current": ("A",),
+    "time": ("s",),
+}
+"""What the SI unit of a well-known quantity may be; any other word may be used with any unit."""
+
+_NOT_ASCII = {"²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "µ": "u", "μ": "u", "°": "deg", "·": " ", "Ω": "ohm"}
+
+
+def parse_unit(text: str) -> Unit:
+    """Read a product such as `N m s/rad`. Raises UnknownUnitError with what is allowed."""
+    if not text.strip():
+        raise UnknownUnitError(f"the unit is missing; {ALLOWED}")
+    symbols: dict[str, int] = {}
+    factor = 1.0
+    dimension: Dimension = (0,) * 6
+    for symbol, power in _factors(text):
+        unit = _symbol(symbol, text)
+        factor *= unit.factor**power
+        dimension = tuple(have + power * more for have, more in zip(dimension, unit.dimension, strict=True))
+        for part, exponent in _factors(unit.si):
+            symbols[part] = symbols.get(part, 0) + power * exponent
+    return Unit(_PREFERRED.get(dimension) or _written(symbols), factor, dimension)
+
+
+def check_quantity(quantity: str, unit: Unit) -> None:
+    """Raises UnknownUnitError where a well-known quantity has a unit of something else."""
+    fitting = QUANTITY_UNITS.get(quantity)
+    if fitting and unit.si not in fitting:
+        raise UnknownUnitError(f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(fitting)}")
+
+
+def quantity_of(si: str) -> str:
+    """The usual word for what is measured in an SI unit; the unit itself where there is none."""
+    return _QUANTITY_OF.get(si, si)
+
+
+_QUANTITY_OF = {
+    "N": "force", "N m": "torque", "m": "position", "rad": "angle", "m/s": "velocity", "rad/s": "velocity",
+    "m/s^2": "acceleration", "rad/s^2": "acceleration", "V": "voltage", "A": "current", "s": "time",
+}  # fmt: skip
+
+
+def _factors(text: str) -> list[tuple[str, int]]:
+    """Symbols with their exponents; what follows a stroke is divided by."""
+    numerator, *denominators = text.replace("*", " ").split("/")
+    found = [_power(factor, 1, text) for factor in numerator.split()]
+    for part in denominators:
+        if len(part.split()) != 1:
+            raise _unknown(text, " (after each stroke stands exactly one symbol, as in N m s/rad or m/s/V)")
+        found.append(_power(part.strip(), -1, text))
+    if not numerator.strip():
+        raise _unknown(text)
+    return found
+
+
+def _power(factor: str, sign: int, text: str) -> tuple[str, int]:
+    match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?", factor)
+    if not match:
+        raise _unknown(text)
+    return match[1], sign * int(match[2] or 1)
+
+
+def _symbol(symbol: str, text: str) -> Unit:
+    if symbol in _FIXED:
+        return _FIXED[symbol]
+    if symbol in _PREFIXABLE:
+        return Unit(symbol, 1.0, _PREFIXABLE[symbol])
+    prefix, base = symbol[0], symbol[1:]
+    if prefix in _PREFIXES and base in _PREFIXABLE:
+        return Unit(base, _PREFIXES[prefix], _PREFIXABLE[base])
+    raise _unknown(text)
+
+
+def _written(symbols: dict[str, int]) -> str:
+    above = [_raised(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
+    below = [_raised(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
+    return "/".join([" ".join(above) or "1", *below])
+
+
+def _raised(symbol: str, power: int) -> str:
+    return symbol if power == 1 else f"{symbol}^{power}"
+
+
+def _unknown(text: str, why: str = "") -> UnknownUnitError:
+    return UnknownUnitError(f"'{text}' is not a unit known here{why}{_suggestion(text)}; {ALLOWED}")
+
+
+def _suggestion(text: str) -> str:
+    plain = "".join(_NOT_ASCII.get(letter, letter) for letter in text).replace("**", "^").strip()
+    plain = re.sub(r"(?<=[a-zA-Z])(-?[2-9])", r"^\1", plain)
+    if plain == text:
+        return ""
+    try:
+        parse_unit(plain)
+    except UnknownUnitError:
+        return ""
+    return f" (did you mean '{plain}'?)"
+
+
+_PREFERRED: dict[Dimension, str] = {}
+for _text in ("N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "s", "kg", "1"):
+    _PREFERRED[parse_unit(_text).dimension] = _text

@@ -1,0 +1,135 @@
+"""What is wanted at the handle and the forces that give it, as tables of numbers over time."""
+
+import csv
+import io
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
+
+STEP_TOLERANCE = 0.01
+"""Each time step may differ so much from the mean one, as a share; more is no constant rate."""
+RATE_TOLERANCE = 1e-5
+"""A rate is taken as the whole number of hertz it lies so close to: time stamps are rounded when printed."""
+
+
+class TableError(ValueError):
+    """A table that cannot be used. `problems`: one sentence each, with the line."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, slots=True)
+class TableKind:
+    name: str
+    header: tuple[str, ...]
+    quantity: str
+    unit: str
+
+
+TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration", "m/s^2")
+FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
+TABLE_KINDS = (TRAJECTORY, FORCES)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Samples at a constant rate. What happens before the first and after the last is not part of it."""
+
+    signal: Signal
+    """(n, 3): acceleration (m/s²) wanted, or force (N) commanded."""
+    start_s: float = 0.0
+    """Time of the first row, so that forces can keep the times of what they play."""
+
+    @property
+    def kind(self) -> TableKind:
+        return FORCES if self.signal.quantity == FORCES.quantity else TRAJECTORY
+
+    def __post_init__(self) -> None:
+        kind = self.kind
+        found = (self.signal.quantity, self.signal.unit, self.signal.channels)
+        if found != (kind.quantity, kind.unit, kind.header[1:]):
+            raise ValueError(
+                f"a table of {kind.name} holds {kind.quantity} in {kind.unit}, channels "
+                f"{', '.join(kind.header[1:])}, not {found[0]} in {found[1]}, channels {', '.join(found[2])}"
+            )
+
+
+def parse_trajectory(text: str) -> Trajectory:
+    """A table of either kind, told apart by its header. Raises TableError."""
+    rows = list(csv.reader(io.StringIO(text)))
+    header = tuple(name.strip() for name in rows[0]) if rows else ()
+    kind = next((kind for kind in TABLE_KINDS if kind.header == header), None)
+    if kind is None:
+        allowed = " or ".join(",".join(kind.header) for kind in TABLE_KINDS)
+        raise TableError((f"line 1 reads '{','.join(header)}'; allowed is {allowed}",))
+    table = _numbers(rows[1:], kind)
+    rate_hz = _rate_hz(table[:, 0])
+    signal = Signal(table[:, 1:], rate_hz, kind.quantity, kind.unit, kind.header[1:])
+    return Trajectory(signal, float(table[0, 0]))
+
+
+def trajectory_csv(trajectory: Trajectory) -> str:
+    """Text that `parse_trajectory` reads back to the same numbers. Raises TableError on missing samples."""
+    samples = trajectory.signal.samples
+    if not np.isfinite(samples).all():
+        raise TableError((f"a table of {trajectory.kind.name} cannot hold missing or infinite values",))
+    lines = [",".join(trajectory.kind.header)]
+    for index, row in enumerate(samples.tolist()):
+        time_s = trajectory.start_s + index / trajectory.signal.sample_rate_hz
+        lines.append(",".join(repr(value) for value in (time_s, *row)))
+    return "\n".join(lines) + "\n"
+
+
+def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
+    """Raises TableError where the rows are not at the model's rate."""
+    found = trajectory.signal.sample_rate_hz
+    if abs(found - rate_hz) > RATE_TOLERANCE * rate_hz:
+        raise TableError((f"the rows are at {found:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))
+
+
+def _numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
+    width = len(kind.header)
+    found, problems = [], []
+    for line, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        try:
+            values = [float(field) for field in row]
+        except ValueError:
+            values = [np.nan]
+        if len(row) != width:
+            problems.append(f"line {line} has {len(row)} fields, but the header names {width}")
+        elif not np.isfinite(values).all():
+            problems.append(f"line {line} reads '{','.join(row)}'; every field must be a number")
+        else:
+            found.append(values)
+    if problems:
+        rest = [f"and {len(problems) - 5} lines more like these"] if len(problems) > 6 else []
+        raise TableError((*problems[: 5 if rest else 6], *rest))
+    if len(found) < 2:
+        raise TableError((f"there are {len(found)} rows of numbers; a rate needs two or more",))
+    return np.array(found, dtype=np.float64)
+
+
+def _rate_hz(time_s: FloatArray) -> float:
+    steps = np.diff(time_s)
+    mean = float(time_s[-1] - time_s[0]) / len(steps)
+    if mean <= 0 or (steps <= 0).any():
+        row = int(np.argmax(steps <= 0))
+        raise TableError((f"time_s does not grow at row {row + 2} (line {row + 3})",))
+    off = np.abs(steps / mean - 1)
+    if (off > STEP_TOLERANCE).any():
+        row = int(np.argmax(off > STEP_TOLERANCE))
+        raise TableError(
+            (
+                f"time_s is not at a constant rate: the step to row {row + 2} (line {row + 3}) is {steps[row]:g} s, "
+                f"the mean step {mean:g} s; allowed is 1 % (write more digits, or resample)",
+            )
+        )
+    rate = 1 / mean
+    whole = round(rate)
+    return float(whole) if whole and abs(rate - whole) <= RATE_TOLERANCE * whole else rate
