@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from protocols.problem import Problem, refuse
 from protocols.staircase_rule import STRICT
 
 Plane = Literal["xy", "yz", "zx"]
@@ -25,15 +26,18 @@ class TestDirections:
 
     plane: Annotated[
         Plane,
-        Field(description="The plane of both directions. Default 'yz', the frontal plane, seen by the participant."),
+        Field(
+            description="The plane of both directions. Default 'yz', the frontal plane, because the picture on "
+            "the screen lies in it too."
+        ),
     ] = "yz"
     symmetry_deg: Annotated[
         float,
         Field(
             ge=-180,
             le=180,
-            description="Angle of the line of symmetry in the plane, from its first axis. Default 90: with one "
-            "leg upright the linkage mirrors left and right about the vertical.",
+            description="Angle of the linkage's line of symmetry in the plane, from its first axis. Default 90, "
+            "because with one leg upright the linkage mirrors left and right about the vertical.",
         ),
     ] = 90.0
 
@@ -43,11 +47,22 @@ class SpringSettings:
     """A weak virtual spring about the centre, which keeps the handle where the linkage is symmetric."""
 
     natural_frequency_hz: Annotated[
-        float, Field(ge=0, le=10, description="With the device's own mass at the handle; 0 = no spring.")
+        float,
+        Field(
+            ge=0,
+            le=10,
+            description="Natural frequency with the device's own mass at the handle; 0 = no spring. Default 3.5, as "
+            "published for identification: weak, below every frequency tested, and it keeps the handle central.",
+        ),
     ] = 3.5
     damping_n_s_per_m: Annotated[
         float,
-        Field(ge=0, le=20, description="Virtual damping beside it; the device's own is enough by default."),
+        Field(
+            ge=0,
+            le=20,
+            description="Virtual damping beside the spring. Default 0, because the device's own friction is enough and "
+            "differentiated encoders are noisy.",
+        ),
     ] = 0.0
 
 
@@ -72,7 +87,8 @@ class SafetySettings:
         Field(
             gt=0,
             le=600,
-            description="A stimulus is released after this time, answered or not; such a trial is void.",
+            description="A stimulus is released after this time, answered or not; such a trial is void. Default 120, "
+            "because an untimed task still must not hold a force on an empty chair.",
         ),
     ] = 120.0
     watchdog_s: Annotated[
@@ -80,13 +96,18 @@ class SafetySettings:
         Field(
             ge=0.05,
             le=5,
-            description="The force fades to zero when the program gives no sign of life for so long.",
+            description="The force fades to zero when the program gives no sign of life for so long. Default 0.5: "
+            "longer than any pause of a busy computer, shorter than a fright.",
         ),
     ] = 0.5
-    release_s: Annotated[float, Field(gt=0, le=1, description="Duration of that fade.")] = 0.05
+    release_s: Annotated[
+        float,
+        Field(gt=0, le=1, description="Duration of a fade for safety. Default 0.05: soon gone, without a jerk."),
+    ] = 0.05
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.total_cap_n < self.stimulus_cap_n:
-            raise ValueError("total_cap_n must not be below stimulus_cap_n")
+            allowed = f"at least {self.stimulus_cap_n} N, the stimulus_cap_n, with room for the spring"
+            refuse([Problem("total_cap_n", f"is {self.total_cap_n} N, below stimulus_cap_n", allowed)])
         return self

@@ -6,6 +6,8 @@ from typing import Annotated, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from protocols.problem import Problem, refuse
+
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
@@ -25,7 +27,7 @@ class StepChange(Enum):
 
 @dataclass(frozen=True, config=STRICT)
 class StepPhase:
-    step_db: Annotated[float, Field(gt=0, le=20, description="Size of one movement in dB.")]
+    step_db: Annotated[float, Field(gt=0, le=20, description="Size of one movement, in dB.")]
     reversals: Annotated[int, Field(ge=1, le=100, description="How many reversals belong to this phase.")]
 
 
@@ -33,7 +35,7 @@ class StepPhase:
 class StaircaseRule:
     """A transformed up-down rule. All numbers without a default are the experimenter's to state."""
 
-    start_n: Annotated[float, Field(gt=0, description="Level of the first trial of every run, in newtons.")]
+    start_n: Annotated[float, Field(ge=0.001, le=3.0, description="Level of the first trial of every run, in newtons.")]
     cap_n: Annotated[
         float, Field(gt=0, le=3.0, description="No trial is above this level, in newtons; 3 N at the most.")
     ]
@@ -54,29 +56,30 @@ class StaircaseRule:
     initial_one_up_one_down: Annotated[
         bool,
         Field(
-            description="Move after every answer until the first reversal. Default: no, the rule is stated "
+            description="Move after every answer until the first reversal. Default: no, because the rule is stated "
             "for the whole run, and the shortcut raises the spread of the threshold by 20 to 50 %."
         ),
     ] = False
     reversal: Annotated[
         Literal["level_direction"],
         Field(
-            description="What a reversal is: a change of the level's direction; the first movement is none. "
-            "Alternating answers alone make no peaks and valleys to average."
+            description="What a reversal is. Default, and the only one offered: a change of the level's direction, the "
+            "first movement being none, because alternating answers alone make no peaks and valleys to average."
         ),
     ] = "level_direction"
     at_cap: Annotated[
         Literal["clamp"],
         Field(
-            description="A movement beyond the cap stops at the cap and goes on from there; a push against "
-            "the cap is no reversal, because no peak is made. Both are counted."
+            description="What happens at the cap. Default, and the only one offered: a movement beyond the cap stops "
+            "at the cap and goes on from there; a push against it is no reversal, because no peak is made. Both are "
+            "counted."
         ),
     ] = "clamp"
     mean: Annotated[
         Literal["newton"],
         Field(
-            description="The threshold is the arithmetic mean of levels in newtons, the unit of the published "
-            "figure; the mean of the levels in dB is always written beside it."
+            description="How the peaks and valleys are averaged. Default, and the only one offered: arithmetic mean in "
+            "newtons, the unit of the published figure; the mean in dB is always written beside it."
         ),
     ] = "newton"
     trial_limit: Annotated[
@@ -91,15 +94,25 @@ class StaircaseRule:
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        problems = []
         if self.start_n > self.cap_n:
-            raise ValueError(f"start_n ({self.start_n} N) must not be above cap_n ({self.cap_n} N)")
+            problems.append(Problem("start_n", f"is {self.start_n} N, above cap_n", f"at most {self.cap_n} N, the cap"))
         if self.averaged_reversals > self.reversals:
-            raise ValueError(
-                f"averaged_reversals ({self.averaged_reversals}) must not exceed reversals ({self.reversals})"
+            problems.append(
+                Problem(
+                    "averaged_reversals",
+                    f"is {self.averaged_reversals}, more than a run has",
+                    f"at most {self.reversals}, the number in reversals",
+                )
             )
         planned = sum(phase.reversals for phase in self.steps)
         if planned != self.reversals:
-            raise ValueError(
-                f"the steps plan {planned} reversals in all, but the run ends after {self.reversals}; make them equal"
+            problems.append(
+                Problem(
+                    "steps",
+                    f"plan {planned} reversals in all, but the run ends after {self.reversals}",
+                    "phases whose reversals add up to the number in reversals",
+                )
             )
+        refuse(problems)
         return self

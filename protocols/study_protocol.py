@@ -6,10 +6,9 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from protocols.apparatus import SafetySettings, SpringSettings, TestDirections
+from protocols.field_types import Name, Source, StimulusFrequency, Title
+from protocols.problem import Problem, refuse
 from protocols.staircase_rule import STRICT, StaircaseRule
-
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="Lower case, digits, underscores.")]
-Frequency = Annotated[float, Field(ge=0.5, le=500.0)]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -17,7 +16,8 @@ class StimulusSettings:
     """One sinusoidal force along one of two directions, held until the answer."""
 
     frequencies_hz: Annotated[
-        tuple[Frequency, ...], Field(min_length=1, max_length=20, description="One staircase each, in hertz.")
+        tuple[StimulusFrequency, ...],
+        Field(max_length=20, description="One staircase each, in hertz. Empty for a session of training alone."),
     ]
     quantity: Annotated[
         Literal["commanded_force", "delivered_acceleration"],
@@ -31,20 +31,26 @@ class StimulusSettings:
         Field(
             gt=0,
             le=5,
-            description="The amplitude rises over this time, so that no onset tells the direction.",
+            description="The amplitude rises over this time. Default 0.5: two and a half periods at 5 Hz, so that "
+            "no onset tells the direction.",
         ),
     ] = 0.5
     fade_out_s: Annotated[
-        float, Field(gt=0, le=5, description="The amplitude falls over this time after the answer.")
+        float,
+        Field(
+            gt=0,
+            le=5,
+            description="The amplitude falls over this time after the answer. Default 0.25: no jerk, no waiting.",
+        ),
     ] = 0.25
     fade_shape: Annotated[
         Literal["raised_cosine", "linear"],
-        Field(description="Raised cosine by default: no corner at either end, hence no click."),
+        Field(description="Default: raised cosine, because it has no corner at either end, hence no click."),
     ] = "raised_cosine"
     onset_polarity: Annotated[
         Literal["random", "positive"],
         Field(
-            description="Sign of the first half-wave. Random by default, so that the first push does not "
+            description="Sign of the first half-wave. Default: random, so that the first push does not "
             "tell the direction."
         ),
     ] = "random"
@@ -52,53 +58,59 @@ class StimulusSettings:
     @model_validator(mode="after")
     def _distinct(self) -> Self:
         if len(set(self.frequencies_hz)) != len(self.frequencies_hz):
-            raise ValueError("frequencies_hz must not name a frequency twice")
-        if any(abs(f * 10 - round(f * 10)) > 1e-9 for f in self.frequencies_hz):
-            raise ValueError("frequencies_hz must be whole tenths of a hertz, so that a whole period can be looped")
+            refuse([Problem("frequencies_hz", "names a frequency twice", "every frequency once")])
         return self
 
 
 @dataclass(frozen=True, config=STRICT)
 class ScheduleSettings:
+    """In which order things come, and what is drawn by lot."""
+
     order: Annotated[
         Literal["random", "williams", "as_listed"],
         Field(
-            description="Order of the frequencies. Random by default, as published; 'williams' balances "
-            "first-order carry-over over participants."
+            description="Order of the frequencies. Default: random, as published; 'williams' balances "
+            "position and first-order carry-over over participants."
         ),
     ] = "random"
     directions: Annotated[
         Literal["independent", "balanced"],
         Field(
-            description="Independent draws by default: no run of equal directions tells the next one. "
-            "'balanced' shows both equally often within every eight trials."
+            description="How directions are drawn. Default: independently, because then no run of equal directions "
+            "tells the next one. 'balanced' shows both equally often within every eight trials."
         ),
     ] = "independent"
     labels: Annotated[
         Literal["fixed", "swapped_for_half"],
         Field(
-            description="Whether the numbers 1 and 2 change places for every second participant. "
-            "Fixed by default, as published; swapping separates a liking for a key from a direction."
+            description="Whether the numbers 1 and 2 change places for every second participant. Default: "
+            "fixed, as published; swapping separates a liking for a key from a direction."
         ),
     ] = "fixed"
 
 
 @dataclass(frozen=True, config=STRICT)
 class TrialSettings:
+    """One presentation and its answer."""
+
     feedback: Annotated[
         Literal["none", "after_answer"],
-        Field(description="Whether the participant learns if the answer was right. None by default."),
+        Field(
+            description="Whether the participant learns if the answer was right. Default: none, because none is "
+            "published and it would teach cues other than direction."
+        ),
     ] = "none"
     time_limit_s: Annotated[
         float,
-        Field(ge=0, le=600, description="Longest time to answer; 0 = as long as wanted, as published."),
+        Field(ge=0, le=600, description="Longest time to answer. Default 0: as long as wanted, as published."),
     ] = 0.0
     pause_between_s: Annotated[
         float,
         Field(
             ge=0,
             le=60,
-            description="Still time between an answer and the next stimulus, to feel the onset anew.",
+            description="Still time between an answer and the next stimulus. Default 0.5: the hand feels the next "
+            "onset as new.",
         ),
     ] = 0.5
 
@@ -108,18 +120,21 @@ class TrainingSettings:
     """Runs before the study proper. They follow the same rule and enter no result."""
 
     frequencies_hz: Annotated[
-        tuple[Frequency, ...], Field(max_length=20, description="One training run each, in this order.")
+        tuple[StimulusFrequency, ...],
+        Field(max_length=20, description="One training run each, in this order. Default: no training."),
     ] = ()
     trial_limit: Annotated[
         int,
         Field(
             ge=0,
             le=1000,
-            description="A training run ends after this many trials at the latest; 0 = a whole staircase.",
+            description="A training run ends after this many trials at the latest. Default 0: a whole staircase, "
+            "so that nobody starts untrained.",
         ),
     ] = 0
     feedback: Annotated[
-        Literal["none", "after_answer"], Field(description="As in [trial], for the training alone.")
+        Literal["none", "after_answer"],
+        Field(description="As trial.feedback, for the training alone. Default: none, like the trials it prepares."),
     ] = "none"
 
 
@@ -127,11 +142,22 @@ class TrainingSettings:
 class RestSettings:
     """Enforced pauses: vibration numbs the hand."""
 
-    after_run_s: Annotated[float, Field(ge=0, le=3600, description="Shortest rest between two runs.")] = 60.0
+    after_run_s: Annotated[
+        float,
+        Field(ge=0, le=3600, description="Shortest rest between two runs. Default 60: numbness fades in a minute."),
+    ] = 60.0
     after_trials: Annotated[
-        int, Field(ge=0, le=1000, description="A rest within a run after this many trials; 0 = none.")
+        int,
+        Field(
+            ge=0,
+            le=1000,
+            description="A rest within a run after this many trials. Default 0: none, because a run takes minutes.",
+        ),
     ] = 0
-    within_run_s: Annotated[float, Field(ge=0, le=3600, description="Shortest rest within a run.")] = 30.0
+    within_run_s: Annotated[
+        float,
+        Field(ge=0, le=3600, description="Shortest rest within a run. Default 30; idle while after_trials is 0."),
+    ] = 30.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -143,7 +169,8 @@ class MeasurementSettings:
         Field(
             gt=0,
             le=60,
-            description="The last whole periods of the steady part, this long at the most, are kept as a recording.",
+            description="The last whole periods of the steady part, this long at the most, are kept as a recording. "
+            "Default 1: five periods at 5 Hz.",
         ),
     ] = 1.0
     missed_ticks_limit: Annotated[
@@ -151,7 +178,8 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial with a larger share of missed 1 kHz ticks is void and drawn again.",
+            description="A trial with a larger share of missed 1 kHz ticks is void and drawn again. Default 0.02: "
+            "fewer cannot be felt.",
         ),
     ] = 0.02
 
@@ -161,13 +189,13 @@ class StudyProtocol:
     """A forced-choice staircase study on two directions."""
 
     name: Name
-    kind: Literal["study"]
-    title: Annotated[str, Field(min_length=1, max_length=200)]
+    kind: Annotated[Literal["study"], Field(description="Taken by a participant with `hapteq study`.")]
+    title: Title
     stimulus: StimulusSettings
     staircase: StaircaseRule
     directions: TestDirections
     safety: SafetySettings
-    source: Annotated[str, Field(max_length=1000, description="Where the numbers come from.")] = ""
+    source: Source = ""
     schedule: ScheduleSettings = Field(default_factory=ScheduleSettings)
     trial: TrialSettings = Field(default_factory=TrialSettings)
     training: TrainingSettings = Field(default_factory=TrainingSettings)
@@ -177,11 +205,23 @@ class StudyProtocol:
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if self.safety.stimulus_cap_n < self.staircase.cap_n:
-            raise ValueError(
-                f"safety.stimulus_cap_n ({self.safety.stimulus_cap_n} N) is below staircase.cap_n "
-                f"({self.staircase.cap_n} N): the highest levels could not be played"
+        problems = []
+        cap_n, limit_s = self.staircase.cap_n, self.trial.time_limit_s
+        if self.safety.stimulus_cap_n < cap_n:
+            wrong = f"is {self.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
+            problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
+        if limit_s >= self.safety.longest_trial_s:
+            wrong = f"is {limit_s} s, not below safety.longest_trial_s, which releases the device"
+            problems.append(
+                Problem("trial.time_limit_s", wrong, f"below {self.safety.longest_trial_s} s, or 0 for none")
             )
-        if self.trial.time_limit_s > 0 and self.trial.time_limit_s >= self.safety.longest_trial_s:
-            raise ValueError("trial.time_limit_s must be below safety.longest_trial_s, which releases the device")
+        if frequencies := (*self.training.frequencies_hz, *self.stimulus.frequencies_hz):
+            period_s = 1 / min(frequencies)
+            if self.measurement.keep_s < period_s:
+                wrong = f"is {self.measurement.keep_s} s, less than one period of the lowest frequency"
+                problems.append(Problem("measurement.keep_s", wrong, f"at least {period_s:g} s"))
+        else:
+            wrong = "is empty, and so is training.frequencies_hz: nothing would be played"
+            problems.append(Problem("stimulus.frequencies_hz", wrong, "at least one frequency in either"))
+        refuse(problems)
         return self
