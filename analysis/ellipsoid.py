@@ -1,0 +1,189 @@
+"""Acceleration ellipsoids: how much of a motion follows the direction of the force.
+
+Two definitions of the same picture, from a sinusoid of constant amplitude along a test direction:
+
+* second moments, as published: the mean of the squared accelerations in the frame of the test direction. Noise,
+  hum and harmonics all count as motion, so a noisy sensor rounds the ellipsoid.
+* phasors: the ellipse that the acceleration traces at the driven frequency alone, by lock-in. Noise averages out,
+  harmonics are told apart, and a phase between the axes shows as a width of the ellipse.
+
+Frame: first axis = test direction; third = the device axis most nearly perpendicular to it, made perpendicular;
+second = third x first. For a direction in a plane of device axes the first two axes span that plane.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.lockin import phasors
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+HARMONICS = 5
+"""Harmonics looked at, the fundamental included, as far as they lie below half the sample rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class MomentEllipsoid:
+    """The published definition."""
+
+    mean_square: tuple[tuple[float, ...], ...]
+    """(3, 3) in (m/s^2)^2, in the frame of the test direction; its diagonal is the mean squared acceleration."""
+    semi_axes_mps2: tuple[float, float, float]
+    """Root mean square along the principal axes, largest first."""
+    tilt_deg: float
+    """Of the largest axis from the test direction, 0 to 90."""
+    turn_deg: float
+    """The same in the plane of the first two axes of the frame, with sign, -90 to 90: for drawing."""
+
+    @property
+    def normalised_axes(self) -> tuple[float, float]:
+        """The two largest semi-axes, divided by the largest."""
+        return 1.0, self.semi_axes_mps2[1] / self.semi_axes_mps2[0]
+
+
+@dataclass(frozen=True, slots=True)
+class PhasorEllipse:
+    """The motion at the driven frequency alone."""
+
+    semi_axes_mps2: tuple[float, float]
+    """Amplitudes along the ellipse's two axes, larger first."""
+    tilt_deg: float
+    turn_deg: float
+    ellipticity: float
+    """Smaller over larger axis: 0 a straight line, 1 a circle."""
+    off_axis_ratio: float | None
+    """Amplitude perpendicular to the test direction over amplitude along it; None if there is none along."""
+    harmonic_share: float
+    """Energy of the harmonics 2 to 5 over that of the fundamental."""
+
+
+@dataclass(frozen=True, slots=True)
+class EllipsoidResult:
+    frequency_hz: float
+    along: str
+    amplitude_n: float
+    moments: MomentEllipsoid
+    phasor: PhasorEllipse
+
+
+def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None) -> tuple[EllipsoidResult, ...]:
+    """One result per sinusoid of the recording, in the order played.
+
+    The response must be acceleration in m/s^2 on three axes; meta["segments"] says of each segment its
+    frequency_hz, along and unit_vector (device frame). sensor_to_device: (3, 3) rotation from the sensor's frame to
+    the device's, identity by default. Raises ValueError where the recording does not hold what is needed.
+    """
+    response = recording.response
+    if response.samples.shape[1] != 3 or response.quantity != "acceleration":
+        raise ValueError(
+            f"an acceleration ellipsoid needs a response of 3 accelerations, not {response.samples.shape[1]} "
+            f"channels of {response.quantity}"
+        )
+    described = _descriptions(recording)
+    rotation = np.eye(3) if sensor_to_device is None else np.asarray(sensor_to_device, dtype=np.float64)
+    results = []
+    for number, (segment, about) in enumerate(zip(recording.segments, described, strict=True), start=1):
+        if segment.kind != "sine":
+            continue
+        samples = response.samples[segment.start : segment.stop] @ rotation.T
+        if not np.isfinite(samples).all():
+            raise ValueError(f"segment {number} (sine): the response has missing values")
+        results.append(_result(samples, recording.sample_rate_hz, segment, about))
+    if not results:
+        raise ValueError("the recording has no segment of kind sine, so there is no ellipsoid to compute")
+    return tuple(results)
+
+
+def direction_frame(unit_vector: FloatArray) -> FloatArray:
+    """Rows are the axes of the test direction's frame; frame @ v turns a device vector into it."""
+    first = np.asarray(unit_vector, dtype=np.float64)
+    length = float(np.linalg.norm(first))
+    if first.shape != (3,) or not math.isclose(length, 1.0, rel_tol=1e-3):
+        raise ValueError(f"unit_vector must be three numbers of norm 1, not {first.tolist()}")
+    first = first / length
+    third = np.eye(3)[int(np.argmin(np.abs(first)))]
+    third = third - (third @ first) * first
+    third = third / np.linalg.norm(third)
+    return np.stack([first, np.cross(third, first), third])
+
+
+def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
+    """samples: (n, 3) in the test direction's frame. The mean is taken off: gravity and offset are no motion."""
+    moving = samples - samples.mean(axis=0)
+    mean_square = moving.T @ moving / len(moving)
+    eigenvalues, vectors = np.linalg.eigh(mean_square)
+    if eigenvalues[-1] <= 0.0:
+        raise ValueError("the response does not move at all: there is no ellipsoid")
+    axes = np.sqrt(np.maximum(eigenvalues[::-1], 0.0))
+    tilt_deg, turn_deg = _angles_deg(vectors[:, -1])
+    return MomentEllipsoid(
+        mean_square=tuple(tuple(float(value) for value in row) for row in mean_square),
+        semi_axes_mps2=(float(axes[0]), float(axes[1]), float(axes[2])),
+        tilt_deg=tilt_deg,
+        turn_deg=turn_deg,
+    )
+
+
+def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: float) -> PhasorEllipse:
+    """samples: (n, 3) in the test direction's frame, one period at least."""
+    harmonics = max(1, min(HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
+    tones = phasors(samples, sample_rate_hz, frequency_hz, harmonics)
+    fundamental = tones[0]
+    # Re(p exp(i phi)) over all phi is the image of the unit circle under [Re p, -Im p]: its singular values and
+    # left singular vectors are the ellipse's axes.
+    directions, axes, _ = np.linalg.svd(np.column_stack([fundamental.real, -fundamental.imag]), full_matrices=False)
+    if axes[0] <= 0.0:
+        raise ValueError("the response does not move at all: there is no ellipse")
+    tilt_deg, turn_deg = _angles_deg(directions[:, 0])
+    along, across = abs(fundamental[0]), float(np.linalg.norm(fundamental[1:]))
+    energy = np.sum(np.abs(tones) ** 2, axis=1)
+    return PhasorEllipse(
+        semi_axes_mps2=(float(axes[0]), float(axes[1])),
+        tilt_deg=tilt_deg,
+        turn_deg=turn_deg,
+        ellipticity=float(axes[1] / axes[0]),
+        off_axis_ratio=float(across / along) if along > 0 else None,
+        harmonic_share=float(energy[1:].sum() / energy[0]),
+    )
+
+
+def _result(samples: FloatArray, sample_rate_hz: float, segment: Segment, about: dict[str, Any]) -> EllipsoidResult:
+    frequency_hz = float(about["frequency_hz"])
+    framed = samples @ direction_frame(np.asarray(about["unit_vector"], dtype=np.float64)).T
+    whole = int(len(framed) * frequency_hz / sample_rate_hz + 1e-9)
+    if whole < 1:
+        raise ValueError(f"the sinusoid of {frequency_hz:g} Hz is shorter than one period")
+    return EllipsoidResult(
+        frequency_hz=frequency_hz,
+        along=str(about["along"]),
+        amplitude_n=segment.amplitude,
+        # Whole periods alone: a torn period would tilt the mean squares.
+        moments=moment_ellipsoid(framed[: round(whole * sample_rate_hz / frequency_hz)]),
+        phasor=phasor_ellipse(framed, sample_rate_hz, frequency_hz),
+    )
+
+
+def _descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
+    described = recording.meta.get("segments")
+    if not isinstance(described, Sequence) or len(described) != len(recording.segments):
+        raise ValueError(
+            'meta["segments"] must describe each of the '
+            f"{len(recording.segments)} segments in order (frequency_hz, along, unit_vector)"
+        )
+    for number, (segment, about) in enumerate(zip(recording.segments, described, strict=True), start=1):
+        missing = [key for key in ("frequency_hz", "along", "unit_vector") if key not in about]
+        if segment.kind == "sine" and missing:
+            raise ValueError(f'meta["segments"]: segment {number} (sine) lacks {", ".join(missing)}')
+    return described
+
+
+def _angles_deg(axis: FloatArray) -> tuple[float, float]:
+    """Angle of an axis (a line, so without sign) from the first axis, and its turn in the plane of the first two."""
+    tilt = math.degrees(math.atan2(float(np.linalg.norm(axis[1:])), abs(float(axis[0]))))
+    sign = 1.0 if axis[0] >= 0 else -1.0
+    turn = math.degrees(math.atan2(sign * float(axis[1]), sign * float(axis[0])))
+    return tilt, turn

@@ -1,0 +1,160 @@
+"""Simulated participants straight through the staircase: no device, no session, no file."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.apparatus import SafetySettings, TestDirections
+from protocols.staircase import begin, finished, level_n, step
+from protocols.staircase_rule import StaircaseRule, StepPhase
+from protocols.study_protocol import StimulusSettings, StudyProtocol
+from protocols.trial import Phase, Trial, TrialStatus
+
+PUBLISHED = StaircaseRule(
+    start_n=1.0,
+    cap_n=3.0,
+    up_after_wrong=1,
+    down_after_right=3,
+    steps=(StepPhase(step_db=4.0, reversals=3), StepPhase(step_db=1.0, reversals=10)),
+    reversals=13,
+    averaged_reversals=10,
+)
+GUESSER = math.inf
+DELIVERED_PER_NEWTON = 4.0
+
+
+def chance_of_right(level: float, true_n: float, slope: float, lapse: float) -> float:
+    """Weibull observer of two alternatives whose 79.37 % level is true_n."""
+    if math.isinf(true_n):
+        return 0.5
+    scale = true_n / (-math.log(1 - (0.5 ** (1 / 3) - 0.5) / (0.5 - lapse))) ** (1 / slope)
+    return 0.5 + (0.5 - lapse) * (1 - math.exp(-((level / scale) ** slope)))
+
+
+def simulated_run(
+    true_n: float,
+    generator: np.random.Generator,
+    *,
+    rule: StaircaseRule = PUBLISHED,
+    subject: str = "s01",
+    run: int = 1,
+    frequency_hz: float = 15.0,
+    slope: float = 2.0,
+    lapse: float = 0.02,
+    felt: bool | None = None,
+) -> list[Trial]:
+    state, trials = begin(rule), []
+    while not finished(rule, state):
+        level = level_n(rule, state)
+        correct = bool(generator.random() < chance_of_right(level, true_n, slope, lapse))
+        shown = int(generator.integers(1, 3))
+        after = step(rule, state, correct)
+        trials.append(
+            Trial(
+                subject=subject,
+                session="1",
+                run=run,
+                trial=state.trials + 1,
+                attempt=1,
+                phase=Phase.TEST,
+                frequency_hz=frequency_hz,
+                level_n=level,
+                direction_shown=shown,
+                answer=shown if correct else 3 - shown,
+                correct=correct,
+                reversal=after.reversals > state.reversals,
+                response_time_s=1.0,
+                delivered_mps2=DELIVERED_PER_NEWTON * level,
+                off_axis_mps2=0.5 * level,
+                displacement_mm=0.1 * level,
+                missed_ticks=0,
+                felt=felt,
+                status=TrialStatus.OK,
+            )
+        )
+        state = after
+    return trials
+
+
+def answered_run(answers: str, rule: StaircaseRule = PUBLISHED) -> list[Trial]:
+    """A run from answers written as 1 (right) and 0 (wrong), directions in turn; the rest after the end is not used."""
+    template = simulated_run(1.0, np.random.default_rng(0))[0]
+    state, trials = begin(rule), []
+    for index, answer in enumerate(answers):
+        if finished(rule, state):
+            break
+        shown = 1 + index % 2
+        correct = answer == "1"
+        trials.append(
+            replace(
+                template,
+                trial=index + 1,
+                level_n=level_n(rule, state),
+                direction_shown=shown,
+                answer=shown if correct else 3 - shown,
+                correct=correct,
+                delivered_mps2=DELIVERED_PER_NEWTON * level_n(rule, state),
+            )
+        )
+        state = step(rule, state, correct)
+    return trials
+
+
+@pytest.fixture
+def rule() -> StaircaseRule:
+    return PUBLISHED
+
+
+@pytest.fixture
+def protocol() -> StudyProtocol:
+    return StudyProtocol(
+        name="direction_threshold",
+        kind="study",
+        title="Direction threshold",
+        stimulus=StimulusSettings(frequencies_hz=(5.0, 15.0, 25.0, 35.0, 45.0)),
+        staircase=PUBLISHED,
+        directions=TestDirections(),
+        safety=SafetySettings(stimulus_cap_n=3.0, total_cap_n=5.0),
+    )
+
+
+@pytest.fixture
+def simulate() -> Callable[..., list[Trial]]:
+    return simulated_run
+
+
+@pytest.fixture
+def answered() -> Callable[..., list[Trial]]:
+    return answered_run
+
+
+@pytest.fixture
+def simulate_study() -> Callable[..., list[Trial]]:
+    """A whole study: thresholds rise with frequency; people differ by a factor."""
+
+    def study(
+        subjects: int = 10,
+        true_n: Sequence[float] = (0.6, 0.7, 0.8, 2.4, 6.0),
+        seed: int = 1,
+        felt: bool | None = None,
+    ) -> list[Trial]:
+        frequencies = (5.0, 15.0, 25.0, 35.0, 45.0)
+        trials: list[Trial] = []
+        for number in range(subjects):
+            generator = np.random.default_rng([seed, number])
+            factor = 10 ** (generator.normal(0, 3.0) / 20)
+            for run, index in enumerate(generator.permutation(len(true_n)), start=1):
+                trials += simulated_run(
+                    true_n[index] * factor,
+                    generator,
+                    subject=f"s{number + 1:02d}",
+                    run=run,
+                    frequency_hz=frequencies[index],
+                    felt=felt,
+                )
+        return trials
+
+    return study
