@@ -60,7 +60,7 @@ def test_a_changed_answer_is_found_by_a_later_level(rows, rule):
 
 def test_an_answer_after_the_last_reversal_is_refused(rows, rule):
     rows.append(replace(rows[-1], trial=rows[-1].trial + 1))
-    with pytest.raises(InconsistentTrialsError, match="although the run was over after .* with 13 reversals"):
+    with pytest.raises(InconsistentTrialsError, match=r"although the run was over after .* with 13 reversals"):
         recompute_runs(rows, rule)
 
 

@@ -53,10 +53,11 @@ def test_nothing_measured_leaves_the_delivered_threshold_empty(answered, rule):
 
 
 def test_one_peak_at_the_cap_among_the_averaged_marks_a_lower_bound(answered, rule):
-    # Ten wrong answers climb to the cap; then peaks at the cap and valleys one step below, to the end.
-    (row,) = thresholds(answered("0" * 10 + "1110" * 7), rule)
+    # Climb to the cap, three turns by 4 dB, climb again; then peaks at the cap and valleys one step below.
+    (row,) = thresholds(answered("0" * 4 + "111" + "0" + "111" + "0" * 6 + "1110" * 6), rule)
     assert row.complete
     assert row.cap_reversals == 5
+    assert row.threshold_n == pytest.approx((5 * 3.0 + 4 * 3.0 / 10**0.05 + 3.0 / 10**0.2) / 10)
     assert row.censored
     assert row.threshold_n < 3.0
     assert row.pushes_against_cap > 0
