@@ -1,0 +1,56 @@
+"""Recordings made one after another, as one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+
+def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
+    """All parts end to end; their segments move along. Time stamps are dropped, because there were pauses.
+
+    Raises ValueError for no parts, or for parts of different devices, rates or channels.
+    """
+    if not parts:
+        raise ValueError("there is nothing to join")
+    first = parts[0]
+    for part in parts[1:]:
+        if (part.device, part.sample_rate_hz) != (first.device, first.sample_rate_hz):
+            raise ValueError(
+                f"a recording of {part.device} at {part.sample_rate_hz:g} Hz cannot follow one of {first.device} "
+                f"at {first.sample_rate_hz:g} Hz"
+            )
+    starts = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
+    segments = [
+        _moved(segment, int(start)) for part, start in zip(parts, starts, strict=False) for segment in part.segments
+    ]
+    return Recording(
+        device=first.device,
+        command=_joined([part.command for part in parts]),
+        response=_joined([part.response for part in parts]),
+        position=_all_or_none([part.position for part in parts]),
+        excitation=_all_or_none([part.excitation for part in parts]),
+        hold=first.hold,
+        segments=tuple(segments),
+        meta=meta,
+    )
+
+
+def _moved(segment: Segment, by: int) -> Segment:
+    return replace(segment, start=segment.start + by, stop=segment.stop + by)
+
+
+def _all_or_none(signals: Sequence[Signal | None]) -> Signal | None:
+    present = [signal for signal in signals if signal is not None]
+    return _joined(present) if len(present) == len(signals) else None
+
+
+def _joined(signals: Sequence[Signal]) -> Signal:
+    first = signals[0]
+    if any((s.channels, s.unit) != (first.channels, first.unit) for s in signals):
+        raise ValueError(f"not all parts have the channels {', '.join(first.channels)} in {first.unit}")
+    return replace(first, samples=np.concatenate([s.samples for s in signals]))

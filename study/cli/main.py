@@ -1,0 +1,82 @@
+"""The command `hapteq`: one file per subcommand, and the only place that turns errors into words and exit codes.
+
+Results go to stdout, talk and progress to stderr. Imports are light, so that `--help` is instant: a command's body
+imports what it needs.
+"""
+
+import signal
+import sys
+from types import FrameType
+from typing import Annotated
+
+import click
+import typer
+
+from study.cli import analyze, protocol, record, rehearse, resume, study, validate, withdraw
+from study.errors import ExitCode, StudyError
+
+app = typer.Typer(
+    name="hapteq",
+    help="Force-direction studies on haptic devices: run them, and know what the device really played.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("study")(study.study)
+app.command("resume")(resume.resume)
+app.command("rehearse")(rehearse.rehearse)
+app.command("analyze")(analyze.analyze)
+app.command("record")(record.record)
+app.add_typer(protocol.app, name="protocol")
+app.command("withdraw")(withdraw.withdraw)
+app.command("validate")(validate.validate)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"hapteq {version('hapteq')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version and exit.")
+    ] = False,
+) -> None:
+    return None
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; returns its exit code."""
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _leave)
+    try:
+        code = app(args=arguments, standalone_mode=False)
+        return code if isinstance(code, int) else ExitCode.DONE
+    except StudyError as error:
+        say(error)
+        return error.exit_code
+    except click.ClickException as error:
+        error.show()
+        return ExitCode.WRONG_USE
+    except (KeyboardInterrupt, click.Abort):
+        sys.stderr.write("\nInterrupted.\n")
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        return ExitCode.ERROR
+
+
+def say(error: StudyError) -> None:
+    """Title on a line, then what happened, what is safe, what to do."""
+    parts = (error.happened, error.saved, error.do_now)
+    sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """A closed terminal or a polite kill: leave like Ctrl-C, with the device released and the log closed."""
+    raise KeyboardInterrupt

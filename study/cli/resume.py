@@ -1,0 +1,19 @@
+"""`hapteq resume`: go on with a session after a crash or a pause."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.study import DataOption, DeviceOption
+
+
+def resume(
+    session: Annotated[str, typer.Argument(help="Session folder, or its name in the data folder.")],
+    device: DeviceOption = "simulated",
+    data: DataOption = Path("data"),
+) -> None:
+    """Go on with a session: its log is folded and checked, a torn last line mended, an open trial drawn again."""
+    from study.cli.conduct import go_on
+
+    go_on(session, device=device, data=data)

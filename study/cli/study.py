@@ -1,0 +1,30 @@
+"""`hapteq study`: take the study, as a person or as a simulated participant."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
+DeviceOption = Annotated[str, typer.Option("--device", help="The device: simulated.")]
+
+
+def study(
+    protocol: Annotated[str, typer.Option(help="A shipped protocol's name, or a file.")] = "direction_threshold",
+    device: DeviceOption = "simulated",
+    subject: Annotated[str | None, typer.Option(help="Participant code, letters and digits.")] = None,
+    observer: Annotated[
+        str | None, typer.Option(help="Let a simulated participant take it: ideal, lapsing, biased, guesser, …")
+    ] = None,
+    plain: Annotated[bool, typer.Option("--plain", help="Line mode, also when input is not a terminal.")] = False,
+    data: DataOption = Path("data"),
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws; drawn and logged if not given.")] = None,
+) -> None:
+    """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
+    from study.cli.conduct import Sitter, begin
+
+    if observer is None and not plain and not sys.stdin.isatty():
+        typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
+        observer = "ideal"
+    begin(Sitter(observer=observer, subject=subject), protocol_name=protocol, device=device, data=data, seed=seed)

@@ -1,0 +1,27 @@
+"""`hapteq validate`: check any of our files and say in words what is wrong."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def validate(
+    files: Annotated[list[Path], typer.Argument(help="Files or session folders.")],
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
+) -> None:
+    """Check files: recordings, models, protocols, tables, logs. Exit code 1 if anything is wrong."""
+    from study.errors import ExitCode
+    from study.workflows.validate import validate_file
+
+    found = [validate_file(path) for path in files]
+    if as_json:
+        rows = [{"file": str(v.path), "kind": v.kind, "problems": list(v.problems)} for v in found]
+        typer.echo(json.dumps(rows, indent=2))
+    for validation in [] if as_json else found:
+        typer.echo(f"{validation.path}: {validation.kind}: {'not valid' if validation.problems else 'valid'}")
+        for problem in validation.problems:
+            typer.echo(f"  {problem}")
+    if any(v.problems for v in found):
+        raise typer.Exit(ExitCode.ERROR)

@@ -1,0 +1,42 @@
+"""Start hapteq, once it is sure that its four packages are its own.
+
+Their names are generic. A stranger's `analysis.py` or `study.py` on the import path would be taken for ours, and
+the program would die of a riddle. This module has a name of its own, so that it can say so instead.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+PACKAGES = ("study", "analysis", "equalizer", "protocols")
+
+
+def home() -> Path:
+    """The folder in which the four packages lie: beside this file when installed, the checkout otherwise."""
+    here = Path(__file__).resolve().parent
+    return here.parent.parent if here.name == "launcher" else here
+
+
+def strangers() -> list[Path]:
+    """What would be imported under one of our names without being ours."""
+    found = []
+    for name in PACKAGES:
+        spec = importlib.util.find_spec(name)
+        origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
+        if origin is not None and origin != home() / name / "__init__.py":
+            found.append(origin)
+    return found
+
+
+def main() -> int:
+    foreign = strangers()
+    if foreign:
+        names = ", ".join(str(path) for path in foreign)
+        sys.stderr.write(
+            f"Another program's files hide those of hapteq: {names}.\n"
+            "Nothing was started. Rename them, or start hapteq without their folder on PYTHONPATH.\n"
+        )
+        return 1
+    from study.cli.main import main as command_line
+
+    return command_line()

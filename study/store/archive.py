@@ -1,0 +1,107 @@
+"""Where sessions lie: one folder each in the data folder, named after participant code and number."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.errors import StudyError, WrongUseError
+from study.store.event_log import LOG_NAME
+
+CODE = re.compile(r"[A-Za-z0-9]{1,16}")
+FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
+TOMBSTONE_NAME = "withdrawn.json"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFolder:
+    path: Path
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+    @property
+    def subject(self) -> str:
+        return self.name.rpartition("_")[0]
+
+    @property
+    def log(self) -> Path:
+        return self.path / LOG_NAME
+
+    @property
+    def recordings(self) -> Path:
+        return self.path / "recordings"
+
+    @property
+    def tombstone(self) -> Path:
+        return self.path / TOMBSTONE_NAME
+
+    @property
+    def withdrawn(self) -> bool:
+        return self.tombstone.exists()
+
+
+def check_subject(code: str) -> str:
+    """A participant appears by a code only: letters and digits, nothing that could be a name with an address."""
+    if not CODE.fullmatch(code):
+        raise WrongUseError(
+            "This is no participant code",
+            f"'{code}' was given; a code has 1 to 16 letters and digits, such as P01.",
+            "Use the code from your list; names, initials with dots and e-mail addresses stay off this computer.",
+        )
+    return code
+
+
+def new_session_folder(data: Path, subject: str) -> SessionFolder:
+    """Make the participant's next folder. Never touches an existing one, also when two programs race."""
+    check_subject(subject)
+    try:
+        data.mkdir(parents=True, exist_ok=True)
+        for _ in range(1000):
+            taken = [folder_number(f.name) for f in session_folders(data) if f.subject == subject]
+            path = data / f"{subject}_{max(taken, default=0) + 1:03d}"
+            try:
+                path.mkdir()
+            except FileExistsError:
+                continue
+            (path / "recordings").mkdir()
+            return SessionFolder(path)
+    except OSError as problem:
+        raise StudyError(
+            "The session folder cannot be made",
+            f"In {data}: {problem.strerror}.",
+            "Choose another folder with --data, or make room and check its permissions.",
+        ) from problem
+    raise StudyError("The session folder cannot be made", f"{data} is changing all the time.", "Try again.")
+
+
+def session_folders(data: Path) -> tuple[SessionFolder, ...]:
+    """All session folders below `data`, withdrawn ones included, in the order of their names."""
+    if not data.is_dir():
+        return ()
+    return tuple(SessionFolder(p) for p in sorted(data.iterdir()) if p.is_dir() and FOLDER.fullmatch(p.name))
+
+
+def folder_number(name: str) -> int:
+    match = FOLDER.fullmatch(name)
+    return int(match["number"]) if match else 0
+
+
+def find_session(session: str, data: Path) -> SessionFolder:
+    """A session by its folder or, within `data`, by its name."""
+    for path in (Path(session), data / session):
+        folder = SessionFolder(path.resolve())
+        if folder.withdrawn:
+            raise StudyError(
+                "This session was withdrawn",
+                f"The participant of {folder.name} withdrew; the data were erased.",
+                "Nothing can be done with it.",
+            )
+        if folder.log.exists():
+            return folder
+    known = ", ".join(f.name for f in session_folders(data) if not f.withdrawn) or "none"
+    raise WrongUseError(
+        "There is no such session",
+        f"'{session}' is neither a session folder nor the name of one in {data}. Sessions there: {known}.",
+        "Give the folder, or its name together with --data.",
+    )

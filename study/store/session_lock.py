@@ -1,0 +1,30 @@
+"""One writer per session: a lock that the operating system drops when its holder dies, however it dies."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from study.errors import StudyError
+
+LOCK_NAME = "session.lock"
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the session's lock. Raises StudyError at once where somebody else does."""
+    lock = FileLock(folder / LOCK_NAME)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as held:
+        raise StudyError(
+            "This session is running elsewhere",
+            f"Another program is writing to {folder.name}.",
+            "Close it there first, or follow it without writing.",
+            saved="Nothing was changed.",
+        ) from held
+    try:
+        yield
+    finally:
+        lock.release()

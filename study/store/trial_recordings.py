@@ -1,0 +1,43 @@
+"""The recording of each trial, beside the log: written once, named by run, trial and attempt."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from equalizer.signals.recording import Recording
+from study.store.archive import SessionFolder
+from study.store.recording_file import read_recording, write_recording
+
+
+@dataclass(frozen=True, slots=True)
+class SavedRecording:
+    name: str
+    """Relative to the session folder."""
+    sha256: str
+
+
+def recording_name(run: int, trial: int, attempt: int) -> str:
+    return f"recordings/run-{run:02d}_trial-{trial:03d}_attempt-{attempt}.h5"
+
+
+def save_trial_recording(
+    folder: SessionFolder, name: str, recording: Recording, conditions: Mapping[str, Any]
+) -> SavedRecording:
+    """On return it is on the disk. conditions: JSON values that say what was played and how the device fared."""
+    path = folder.path / name
+    write_recording(path, replace(recording, meta={**recording.meta, **conditions}))
+    return SavedRecording(name, _sha256(path))
+
+
+def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
+    """A recording that reached the disk although the log does not know of it."""
+    path = folder.path / name
+    if not path.exists():
+        return None
+    return SavedRecording(name, _sha256(path)), read_recording(path)
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,63 @@
+"""The two directions as oriented segments, told apart by number, place and line style, and in words."""
+
+import math
+
+from study.session.views import DirectionPicture
+from study.tui.braille import Canvas
+
+ENDS = {
+    "yz": (("right", "left"), ("up", "down")),
+    "xy": (("toward you", "away from you"), ("right", "left")),
+    "zx": (("up", "down"), ("toward you", "away from you")),
+}
+"""Words for the positive and the negative end of a plane's first and second axis."""
+
+SCREEN = {"yz": ((1, 0), (0, 1)), "xy": ((0, -1), (1, 0)), "zx": ((0, 1), (1, 0))}
+"""Where a plane's first and second axis point on the screen: (right, up). 'xy' is seen from above."""
+
+
+def sentence(picture: DirectionPicture, number: int) -> str:
+    """Such as "1: up-left to down-right"."""
+    angle = picture.angle_deg[number - 1]
+    return f"{number}: {_end(picture.plane, angle)} to {_end(picture.plane, angle + 180)}"
+
+
+def drawing(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
+    """Both directions side by side: 1 solid, 2 dashed, each with its number below."""
+    left = _one(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
+    right = _one(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
+    numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
+    return [f"{a}    {b}".rstrip() for a, b in zip(left, right, strict=True)] + [numbers.rstrip()]
+
+
+def _one(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
+    canvas = Canvas(columns, rows)
+    right, up = _on_screen(plane, angle_deg)
+    cx, cy = (canvas.width - 1) / 2, (canvas.height - 1) / 2
+    reach = 0.95 * min(cx, cy)
+    start, end = (cx - reach * right, cy + reach * up), (cx + reach * right, cy - reach * up)
+    canvas.line(start, end, dashed)
+    for tip, turn in ((start, 180.0), (end, 0.0)):
+        for spread in (150.0, -150.0):
+            heading = math.degrees(math.atan2(up, right)) + turn + spread
+            h = math.radians(heading)
+            barb = (tip[0] + 5 * math.cos(h), tip[1] - 5 * math.sin(h))
+            canvas.line(tip, barb)
+    return canvas.lines()
+
+
+def _on_screen(plane: str, angle_deg: float) -> tuple[float, float]:
+    first, second = SCREEN[plane]
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    return c * first[0] + s * second[0], c * first[1] + s * second[1]
+
+
+def _end(plane: str, angle_deg: float) -> str:
+    (first_plus, first_minus), (second_plus, second_minus) = ENDS[plane]
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    words = []
+    if abs(s) > 0.2:
+        words.append(second_plus if s > 0 else second_minus)
+    if abs(c) > 0.2:
+        words.append(first_plus if c > 0 else first_minus)
+    return "-".join(words)

@@ -1,0 +1,43 @@
+"""Lines from a terminal or a pipe, with a limit of time, so that whoever waits can do something meanwhile."""
+
+import os
+import select
+import sys
+
+
+class LineInput:
+    """Reads standard input by itself. `read` returns None when nothing came in time; raises EOFError at its end."""
+
+    def __init__(self, descriptor: int | None = None) -> None:
+        self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
+        self._pending = b""
+        self.interactive = os.isatty(self._descriptor)
+
+    def read(self, timeout_s: float) -> str | None:
+        line = self._take_line()
+        if line is not None:
+            return line
+        ready, _, _ = select.select([self._descriptor], [], [], timeout_s)
+        if not ready:
+            return None
+        data = os.read(self._descriptor, 4096)
+        if not data:
+            raise EOFError
+        self._pending += data
+        return self._take_line()
+
+    def forget(self) -> None:
+        """Drop what a person typed or pasted too early. A pipe keeps its lines: its writer planned them."""
+        if not self.interactive:
+            return
+        import termios
+
+        termios.tcflush(self._descriptor, termios.TCIFLUSH)
+        self._pending = b""
+
+    def _take_line(self) -> str | None:
+        line, newline, rest = self._pending.partition(b"\n")
+        if not newline:
+            return None
+        self._pending = rest
+        return line.decode("utf-8", errors="replace").strip()

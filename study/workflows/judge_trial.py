@@ -1,0 +1,30 @@
+"""Whether an answered trial counts, from what the device did in it."""
+
+from dataclasses import dataclass
+
+from protocols.study_protocol import MeasurementSettings
+from study.devices.device import Fault, Health
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    spoiled: str
+    """Why the trial is void; empty where it counts."""
+    flags: tuple[str, ...]
+    """What is worth a look in a trial that counts."""
+
+
+def judge(health: Health, measured: bool, settings: MeasurementSettings) -> Judgement:
+    if health.fault is not Fault.NONE:
+        return Judgement(health.fault.value, ())
+    if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
+        share = 100 * health.missed_ticks / max(health.ticks, 1)
+        return Judgement(f"{share:.1f} % of the 1 kHz ticks were missed", ())
+    observed = (
+        (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
+        (health.total_clipped > 0, "leaned on the spring: stimulus reduced at the total cap"),
+        (health.slew_limited > 0, "slew limited"),
+        (health.sensor_clipped > 0, "accelerometer clipped"),
+        (not measured, "answered before the stimulus was steady"),
+    )
+    return Judgement("", tuple(text for seen, text in observed if seen))

@@ -1,0 +1,129 @@
+"""Begin a session: a folder of its own, a log with its first line, and everything that first line fixes."""
+
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from protocols.hashing import protocol_hash
+from protocols.study_protocol import StudyProtocol
+from study.devices.clock import Clock
+from study.devices.device import DeviceInfo, DeviceSettings
+from study.errors import StudyError
+from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
+from study.session.limits import limits_of_study
+from study.session.state import SessionState, begin_session
+from study.store.archive import SessionFolder, new_session_folder, session_folders
+from study.store.event_log import LOG_NAME, EventLog, read_log
+from study.store.provenance import versions
+from study.store.session_lock import locked
+
+
+@dataclass(frozen=True, slots=True)
+class SessionPlan:
+    """What is decided before anybody sits down."""
+
+    protocol: StudyProtocol
+    protocol_text: str
+    protocol_locked: bool
+    subject: str
+    observer: str | None
+    """Name of the simulated participant; None for a person."""
+    seed: int
+    data: Path
+    participant_number: int | None = None
+    """Place in a balanced order; None counts the participants in the data folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenedSession:
+    folder: SessionFolder
+    log: EventLog
+    state: SessionState
+
+
+def fresh_seed() -> int:
+    return secrets.randbits(32)
+
+
+def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
+    return DeviceSettings(
+        limits=limits_of_study(protocol),
+        spring_frequency_hz=protocol.spring.natural_frequency_hz,
+        spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
+        keep_s=protocol.measurement.keep_s,
+        hand_on_handle=hand_on_handle,
+    )
+
+
+def check_playable(protocol: StudyProtocol) -> None:
+    """Raises StudyError where the staircase is to move what this set-up cannot deliver."""
+    if protocol.stimulus.quantity == "delivered_acceleration":
+        raise StudyError(
+            "This protocol needs an equalizer",
+            f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and no equalizer model was given.",
+            'Set stimulus.quantity = "commanded_force", or give a model of this device.',
+        )
+
+
+@contextmanager
+def opened_session(plan: SessionPlan, device: DeviceInfo, equalizer: str, clock: Clock) -> Iterator[OpenedSession]:
+    """A new session, locked as long as the context lasts."""
+    number = plan.participant_number
+    if number is None:
+        number = participant_number(plan.data, plan.subject, plan.protocol.name)
+    folder = new_session_folder(plan.data, plan.subject)
+    opened = SessionOpened(
+        utc=clock.utc(),
+        format=SESSION_FORMAT,
+        version=SESSION_VERSION,
+        session=folder.name,
+        subject=plan.subject,
+        participant_number=number,
+        observer=plan.observer,
+        protocol_text=plan.protocol_text,
+        protocol_hash=protocol_hash(plan.protocol),
+        protocol_locked=plan.protocol_locked,
+        seed=plan.seed,
+        device=device_facts(device),
+        equalizer=equalizer,
+        versions=versions(),
+    )
+    with locked(folder.path):
+        log = EventLog.create(folder.log)
+        try:
+            log.append(opened)
+            yield OpenedSession(folder, log, begin_session(opened, plan.protocol))
+        finally:
+            log.close()
+
+
+def participant_number(data: Path, subject: str, protocol_name: str) -> int:
+    """How many other participants came before this one: 0 for the first. A returning one keeps the number.
+
+    Withdrawn participants keep theirs too, so that a balanced order never gives a row twice by mistake.
+    """
+    seen: list[str] = []
+    for folder in session_folders(data):
+        if folder.subject == subject:
+            returning = _number_in(folder, protocol_name)
+            if returning is not None:
+                return returning
+        elif folder.subject not in seen:
+            seen.append(folder.subject)
+    return len(seen)
+
+
+def device_facts(info: DeviceInfo) -> DeviceFacts:
+    return DeviceFacts(
+        name=info.name, simulated=info.simulated, sample_rate_hz=info.sample_rate_hz, details=info.details
+    )
+
+
+def _number_in(folder: SessionFolder, protocol_name: str) -> int | None:
+    if not (folder.path / LOG_NAME).exists():
+        return None
+    first = next(iter(read_log(folder.log).events), None)
+    same = isinstance(first, SessionOpened) and f'"{protocol_name}"' in first.protocol_text
+    return first.participant_number if isinstance(first, SessionOpened) and same else None

@@ -1,0 +1,103 @@
+"""A whole study of simulated participants, several at once; begun ones are resumed, finished ones left alone."""
+
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+from protocols.study_protocol import StudyProtocol
+from study.devices.clock import VirtualClock
+from study.errors import StudyError
+from study.participants.population import population
+from study.store.archive import SessionFolder, session_folders
+from study.workflows.conduct_session import conduct_new, conduct_resumed
+from study.workflows.fold_session import fold_session
+from study.workflows.open_session import SessionPlan
+from study.workflows.session_results import write_tables
+from study.workflows.simulated_participant import seated
+
+DEVICE = "simulated"
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsal:
+    protocol: StudyProtocol
+    protocol_text: str
+    subjects: int
+    seed: int
+    data: Path
+
+
+def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[], None]) -> None:
+    """Blocks until every participant has finished. After an interruption the same call goes on.
+
+    Raises StudyError where the folder holds a rehearsal of another protocol or seed.
+    """
+    _check_same(rehearsal)
+    # Forking a process with numba's and the device's threads in it is not safe; a spawned one starts clean.
+    with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(_sit, rehearsal, number) for number in range(rehearsal.subjects)]
+        try:
+            for future in as_completed(futures):
+                future.result()
+                on_finished()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def subject_code(number: int) -> str:
+    return f"S{number + 1:03d}"
+
+
+def subject_seed(seed: int, number: int) -> int:
+    """Neighbouring rehearsals share no participant: the number is mixed in, not added."""
+    from numpy.random import SeedSequence
+
+    return int(SeedSequence(seed, spawn_key=(number,)).generate_state(1)[0])
+
+
+def _sit(rehearsal: Rehearsal, number: int) -> None:
+    observer = population(rehearsal.subjects, rehearsal.seed)[number]
+    clock, seed = VirtualClock(), subject_seed(rehearsal.seed, number)
+    participant = seated(observer, seed, clock)
+    begun = _begun(rehearsal.data, subject_code(number))
+    if begun is None:
+        plan = SessionPlan(
+            protocol=rehearsal.protocol,
+            protocol_text=rehearsal.protocol_text,
+            protocol_locked=False,
+            subject=subject_code(number),
+            observer=observer.name,
+            seed=seed,
+            data=rehearsal.data,
+            participant_number=number,
+        )
+        conducted = conduct_new(plan, DEVICE, participant)
+    elif fold_session(begun).state.closed:
+        return
+    else:
+        conducted = conduct_resumed(begun, DEVICE, participant)
+    write_tables(conducted.folder)
+
+
+def _begun(data: Path, subject: str) -> SessionFolder | None:
+    """The participant's last session with a first line; an empty folder is what a crash at birth leaves."""
+    folders = [f for f in session_folders(data) if f.subject == subject and f.log.exists() and f.log.stat().st_size]
+    return folders[-1] if folders else None
+
+
+def _check_same(rehearsal: Rehearsal) -> None:
+    for number in range(rehearsal.subjects):
+        folder = _begun(rehearsal.data, subject_code(number))
+        if folder is None:
+            continue
+        opened = fold_session(folder).state.opened
+        if opened.seed != subject_seed(rehearsal.seed, number) or opened.protocol_text != rehearsal.protocol_text:
+            raise StudyError(
+                "This folder holds another rehearsal",
+                f"{folder.name} in {rehearsal.data} was begun with another seed or protocol.",
+                "Choose another folder with --out, or the same --seed and --protocol to go on.",
+                saved="Nothing was changed.",
+            )

@@ -1,0 +1,110 @@
+"""Go on with a session after a crash or a pause: fold its log, check it, close what was left open."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from protocols.schedule import label_of
+from study.devices.clock import Clock
+from study.devices.device import DeviceInfo
+from study.errors import StudyError
+from study.session.delivered import delivered
+from study.session.events import SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.state import SessionState, apply, labels_are_swapped
+from study.session.stimulus import direction_vector
+from study.store.archive import SessionFolder
+from study.store.event_log import EventLog, mend
+from study.store.provenance import versions
+from study.store.session_lock import locked
+from study.store.trial_recordings import find_trial_recording, recording_name
+from study.workflows.fold_session import fold_session
+from study.workflows.open_session import OpenedSession, device_facts
+
+
+@contextmanager
+def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
+    """An existing session, mended and locked as long as the context lasts."""
+    with locked(folder.path):
+        folded = fold_session(folder)
+        _check_resumable(folded.state, device, folder)
+        mend(folder.log, folded.contents)
+        log = EventLog.reopen(folder.log)
+        try:
+            resumed = SessionResumed(
+                utc=clock.utc(), device=device_facts(device), versions=versions(), mended=folded.contents.torn
+            )
+            log.append(resumed)
+            state = _close_open_trial(apply(folded.state, resumed), folder, log, clock)
+            yield OpenedSession(folder, log, state)
+        finally:
+            log.close()
+
+
+def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:
+    if state.closed:
+        raise StudyError(
+            "This session is finished",
+            f"{folder.name} has all its runs.",
+            f"Look at its results: hapteq analyze {folder.name}",
+            saved=f"{state.answers} answers are on disk.",
+        )
+    if device.simulated != state.opened.device.simulated:
+        raise StudyError(
+            "This session was begun on another kind of device",
+            f"{folder.name} was begun on '{state.opened.device.name}', now there is '{device.name}'. Felt and unfelt "
+            "answers never mix.",
+            "Resume it with the device it was begun on.",
+            saved="Nothing was changed.",
+        )
+
+
+def _close_open_trial(state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock) -> SessionState:
+    """An answered trial counts; an unanswered one is void, because it may have been felt."""
+    presented = state.presented
+    if presented is None:
+        return state
+    if state.answered is None:
+        event: TrialMeasured | TrialSpoiled = TrialSpoiled(
+            utc=clock.utc(),
+            run=presented.run,
+            trial=presented.trial,
+            attempt=presented.attempt,
+            reason="the program ended before the answer",
+        )
+    else:
+        event = _measured_late(state, presented, folder, clock)
+    log.append(event)
+    return apply(state, event)
+
+
+def _measured_late(
+    state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
+) -> TrialMeasured:
+    """The program died between answer and measurement: the recording may still have reached the disk."""
+    found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
+    if found is None:
+        return TrialMeasured(
+            utc=clock.utc(),
+            run=presented.run,
+            trial=presented.trial,
+            attempt=presented.attempt,
+            status="unmeasured",
+            flags=("its recording was lost when the program ended",),
+        )
+    saved, recording = found
+    direction = label_of(presented.direction, labels_are_swapped(state))
+    vector = direction_vector(state.protocol.directions, direction)
+    values = delivered(recording, vector, presented.frequency_hz)
+    return TrialMeasured(
+        utc=clock.utc(),
+        run=presented.run,
+        trial=presented.trial,
+        attempt=presented.attempt,
+        status="flagged",
+        flags=("measured after a restart",),
+        recording=saved.name,
+        sha256=saved.sha256,
+        delivered_mps2=values.along_mps2 if values else None,
+        off_axis_mps2=values.off_axis_mps2 if values else None,
+        displacement_mm=values.displacement_mm if values else None,
+        missed_ticks=recording.meta.get("missed_ticks"),
+    )
