@@ -1,0 +1,60 @@
+"""A participant who feels the direction, more or less well.
+
+One presentation, two answers: identification, not a choice between two intervals. With e normal around +d'/2 for
+direction 1 and -d'/2 for direction 2, spread 1, answer 1 is given where e > -criterion. Unbiased, the share of
+right answers is Phi(d'/2), so d' = 2 Phi^-1(share of the Weibull curve); a criterion lowers the share at equal d'.
+
+Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
+"""
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+from study.participants.chance import response_time_s, uniform
+from study.participants.observer import Felt, Reply
+from study.participants.psychometric_curve import WeibullCurve, threshold_at
+
+_NORMAL = NormalDist()
+_SUREST = 1.0 - 1e-12
+"""The inverse of the normal distribution ends before 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class DirectionFeeler:
+    name: str
+    thresholds_n: tuple[tuple[float, float], ...]
+    """(frequency in Hz, level in N with 79.37 % right), frequencies ascending."""
+    slope: float = 2.0
+    """Of the Weibull curve over newtons; people's lie between 1 and 3.5."""
+    lapse: float = 0.0
+    """Share of wrong answers that is left at the strongest level; such answers are a coin's, for twice this share."""
+    criterion: float = 0.0
+    """Liking for answer 1 (negative: 2), in units of d'."""
+    drift_db_per_100_trials: float = 0.0
+    """By how much the thresholds rise as the session goes on."""
+    numb_above_hz: float = math.inf
+    """Above this frequency the direction is not felt at all."""
+
+    def reply(self, felt: Felt, seed: int) -> Reply:
+        luck, delay = uniform(felt, seed, 2)
+        answer = 1 if luck < self.share_of_1(felt) else 2
+        return Reply(answer, response_time_s(delay))
+
+    def share_of_1(self, felt: Felt) -> float:
+        """Probability of answer 1."""
+        sign = 1.0 if felt.direction_shown == 1 else -1.0
+        certain = _NORMAL.cdf(sign * self._d_prime(felt) / 2 + self.criterion)
+        return self.lapse + (1.0 - 2.0 * self.lapse) * certain
+
+    def share_right(self, felt: Felt) -> float:
+        share_of_1 = self.share_of_1(felt)
+        return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
+
+    def _d_prime(self, felt: Felt) -> float:
+        if felt.frequency_hz > self.numb_above_hz:
+            return 0.0
+        drift_db = self.drift_db_per_100_trials * felt.trials_before / 100.0
+        threshold_n = threshold_at(self.thresholds_n, felt.frequency_hz) * 10.0 ** (drift_db / 20.0)
+        share = WeibullCurve(threshold_n, self.slope).share_right(felt.level_n)
+        return 2.0 * _NORMAL.inv_cdf(min(share, _SUREST))

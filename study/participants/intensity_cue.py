@@ -1,0 +1,37 @@
+"""A participant who feels no direction, but notices that one direction comes out stronger than the other.
+
+A device rarely delivers both directions equally strong. Who remembers how strong this level feels on average can
+take "stronger" for direction 1 and "weaker" for direction 2. The level moves seldom, so the memory is taken as
+perfect: an upper bound of what this trick can do.
+
+Model: the felt strength in dB is normal around +difference_db/2 (direction 1) or -difference_db/2 (direction 2) of
+the remembered one, with the spread noise_db sqrt(1 + (detection_n / level)^2): a constant Weber fraction well above
+the detection level, growing noise towards it. So d' = difference_db / spread. Without a difference it is chance.
+"""
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+from study.participants.chance import response_time_s, uniform
+from study.participants.observer import Felt, Reply
+
+
+@dataclass(frozen=True, slots=True)
+class IntensityCue:
+    name: str
+    difference_db: float = 3.0
+    """How much stronger direction 1 is delivered than direction 2."""
+    noise_db: float = 1.0
+    """Spread of one judgement of strength, about the difference limen of vibration."""
+    detection_n: float = 0.1
+    """Level at which the noise has grown by the square root of two."""
+
+    def reply(self, felt: Felt, seed: int) -> Reply:
+        luck, delay = uniform(felt, seed, 2)
+        sign = 1.0 if felt.direction_shown == 1 else -1.0
+        share_of_1 = NormalDist().cdf(sign * self.d_prime(felt.level_n) / 2)
+        return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
+
+    def d_prime(self, level_n: float) -> float:
+        return self.difference_db / (self.noise_db * math.hypot(1.0, self.detection_n / level_n))

@@ -1,0 +1,60 @@
+"""The simulated participants that `--observer` knows by name."""
+
+import re
+from difflib import get_close_matches
+
+from study.errors import WrongUseError
+from study.participants.direction_feeler import DirectionFeeler
+from study.participants.intensity_cue import IntensityCue
+from study.participants.observer import Observer
+from study.participants.population import TYPICAL_THRESHOLDS_N, person
+from study.participants.strategies import Alternator, Constant, Guesser, Scripted
+
+OBSERVERS = {
+    "ideal": "feels directions as the median participant does, never lapses",
+    "lapsing": "like ideal, but answers without attention one time in ten",
+    "biased": "like ideal, but likes to answer 1",
+    "guesser": "tosses a coin",
+    "alternator": "says 1, 2, 1, 2",
+    "always_1": "says 1 every time",
+    "always_2": "says 2 every time",
+    "vibration_only": "like ideal up to 20 Hz; above that, vibration without a direction",
+    "intensity_cue": "feels no direction, but notices that direction 1 is delivered 3 dB stronger",
+    "drifting": "like ideal, but thresholds rise by 1 dB every 100 trials",
+    "scripted": "right or wrong by the trial's number alone",
+    "person": "one of the simulated population, picked by the seed",
+}
+"""Name and one line about it, for help texts. Beside these, person_7_seed_1 is the seventh of population 1."""
+
+_MEMBER = re.compile(r"person_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
+
+
+def observer_named(name: str, seed: int) -> Observer:
+    """seed: picks the person of "person", no other. Raises WrongUseError with the names there are."""
+    known = name.replace("-", "_")
+    if member := _MEMBER.fullmatch(known):
+        return person(int(member["number"]), int(member["seed"]))
+    typical = DirectionFeeler(known, TYPICAL_THRESHOLDS_N)
+    observers: dict[str, Observer] = {
+        "ideal": typical,
+        "lapsing": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, lapse=0.05),
+        "biased": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion=0.5),
+        "guesser": Guesser(known),
+        "alternator": Alternator(known),
+        "always_1": Constant(known, 1),
+        "always_2": Constant(known, 2),
+        "vibration_only": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, numb_above_hz=20.0),
+        "intensity_cue": IntensityCue(known),
+        "drifting": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, drift_db_per_100_trials=1.0),
+        "scripted": Scripted(known),
+        "person": person(1, seed),
+    }
+    if known not in observers:
+        close = get_close_matches(known, OBSERVERS, n=1)
+        guess = f" Did you mean {close[0]}?" if close else ""
+        raise WrongUseError(
+            title="There is no such simulated participant",
+            happened=f"No observer is called {name}.{guess}",
+            do_now=f"Choose one of {', '.join(OBSERVERS)}.",
+        )
+    return observers[known]

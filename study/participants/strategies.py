@@ -1,0 +1,56 @@
+"""Participants who answer without feeling anything: controls that must not pass for people who do."""
+
+from dataclasses import dataclass
+
+from study.participants.chance import response_time_s, uniform
+from study.participants.observer import Felt, Reply
+
+
+@dataclass(frozen=True, slots=True)
+class Guesser:
+    """Tosses a coin."""
+
+    name: str
+
+    def reply(self, felt: Felt, seed: int) -> Reply:
+        luck, delay = uniform(felt, seed, 2)
+        return Reply(1 if luck < 0.5 else 2, response_time_s(delay))
+
+
+@dataclass(frozen=True, slots=True)
+class Alternator:
+    """Says 1, 2, 1, 2 through the whole session."""
+
+    name: str
+
+    def reply(self, felt: Felt, seed: int) -> Reply:
+        _, delay = uniform(felt, seed, 2)
+        return Reply(1 + felt.trials_before % 2, response_time_s(delay))
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """Says the same every time."""
+
+    name: str
+    answer: int
+
+    def reply(self, felt: Felt, seed: int) -> Reply:
+        _, delay = uniform(felt, seed, 2)
+        return Reply(self.answer, response_time_s(delay))
+
+
+@dataclass(frozen=True, slots=True)
+class Scripted:
+    """Right or wrong by run and trial number alone, whatever direction was drawn and however often: after any
+    interruption the levels must be those of the uninterrupted session."""
+
+    name: str
+    script: str = "111111011101110011111101110011101110"
+    """1 = right, 0 = wrong; repeated, and begun one place later in every run. The default ends a published
+    staircase with its 36th answer in run 0, a little sooner or later in others."""
+
+    def reply(self, felt: Felt, seed: int) -> Reply:
+        _, delay = uniform(felt, seed, 2)
+        right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
+        return Reply(felt.direction_shown if right else 3 - felt.direction_shown, response_time_s(delay))
