@@ -96,7 +96,7 @@ def _problems(model: IdentifiedModel) -> Iterator[str]:
         yield f"band_hz is {low:g} to {high:g}; it must rise within 0 and half the sample rate, {rate / 2:g} Hz"
     if not (np.isfinite(model.delay_samples) and model.delay_samples >= 0):
         yield f"delay_samples is {model.delay_samples}; it must be a number that is not negative"
-    if model.place_m is not None and not (len(model.place_m) == 3 and np.isfinite(model.place_m).all()):
+    if model.place_m is not None and (np.shape(model.place_m) != (3,) or not np.isfinite(model.place_m).all()):
         yield f"place_m is {model.place_m}; it must be three numbers, x, y, z in metres"
     if not shape_problems:
         yield from _uncertainty_problems(model)

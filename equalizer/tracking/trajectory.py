@@ -60,7 +60,7 @@ class Trajectory:
 
 def parse_trajectory(text: str) -> Trajectory:
     """A table of either kind, told apart by its header. Raises TableError."""
-    rows = list(csv.reader(io.StringIO(text)))
+    rows = list(csv.reader(io.StringIO(text.rstrip())))
     header = tuple(name.strip() for name in rows[0]) if rows else ()
     kind = next((kind for kind in TABLE_KINDS if kind.header == header), None)
     if kind is None:
@@ -95,8 +95,6 @@ def _numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
     width = len(kind.header)
     found, problems = [], []
     for line, row in enumerate(rows, start=2):
-        if not row:
-            continue
         try:
             values = [float(field) for field in row]
         except ValueError:

@@ -1,0 +1,120 @@
+"""Tables whose columns are the fields of a frozen dataclass, in declared order.
+
+True and false as `true` and `false`, nothing as an empty field, numbers with all their digits.
+"""
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import fields
+from enum import Enum
+from types import NoneType, UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+Row = TypeVar("Row")
+
+_SHOWN = 8
+"""No more problems than this are listed one by one."""
+
+
+class CsvError(ValueError):
+    """A table that cannot be used. `problems`: one sentence each, with line and column."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+def columns(row_type: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(row_type))
+
+
+def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
+    names = columns(row_type)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_written(getattr(row, name)) for name in names] for row in rows)
+    return text.getvalue()
+
+
+def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
+    """Columns beyond the known ones are left out. Raises CsvError."""
+    lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) if text.strip() else [[]]
+    problem = header_problem(tuple(lines[0]), columns(row_type))
+    if problem:
+        raise CsvError((problem,))
+    hints, names = get_type_hints(row_type), columns(row_type)
+    found: list[Row] = []
+    problems: list[str] = []
+    for number, line in enumerate(lines[1:], start=2):
+        if len(line) != len(lines[0]):
+            problems.append(f"line {number} has {len(line)} fields, but the header names {len(lines[0])}")
+            continue
+        values: dict[str, Any] = {}
+        for name, field in zip(names, line, strict=False):
+            try:
+                values[name] = _read(field, hints[name])
+            except ValueError as error:
+                problems.append(f"line {number}, column {name}: {error}")
+        if len(values) == len(names):
+            found.append(row_type(**values))
+    if problems:
+        rest = len(problems) - _SHOWN
+        raise CsvError((*problems[:_SHOWN], *([f"and {rest} problems more like these"] if rest > 0 else [])))
+    return tuple(found)
+
+
+def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
+    """Empty where the header begins with the expected columns."""
+    if header[: len(expected)] == expected:
+        return ""
+    for position, name in enumerate(expected, start=1):
+        if header[position - 1 : position] != (name,):
+            found = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
+            return f"column {position} of the header {found}; it must be '{name}' (of {', '.join(expected)})"
+    return ""
+
+
+def _written(value: Any) -> str:
+    match value:
+        case None:
+            return ""
+        case bool():
+            return "true" if value else "false"
+        case Enum():
+            return str(value.value)
+        case float():
+            return repr(float(value))
+    return str(value)
+
+
+def _read(field: str, hint: Any) -> Any:
+    if get_origin(hint) in (Union, UnionType):
+        if field == "" and NoneType in get_args(hint):
+            return None
+        (hint,) = (option for option in get_args(hint) if option is not NoneType)
+    if field == "" and hint is not str:
+        raise ValueError("it is empty, but a value is needed")
+    if hint is bool:
+        return _truth(field)
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return _choice(field, hint)
+    try:
+        return hint(field)
+    except ValueError:
+        wanted = {int: "a whole number", float: "a number"}[hint]
+        raise ValueError(f"'{field}' is not {wanted}") from None
+
+
+def _truth(field: str) -> bool:
+    if field not in ("true", "false"):
+        raise ValueError(f"'{field}' is neither true nor false")
+    return field == "true"
+
+
+def _choice(field: str, options: type[Enum]) -> Enum:
+    for option in options:
+        if str(option.value) == field:
+            return option
+    raise ValueError(f"'{field}' is none of {', '.join(str(option.value) for option in options)}")

@@ -1,0 +1,83 @@
+"""Files that cannot be read, used or written, each as an error that a person can act on."""
+
+import errno
+from pathlib import Path
+
+from study.errors import StudyError
+
+
+class UnusableFileError(StudyError):
+    """A file that was read and is not what it should be. `problems`: one sentence fragment each."""
+
+    def __init__(self, path: Path, kind: str, problems: tuple[str, ...]) -> None:
+        super().__init__(
+            title=f"{path.name} is not a usable {kind}",
+            happened="; ".join(problems) + ".",
+            do_now="Correct it, or make it again; `hapteq validate` checks it.",
+        )
+        self.kind = kind
+        self.problems = problems
+
+
+class CannotReadError(StudyError):
+    """A file that is not there or cannot be opened."""
+
+    def __init__(self, path: Path, problem: OSError | UnicodeDecodeError) -> None:
+        super().__init__(
+            title=f"{path.name} cannot be read",
+            happened=_why_not_read(path, problem) + ".",
+            do_now="Check the name and the folder.",
+        )
+
+
+class CannotWriteError(StudyError):
+    """A file that could not be written. What stood there before is untouched."""
+
+    def __init__(self, path: Path, problem: OSError) -> None:
+        why, do_now = _why_not_written(path, problem)
+        super().__init__(
+            title=f"{path.name} was not written",
+            happened=why + ".",
+            saved="Nothing was changed: no half-written file is left, and what stood there before is as it was.",
+            do_now=do_now,
+        )
+
+
+class AlreadyThereError(StudyError):
+    """Nothing existing is overwritten unless asked for."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            title=f"{path.name} already exists",
+            happened="Nothing that exists is overwritten.",
+            saved="The file is as it was.",
+            do_now="Choose another name, or move the old file away.",
+        )
+
+
+def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
+    match problem:
+        case FileNotFoundError():
+            return f"There is no file {path}"
+        case IsADirectoryError():
+            return f"{path} is a folder"
+        case PermissionError():
+            return f"You have no right to read {path}"
+        case UnicodeDecodeError():
+            return f"It is not text in UTF-8 (byte {problem.start})"
+    return f"The system says: {problem.strerror or problem}"
+
+
+def _why_not_written(path: Path, problem: OSError) -> tuple[str, str]:
+    match problem.errno:
+        case errno.ENOSPC | errno.EDQUOT:
+            return "The disk is full", "Make room and do it again."
+        case errno.EFBIG:
+            return "It would be larger than the system allows for one file", "Raise the limit, or write less at once."
+        case errno.EACCES | errno.EPERM | errno.EROFS:
+            return f"You have no right to write in {path.parent}", "Choose another folder."
+        case errno.ENOENT | errno.ENOTDIR:
+            return f"There is no folder {path.parent}", "Make the folder first, or choose another."
+        case errno.EISDIR:
+            return f"{path} is a folder", "Choose a name for a file."
+    return f"The system says: {problem.strerror or problem}", "Choose another folder, or mend this and do it again."

@@ -1,0 +1,119 @@
+"""Identified models as HDF5: the format `hapteq-model`, version 1."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel, IdentifiedModelError
+from equalizer.signals.signal import FloatArray
+from study.store.file_errors import UnusableFileError
+from study.store.hdf5_attributes import numbers_attribute, text_attribute, text_or_list, texts_attribute, write_texts
+from study.store.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
+from study.store.layout import Entry
+
+FORMAT, VERSION = "hapteq-model", 1
+KIND = "identified model"
+
+LAYOUT = (
+    Entry("format", "attribute, text", f"`{FORMAT}`"),
+    Entry("version", "attribute, whole number", f"{VERSION}"),
+    Entry("A", "(n, n) float32 or float64", "x[k+1] = A x[k] + B u[k]"),
+    Entry("B", "(n, m) float32 or float64", "likewise"),
+    Entry("C", "(p, n) float32 or float64", "y[k] = C x[k] + D u[k]"),
+    Entry("D", "(p, m) float32 or float64", "likewise"),
+    Entry("sample_rate_hz", "attribute, number", "the only rate at which the model can run"),
+    Entry("band_hz", "attribute, 2 numbers", "where the fit was made"),
+    Entry("input_unit", "attribute, text or list", "SI; one for all channels, or one per channel"),
+    Entry("output_unit", "attribute, text or list", "likewise"),
+    Entry("input_channels", "attribute, list of text", "one name per input"),
+    Entry("output_channels", "attribute, list of text", "one name per output"),
+    Entry("delay_samples", "attribute, number", "for information: A, B, C, D include the delay", False),
+    Entry("place_m", "attribute, 3 numbers", "where in the workspace; left out = not known", False),
+    Entry("covariance", "(k, k) float32 or float64", "of the k entries of A, B, C, D, each row by row", False),
+    Entry("samples", "(draws, k) float32 or float64", "draws of the same entries from their uncertainty", False),
+    Entry("provenance", "attribute, JSON text", "versions, command, seeds, parents", False),
+)
+
+
+def read_identified_model(path: Path) -> IdentifiedModel:
+    """Raises CannotReadError, or UnusableFileError with everything that is wrong."""
+    with opened_hdf5(path, KIND, FORMAT, VERSION) as file:
+        problems = Problems()
+
+        def matrix(name: str) -> FloatArray:
+            return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
+
+        def texts(name: str) -> tuple[str, ...]:
+            return problems.attempt(lambda: texts_attribute(file, name), ())
+
+        def numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+            return problems.attempt(lambda: numbers_attribute(file, name, count, default), (0.0,) * count)
+
+        (rate_hz,), (low_hz, high_hz) = numbers("sample_rate_hz", 1), numbers("band_hz", 2)
+        (delay_samples,) = numbers("delay_samples", 1, (0.0,))
+        place = problems.attempt(lambda: _place(file), None)
+        provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
+        A, B, C, D = (matrix(name) for name in ("A", "B", "C", "D"))
+        covariance, samples = (matrix(name) if name in file else None for name in ("covariance", "samples"))
+        input_unit, output_unit = texts("input_unit"), texts("output_unit")
+        input_channels, output_channels = texts("input_channels"), texts("output_channels")
+    if problems.found:
+        raise UnusableFileError(path, KIND, tuple(problems.found))
+    try:
+        return IdentifiedModel(
+            A=A,
+            B=B,
+            C=C,
+            D=D,
+            sample_rate_hz=rate_hz,
+            band_hz=(low_hz, high_hz),
+            input_unit=text_or_list(input_unit),
+            output_unit=text_or_list(output_unit),
+            input_channels=input_channels,
+            output_channels=output_channels,
+            delay_samples=delay_samples,
+            place_m=place,
+            covariance=covariance,
+            samples=samples,
+            provenance=provenance,
+        )
+    except IdentifiedModelError as error:
+        raise UnusableFileError(path, KIND, error.problems) from error
+
+
+def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: bool = False) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+
+    def fill(file: Any) -> None:
+        file.attrs.update({"format": FORMAT, "version": VERSION, "sample_rate_hz": model.sample_rate_hz})
+        file.attrs.update({"band_hz": model.band_hz, "delay_samples": model.delay_samples})
+        if model.place_m is not None:
+            file.attrs["place_m"] = model.place_m
+        for name in ("input_unit", "output_unit", "input_channels", "output_channels"):
+            write_texts(file, name, getattr(model, name))
+        for name in ("A", "B", "C", "D", "covariance", "samples"):
+            if getattr(model, name) is not None:
+                file.create_dataset(name, data=getattr(model, name))
+        file.attrs["provenance"] = json.dumps(dict(model.provenance), allow_nan=False)
+
+    write_hdf5(path, fill, overwrite=overwrite)
+
+
+def _place(file: Any) -> tuple[float, float, float] | None:
+    if "place_m" not in file.attrs:
+        return None
+    x, y, z = numbers_attribute(file, "place_m", 3)
+    return x, y, z
+
+
+def _provenance(file: Any) -> dict[str, Any]:
+    text = text_attribute(file, "provenance", "{}")
+    try:
+        found = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"the attribute 'provenance' is not JSON: {error}") from error
+    if not isinstance(found, dict):
+        raise ValueError(f"the attribute 'provenance' is {found!r}; it must be a JSON object")
+    return found

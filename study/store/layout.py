@@ -1,0 +1,12 @@
+"""What a file of ours holds, entry by entry: the tables of docs/formats.md are made from these."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    name: str
+    holds: str
+    """Type and shape."""
+    meaning: str
+    required: bool = True

@@ -1,0 +1,19 @@
+"""Text files as UTF-8, with errors that a person can act on."""
+
+from pathlib import Path
+
+from study.store.atomic_write import write_atomically
+from study.store.file_errors import CannotReadError
+
+
+def read_text(path: Path) -> str:
+    """The text without a byte order mark. Raises CannotReadError."""
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise CannotReadError(path, problem) from problem
+
+
+def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
+    """Line ends are written as they are, so that a file is the same on every system."""
+    write_atomically(path, text.encode("utf-8"), overwrite=overwrite)
