@@ -4,6 +4,7 @@ Every call and every answer is a value, so that a real device's 1 kHz loop can l
 `hold` has no end because a participant feels a trial as long as wanted.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -37,6 +38,8 @@ class DeviceSettings:
     keep_s: float
     hand_on_handle: bool
     """Whether a hand holds the handle. A simulated device then carries a simulated hand."""
+    place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the spring is centred, x, y, z."""
 
 
 class Fault(Enum):
@@ -71,9 +74,12 @@ class Played:
     """What the device did between `hold` and `release`, or during `play`."""
 
     recording: Recording | None
-    """For `hold`: the steady part, whole loops, at most `DeviceSettings.keep_s` long.
-    None if it never became steady."""
+    """For `hold`: the last of the steady part, whole loops, at most `DeviceSettings.keep_s` long; of a loop longer
+    than that, its last `keep_s`. None if it was not steady for so long. For `play`: all of it, or None if a fault
+    ended it."""
     health: Health
+    truth: Signal | None = None
+    """The handle's true acceleration, beside the recording: for tests and benchmarks of simulated devices."""
 
 
 class Device(Protocol):
@@ -83,7 +89,10 @@ class Device(Protocol):
     def info(self) -> DeviceInfo: ...
 
     def hold(self, stimulus: HeldStimulus) -> None:
-        """Fade in and repeat until `release`. Returns at once."""
+        """Fade in and repeat until `release`. Returns at once.
+
+        Raises `DeviceError`, before anything moves, for a stimulus that is not within the limits.
+        """
         ...
 
     def keep_alive(self) -> None:
@@ -95,11 +104,17 @@ class Device(Protocol):
         ...
 
     def release(self) -> Played:
-        """Fade out, wait until the device is still, and say what happened."""
+        """Fade out, wait until the device is still, and say what happened. To be called after a fault as well.
+
+        Raises `DeviceError` when the device was lost.
+        """
         ...
 
-    def play(self, commands: Signal) -> Played:
-        """Play once through: identification and recordings. Returns when it is over."""
+    def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
+        """Play once through: identification and recordings. Returns when it is over; gives its own signs of life.
+
+        `on_progress(share)` is called now and then with the share that is over.
+        """
         ...
 
     def stop(self) -> None:

@@ -1,0 +1,104 @@
+"""What the safety layer refuses before anything moves, each with a sentence that says why."""
+
+import math
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
+from study.devices.device import DeviceInfo, DeviceSettings
+from study.errors import DeviceError
+from study.session.limits import Limits
+from study.session.stimulus import HeldStimulus
+
+HAND_STIMULUS_CAP_N = 3.0
+HAND_TOTAL_CAP_N = 6.0
+"""With a hand on the handle no protocol and no setting goes beyond these."""
+
+TOLERANCE = 1 + 1e-9
+"""Rounding, when a stimulus is exactly at its cap."""
+
+HIGHEST = {
+    "slew_n_per_s": 1e5,
+    "longest_hold_s": 600.0,
+    "watchdog_s": 5.0,
+    "release_s": 1.0,
+    "keep_s": 600.0,
+}
+
+FADE_SHAPES = ("raised_cosine", "linear")
+
+
+def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
+    """Raises `DeviceError` for limits that are no limits, or weaker than may be."""
+    limits = settings.limits
+    times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
+    for name, value in times.items():
+        _within(name, value, HIGHEST[name])
+    ceiling_n = min(info.max_force_n, HAND_TOTAL_CAP_N) if settings.hand_on_handle else info.max_force_n
+    stimulus_ceiling_n = min(ceiling_n, HAND_STIMULUS_CAP_N) if settings.hand_on_handle else ceiling_n
+    _within("total_cap_n", limits.total_cap_n, ceiling_n)
+    _within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
+    _within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
+    _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
+    if not all(math.isfinite(component) for component in settings.place_m):
+        raise _refused_settings(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
+
+
+def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
+    """Raises `DeviceError` for a loop that cannot be held within the limits."""
+    if stimulus.fade_shape not in FADE_SHAPES:
+        raise _refused(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
+    for name, seconds in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
+        if not 0 <= seconds <= 10:
+            raise _refused(f"its {name} is {seconds}; it must lie between 0 and 10 s")
+    _check_forces(stimulus.loop, limits, rate_hz)
+    samples = stimulus.loop.samples
+    _check_steps(np.diff(samples, axis=0, append=samples[:1]), limits, rate_hz)
+
+
+def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:
+    """Raises `DeviceError` for commands that cannot be played within the limits, from zero force on."""
+    _check_forces(commands, limits, rate_hz)
+    _check_steps(np.diff(commands.samples, axis=0, prepend=0.0), limits, rate_hz)
+
+
+def _check_forces(force: Signal, limits: Limits, rate_hz: float) -> None:
+    if force.sample_rate_hz != rate_hz:
+        raise _refused(f"it was made for {force.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz")
+    if force.samples.shape[1] != 3 or not len(force):
+        raise _refused(f"its samples have the shape {force.samples.shape}; it must be (n, 3) with n > 0")
+    if (force.quantity, force.unit) != ("force", "N"):
+        raise _refused(f"it is {force.quantity} in {force.unit}; it must be force in N")
+    if not np.isfinite(force.samples).all():
+        raise _refused("some of its samples are not numbers")
+    peak_n = float(np.linalg.norm(force.samples, axis=1).max())
+    if peak_n > limits.stimulus_cap_n * TOLERANCE:
+        raise _refused(f"it reaches {peak_n:.4g} N; the cap of the stimulus is {limits.stimulus_cap_n:g} N")
+
+
+def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
+    steepest = float(np.linalg.norm(steps, axis=1).max()) * rate_hz
+    if steepest > limits.slew_n_per_s * TOLERANCE:
+        raise _refused(f"it changes by {steepest:.4g} N/s; the slew limit is {limits.slew_n_per_s:g} N/s")
+
+
+def _within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
+    if not (0 < value <= highest or (zero and value == 0)):
+        allowed = "at least 0" if zero else "above 0"
+        raise _refused_settings(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")
+
+
+def _refused_settings(happened: str) -> DeviceError:
+    return DeviceError(
+        "The device was not opened: its limits are not safe",
+        happened,
+        "Correct the [safety] and [spring] sections of the protocol.",
+    )
+
+
+def _refused(why: str) -> DeviceError:
+    return DeviceError(
+        "The device did not play this: it is not within the limits",
+        f"Nothing has moved. The stimulus was refused because {why}.",
+        "Correct the protocol or the equalizer's model, or widen the protocol's limits if they are meant to be wider.",
+    )

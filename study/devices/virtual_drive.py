@@ -1,0 +1,38 @@
+"""Ticks in virtual time: those that became due are run whenever somebody sleeps."""
+
+from collections.abc import Callable
+
+from study.devices.clock import VirtualClock
+from study.devices.governor import Governor
+from study.devices.runner import Runner
+
+
+class VirtualDrive:
+    def __init__(self, runner: Runner, governor: Governor, clock: VirtualClock, rate_hz: float) -> None:
+        self._runner = runner
+        self._governor = governor
+        self._clock = clock
+        self._rate_hz = rate_hz
+        self._started_s = 0.0
+        self._run = 0
+        clock.listen(self._pump)
+
+    def start(self, begin: Callable[[], None]) -> None:
+        """`begin` readies the governor; from now on its ticks fall due."""
+        begin()
+        self._started_s = self._clock.now_s()
+        self._run = 0
+
+    def close(self) -> None:
+        self._clock.forget(self._pump)
+
+    def _pump(self, now_s: float) -> None:
+        if self._governor.moving:
+            due = ticks_by(now_s - self._started_s, self._rate_hz)
+            self._runner.run(due - self._run)
+            self._run = due
+
+
+def ticks_by(elapsed_s: float, rate_hz: float) -> int:
+    """Ticks that are due; a sum of rounded times just short of a tick counts as that tick."""
+    return int(elapsed_s * rate_hz + 1e-6)
