@@ -52,7 +52,7 @@ class SessionState:
 
     @property
     def answers(self) -> int:
-        return sum(t.counts for t in self.trials) + (self.answered is not None)
+        return sum(trial.counts for trial in self.trials)
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:

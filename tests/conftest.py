@@ -1,0 +1,78 @@
+"""Shared by all tests: small protocols, and where shared test material lies."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from protocols.loading import load_protocol
+from protocols.study_protocol import StudyProtocol
+
+SMALL = """
+name = "small"
+kind = "study"
+title = "A small study for tests"
+
+[stimulus]
+frequencies_hz = [25.0, 35.0]
+fade_in_s = 0.1
+fade_out_s = 0.05
+
+[staircase]
+start_n = 1.0
+cap_n = 3.0
+up_after_wrong = 1
+down_after_right = 3
+steps = [{ step_db = 4.0, reversals = 2 }, { step_db = 1.0, reversals = 3 }]
+reversals = 5
+averaged_reversals = 3
+
+[directions]
+
+[safety]
+stimulus_cap_n = 3.0
+total_cap_n = 4.5
+
+[training]
+frequencies_hz = [5.0]
+trial_limit = 4
+
+[rests]
+after_run_s = 2.0
+
+[measurement]
+keep_s = 0.2
+"""
+
+
+@pytest.fixture
+def small_text() -> str:
+    return SMALL
+
+
+@pytest.fixture
+def small_protocol() -> StudyProtocol:
+    protocol = load_protocol(SMALL, "small.toml")
+    assert isinstance(protocol, StudyProtocol)
+    return protocol
+
+
+@pytest.fixture
+def shared() -> Path:
+    """The folder of shared test material beside the checkout; tests that need it skip without it."""
+    folder = Path(__file__).resolve().parents[2] / "shared"
+    if not folder.is_dir():
+        pytest.skip("the shared recordings and cases are not beside this checkout")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def rigs() -> ModuleType:
+    """`tests/rigs.py`, bare rigs that write down every force. Imported late: it compiles."""
+    spec = importlib.util.spec_from_file_location("rigs", Path(__file__).parent / "rigs.py")
+    assert spec is not None and spec.loader is not None
+    module = sys.modules["rigs"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
