@@ -76,6 +76,16 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
     return ""
 
 
+def in_words(hint: Any) -> str:
+    """What a column of this type holds, for people."""
+    if get_origin(hint) in (Union, UnionType):
+        (inner,) = (option for option in get_args(hint) if option is not NoneType)
+        return f"{in_words(inner)}, or empty"
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return ", ".join(f"`{option.value}`" for option in hint)
+    return {bool: "`true` or `false`", int: "whole number", float: "number", str: "text"}[hint]
+
+
 def _written(value: Any) -> str:
     match value:
         case None:

@@ -7,16 +7,19 @@ from study.errors import StudyError
 
 
 class UnusableFileError(StudyError):
-    """A file that was read and is not what it should be. `problems`: one sentence fragment each."""
+    """A file that was read and is not what it should be.
+
+    `problems`: one each, without a full stop; `sentences`: the same, ready to be shown.
+    """
 
     def __init__(self, path: Path, kind: str, problems: tuple[str, ...]) -> None:
+        self.kind = kind
+        self.sentences = tuple(_sentence(problem) for problem in problems)
         super().__init__(
             title=f"{path.name} is not a usable {kind}",
-            happened="; ".join(problems) + ".",
+            happened=" ".join(self.sentences),
             do_now="Correct it, or make it again; `hapteq validate` checks it.",
         )
-        self.kind = kind
-        self.problems = problems
 
 
 class CannotReadError(StudyError):
@@ -55,6 +58,15 @@ class AlreadyThereError(StudyError):
         )
 
 
+_PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
+
+
+def _sentence(problem: str) -> str:
+    """A problem that begins with a key or a name of the file keeps it as it is written there."""
+    capital = problem[:1].upper() if problem.partition(" ")[0] in _PROSE else problem[:1]
+    return capital + problem[1:].rstrip(".") + "."
+
+
 def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
     match problem:
         case FileNotFoundError():
@@ -64,7 +76,7 @@ def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
         case PermissionError():
             return f"You have no right to read {path}"
         case UnicodeDecodeError():
-            return f"It is not text in UTF-8 (byte {problem.start})"
+            return f"It is neither HDF5 nor text in UTF-8 (byte {problem.start})"
     return f"The system says: {problem.strerror or problem}"
 
 

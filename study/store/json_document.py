@@ -50,13 +50,17 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
 def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
     """A JSON object. Raises UnusableFileError."""
     try:
-        document = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+        document = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:
         raise UnusableFileError(path, kind, (f"this is not JSON: {error}",)) from error
     if not isinstance(document, dict):
         wrong = f"it holds a {type(document).__name__}; a document of ours is an object with format and version"
         raise UnusableFileError(path, kind, (wrong,))
     return document
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"JSON has no {constant}; write null")
 
 
 def _said(value: Any) -> str:

@@ -1,0 +1,196 @@
+"""What a diagnosis says, as a document: the content of `diagnosis.json`, format `hapteq-diagnosis`, version 1.
+
+Shares and probabilities lie in 0 to 1. Errors are normalised root-mean-square over the channels.
+"""
+
+import json
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, model_validator
+from pydantic.dataclasses import dataclass
+
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
+
+FORMAT, VERSION = "hapteq-diagnosis", 1
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+Verdict = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained"]
+Share = Annotated[float, Field(ge=0, le=1)]
+Rms = Annotated[float | None, Field(ge=0, description="Normalised rms; null where it cannot be known.")]
+EffectWord = Annotated[
+    str,
+    Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="A name of the vocabulary, or a new one written like them."),
+]
+
+
+class DiagnosisError(ValueError):
+    """A document that is not a diagnosis. `problems`: one sentence each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, config=STRICT)
+class Mismatch:
+    """A place where model and device disagree more than repeats do."""
+
+    output: str
+    input: str
+    band_hz: tuple[float, float]
+    amplitude: float | None
+    """Level of the excitation, in the command's unit; null over all levels."""
+    state: str | None
+    """The state that it is tied to, in words ("near v = 0"); null where it is tied to none."""
+    share: Share
+    p_value: Annotated[float, Field(ge=0, le=1)]
+
+    @model_validator(mode="after")
+    def _rising_band(self) -> Self:
+        if not 0 <= self.band_hz[0] < self.band_hz[1]:
+            raise ValueError(f"band_hz must rise from 0 or more, not {list(self.band_hz)}")
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class Estimate:
+    """A parameter with its 95 % interval; null where no interval can be given."""
+
+    value: float
+    unit: Annotated[str, Field(min_length=1, description="SI in ASCII; 1 for a plain number.")]
+    ci95: tuple[float, float] | None = None
+
+    @model_validator(mode="after")
+    def _rising_interval(self) -> Self:
+        if self.ci95 is not None and self.ci95[0] > self.ci95[1]:
+            raise ValueError(f"ci95 must rise, not {list(self.ci95)}")
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rival:
+    """An effect that was passed over."""
+
+    effect: EffectWord
+    probability: Share
+    inseparable: Annotated[bool, Field(description="True: these data cannot tell it from the named effect.")]
+    why_not: str
+
+
+@dataclass(frozen=True, config=STRICT)
+class NamedEffect:
+    """Physics that the model lacks. With its inseparable rivals it is the returned set."""
+
+    effect: EffectWord
+    place: Place
+    axis: Annotated[str | None, Field(description="Axis or channel; null where all share it.")]
+    share: Annotated[Share, Field(description="Of the mismatch after re-tuning.")]
+    probability: Share
+    parameters: dict[str, Estimate]
+    rivals: tuple[Rival, ...] = ()
+
+    @model_validator(mode="after")
+    def _as_in_the_vocabulary(self) -> Self:
+        known = EFFECTS_BY_NAME.get(self.effect)
+        if known is None:
+            return self
+        if self.place != known.place:
+            raise ValueError(f"{self.effect} sits in the {known.place}, not in the {self.place}")
+        if known.main.name not in self.parameters:
+            raise ValueError(f"{self.effect} lacks its main parameter, {known.main.name} ({known.main.unit})")
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class Errors:
+    """One record's errors: the given model, re-tuned, with the named effects, and what repeats allow."""
+
+    before: Rms
+    retuned: Rms
+    after: Rms
+    noise: Rms
+
+
+@dataclass(frozen=True, config=STRICT)
+class Fit:
+    fit: Errors
+    test: Errors
+
+
+@dataclass(frozen=True, config=STRICT)
+class NextExperiment:
+    """The recording that would tell rivals apart."""
+
+    command: str
+    splits: tuple[str, ...]
+    why: str
+
+
+@dataclass(frozen=True, config=STRICT)
+class Diagnosis:
+    verdict: Verdict
+    mismatch: tuple[Mismatch, ...]
+    effects: tuple[NamedEffect, ...]
+    retuned: Annotated[dict[str, JsonValue], Field(description="The model's own parameters after re-tuning.")]
+    remainder: tuple[Mismatch, ...]
+    fit: Fit
+    error: Annotated[
+        str,
+        Field(
+            pattern=r"^(free simulation|predicted force|windows of [0-9.]+ s)$",
+            description="How errors were measured: free simulation, windows of 1 s, or predicted force.",
+        ),
+    ]
+    next_experiment: NextExperiment | None
+
+    @model_validator(mode="after")
+    def _verdict_fits(self) -> Self:
+        named = self.verdict in ("explained", "partly_explained")
+        if named != bool(self.effects):
+            raise ValueError(
+                f"the verdict '{self.verdict}' goes with {'one effect or more' if named else 'no effects'}"
+            )
+        if self.verdict == "partly_explained" and not self.remainder:
+            raise ValueError("the verdict 'partly_explained' goes with a remainder")
+        if self.verdict == "unexplained" and not self.mismatch:
+            raise ValueError("the verdict 'unexplained' goes with a mismatch")
+        return self
+
+    @property
+    def returned_set(self) -> tuple[str, ...]:
+        """The named effects and every rival that these data cannot tell from them."""
+        names = [name for effect in self.effects for name in (effect.effect, *_inseparable(effect))]
+        return tuple(dict.fromkeys(names))
+
+
+def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Plain values, without format and version."""
+    plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json")
+    return plain
+
+
+def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
+    """document: without format and version. Raises DiagnosisError with every problem, by its place."""
+    try:
+        # By way of JSON: strict checking then takes a list for a tuple, but no text for a number.
+        return _ADAPTER.validate_json(json.dumps(document), strict=True)
+    except ValidationError as error:
+        raise DiagnosisError(tuple(_sentence(wrong["loc"], wrong["msg"]) for wrong in error.errors())) from error
+
+
+def diagnosis_schema() -> dict[str, Any]:
+    """JSON Schema of what `diagnosis_to_json` gives."""
+    return _ADAPTER.json_schema(mode="serialization")
+
+
+def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
+    return tuple(rival.effect for rival in effect.rivals if rival.inseparable)
+
+
+def _sentence(place: tuple[str | int, ...], message: str) -> str:
+    where = ".".join(str(part) for part in place)
+    plain = message.removeprefix("Value error, ")
+    return f"{where}: {plain}" if where else plain
+
+
+_ADAPTER: TypeAdapter[Diagnosis] = TypeAdapter(Diagnosis)

@@ -1,0 +1,33 @@
+"""`diagnosis.json`: the format `hapteq-diagnosis`, version 1."""
+
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.document import (
+    FORMAT,
+    VERSION,
+    Diagnosis,
+    DiagnosisError,
+    diagnosis_from_json,
+    diagnosis_to_json,
+)
+from study.store.file_errors import UnusableFileError
+from study.store.json_document import read_json, write_json
+from study.store.provenance import Provenance
+
+
+def read_diagnosis(path: Path) -> Diagnosis:
+    """Raises CannotReadError, UnusableFileError."""
+    document: dict[str, Any] = read_json(path, FORMAT, VERSION)
+    document.pop("provenance", None)
+    try:
+        return diagnosis_from_json(document)
+    except DiagnosisError as error:
+        raise UnusableFileError(path, "diagnosis", error.problems) from error
+
+
+def write_diagnosis(
+    path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None, *, overwrite: bool = False
+) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance, overwrite=overwrite)

@@ -1,0 +1,63 @@
+"""A file opened once, so that everybody who might know its format can look at it."""
+
+import csv
+import io
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from study.store.file_errors import UnusableFileError
+from study.store.hdf5_file import format_of, is_hdf5
+from study.store.text_file import read_text
+
+
+@dataclass(frozen=True, slots=True)
+class FileContent:
+    """What a file is made of. Everything that it is not is None."""
+
+    path: Path
+    is_folder: bool = False
+    hdf5_format: str | None = None
+    """What an HDF5 file calls itself; empty where it says nothing."""
+    text: str | None = None
+    json: Any = None
+    """A whole document. Lines of JSON (`events.jsonl`) are none."""
+    toml: dict[str, Any] | None = None
+
+    @property
+    def json_format(self) -> Any:
+        return self.json.get("format") if isinstance(self.json, dict) else None
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """The first line's fields, if this were a table."""
+        rows = csv.reader(io.StringIO((self.text or "").partition("\n")[0]))
+        return tuple(name.strip() for name in next(rows, []))
+
+
+def open_content(path: Path) -> FileContent:
+    """Raises CannotReadError, UnusableFileError."""
+    if path.is_dir():
+        return FileContent(path, is_folder=True)
+    if is_hdf5(path):
+        return FileContent(path, hdf5_format=format_of(path))
+    if path.is_file() and path.suffix.lower() in (".h5", ".hdf5"):
+        raise UnusableFileError(path, "HDF5 file", ("it does not begin as HDF5 files do",))
+    text = read_text(path)
+    return FileContent(path, text=text, json=_json(text), toml=_toml(text))
+
+
+def _json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _toml(text: str) -> dict[str, Any] | None:
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return None

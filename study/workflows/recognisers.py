@@ -1,0 +1,121 @@
+"""Who knows which file: one small function per format. A new format adds its function to the tuple at the end."""
+
+from collections.abc import Callable
+
+from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
+from equalizer.tracking.trajectory import TRAJECTORY
+from protocols.loading import ProtocolError, load_protocol
+from protocols.recording_protocol import RecordingProtocol
+from protocols.schema import ADAPTERS, protocol_schema
+from study.store import identified_model_file, recording_layout
+from study.store.csv_rows import header_problem
+from study.store.diagnosis_file import read_diagnosis
+from study.store.file_errors import UnusableFileError
+from study.store.identified_model_file import read_identified_model
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.recording_file import read_recording
+from study.store.thresholds_file import THRESHOLDS_HEADER, read_thresholds
+from study.store.trajectory_file import read_trajectory
+from study.store.trials_file import TRIALS_HEADER, read_trials
+from study.workflows.file_content import FileContent
+
+Recogniser = Callable[[FileContent], str | None]
+"""What the file is, in words; None where it is another's. Raises UnusableFileError where it is ours but wrong."""
+
+
+def recognise_recording(content: FileContent) -> str | None:
+    if content.hdf5_format != recording_layout.FORMAT:
+        return None
+    found = read_recording(content.path)
+    parts = [
+        f"recording, {found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
+        _count(len(found.command.channels), "command"),
+        _count(len(found.response.channels), "response"),
+    ]
+    if found.position is not None:
+        parts.append(_count(len(found.position.channels), "position"))
+    if found.segments:
+        parts.append(_count(len(found.segments), "segment"))
+    return ", ".join(parts)
+
+
+def recognise_identified_model(content: FileContent) -> str | None:
+    if content.hdf5_format != identified_model_file.FORMAT:
+        return None
+    found = read_identified_model(content.path)
+    stable = "stable" if found.spectral_radius < 1 else f"unstable (spectral radius {found.spectral_radius:.6g})"
+    return (
+        f"identified model of order {found.order}, {found.band_hz[0]:g} to {found.band_hz[1]:g} Hz at "
+        f"{found.sample_rate_hz:g} Hz, {_count(len(found.input_channels), 'input')}, "
+        f"{_count(len(found.output_channels), 'output')}, {stable}"
+    )
+
+
+def recognise_mechanical_model(content: FileContent) -> str | None:
+    if content.toml is None or not content.toml.keys() & {"model", "sensor", "actuator", "effect", "tolerance"}:
+        return None
+    found = read_mechanical_model(content.path)
+    effects = ", ".join(effect.kind for effect in found.effects) or "no effects"
+    return (
+        f"mechanical model '{found.name}', {_count(found.coordinates, 'coordinate')}, {_count(found.inputs, 'input')}, "
+        f"{_count(found.outputs, 'output')} ({found.quantity}), {effects}"
+    )
+
+
+_PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}
+
+
+def recognise_protocol(content: FileContent) -> str | None:
+    if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
+        return None
+    try:
+        found = load_protocol(content.text or "", content.path.name)
+    except ProtocolError as error:
+        raise UnusableFileError(content.path, "protocol", tuple(str(problem) for problem in error.problems)) from error
+    kind = "recording" if isinstance(found, RecordingProtocol) else "study"
+    return f"{kind} protocol '{found.name}': {found.title}"
+
+
+def recognise_diagnosis(content: FileContent) -> str | None:
+    if content.json_format != DIAGNOSIS_FORMAT:
+        return None
+    found = read_diagnosis(content.path)
+    return f"diagnosis, {found.verdict}: {', '.join(effect.effect for effect in found.effects) or 'no effects'}"
+
+
+def recognise_trajectory(content: FileContent) -> str | None:
+    if content.header[:1] != TRAJECTORY.header[:1]:
+        return None
+    found = read_trajectory(content.path)
+    signal = found.signal
+    return f"{found.kind.name}, {signal.duration_s:g} s at {signal.sample_rate_hz:g} Hz ({found.kind.unit})"
+
+
+def recognise_trials(content: FileContent) -> str | None:
+    # A header with one wrong column is still one of ours; both tables begin with the subject.
+    if content.header[:2] != TRIALS_HEADER[:2] and header_problem(content.header, TRIALS_HEADER):
+        return None
+    return f"table of {_count(len(read_trials(content.path)), 'trial')}"
+
+
+def recognise_thresholds(content: FileContent) -> str | None:
+    if content.header[:2] != THRESHOLDS_HEADER[:2] and header_problem(content.header, THRESHOLDS_HEADER):
+        return None
+    return f"table of {_count(len(read_thresholds(content.path)), 'threshold')}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+RECOGNISERS: tuple[Recogniser, ...] = (
+    recognise_recording,
+    recognise_identified_model,
+    recognise_mechanical_model,
+    recognise_diagnosis,
+    recognise_trajectory,
+    recognise_trials,
+    recognise_thresholds,
+    recognise_protocol,
+)
+"""Asked in this order; the first answer counts."""

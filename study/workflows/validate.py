@@ -1,0 +1,79 @@
+"""`hapteq validate`: what a file is, and everything that is wrong with it, in words."""
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.errors import StudyError
+from study.store.file_errors import UnusableFileError
+from study.workflows.file_content import FileContent, open_content
+from study.workflows.recognisers import RECOGNISERS, Recogniser
+
+KNOWN = (
+    "known are recordings and identified models (HDF5), mechanical models and protocols (TOML), trajectories, forces, "
+    "trials and thresholds (CSV), diagnoses and other JSON documents with format and version, and session folders"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    path: Path
+    kind: str
+    """In words: "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""
+    problems: tuple[str, ...]
+    """One sentence each; empty = the file is sound."""
+
+
+def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = RECOGNISERS) -> Validation:
+    """Never raises for what is in a file or for one that is not there."""
+    try:
+        content = open_content(path)
+        for recognise in recognisers:
+            kind = recognise(content)
+            if kind is not None:
+                return Validation(path, kind, ())
+    except UnusableFileError as error:
+        return Validation(path, error.kind, error.sentences)
+    except StudyError as error:
+        return Validation(path, "unreadable", (error.happened,))
+    kind, problem = _unknown(content)
+    return Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
+
+
+def _unknown(content: FileContent) -> tuple[str, str]:
+    """The best that can be said of a file that nobody knows."""
+    if content.is_folder:
+        return "folder", "this folder is not a session: it holds no events.jsonl"
+    if content.hdf5_format is not None:
+        said = f"calls itself '{content.hdf5_format}'" if content.hdf5_format else "has no attribute 'format'"
+        return "HDF5 file", f"it {said}; known formats are hapteq-recording and hapteq-model"
+    if not (content.text or "").strip():
+        return "empty file", f"it holds nothing; {KNOWN}"
+    match content.path.suffix.lower():
+        case ".json":
+            return "JSON document", _json_problem(content)
+        case ".toml":
+            return "TOML file", _toml_problem(content)
+        case ".csv":
+            return "table", f"its header, '{','.join(content.header)}', is none of ours; {KNOWN}"
+    return "unknown file", f"nothing here knows this file; {KNOWN}"
+
+
+def _json_problem(content: FileContent) -> str:
+    try:
+        json.loads(content.text or "")
+    except (ValueError, RecursionError) as error:
+        return f"this is not JSON: {error}"
+    if content.json_format is None:
+        return "it says no format; every document of ours says its format and version"
+    return f"its format, '{content.json_format}', is not known here"
+
+
+def _toml_problem(content: FileContent) -> str:
+    try:
+        tomllib.loads(content.text or "")
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return f"this is not TOML: {error}"
+    keys = ", ".join(content.toml or ())
+    return f"its keys ({keys}) are neither those of a mechanical model ([model] ...) nor of a protocol (kind = ...)"
