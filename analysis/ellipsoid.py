@@ -55,6 +55,8 @@ class PhasorEllipse:
     turn_deg: float
     ellipticity: float
     """Smaller over larger axis: 0 a straight line, 1 a circle."""
+    on_axis_mps2: float
+    """Amplitude along the test direction."""
     off_axis_ratio: float | None
     """Amplitude perpendicular to the test direction over amplitude along it; None if there is none along."""
     harmonic_share: float
@@ -146,6 +148,7 @@ def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: flo
         tilt_deg=tilt_deg,
         turn_deg=turn_deg,
         ellipticity=float(axes[1] / axes[0]),
+        on_axis_mps2=float(along),
         off_axis_ratio=float(across / along) if along > 0 else None,
         harmonic_share=float(energy[1:].sum() / energy[0]),
     )

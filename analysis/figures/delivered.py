@@ -1,0 +1,67 @@
+"""What the device delivered for what was commanded, frequency by frequency."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.style import BLUE, GREY, VERMILLION, new_figure, newton_ticks, plain_axes, say_nothing_to_draw
+from protocols.trial import Trial
+
+_COLUMNS = 3
+_RASTER_FROM = 400
+"""So many points are drawn as a picture, or the page grows by a line of text per point."""
+
+
+def draw_delivered(trials: Sequence[Trial]) -> Figure:
+    """Acceleration amplitude along and off the direction against the commanded level, one panel per frequency."""
+    measured = [trial for trial in trials if trial.counts and trial.delivered_mps2]
+    if not measured:
+        return say_nothing_to_draw(new_figure(8.6, 2.0), "No trial has a measured acceleration.")
+    frequencies = sorted({trial.frequency_hz for trial in measured})
+    columns = min(_COLUMNS, len(frequencies) + 1)
+    lines = -(-(len(frequencies) + 1) // columns)
+    figure = new_figure(8.6, 2.5 * lines)
+    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    panels = [panel for line in grid for panel in line]
+    levels = [trial.level_n for trial in measured]
+    panels[0].set_xscale("log")
+    panels[0].set_xlim(0.8 * min(levels), 1.25 * max(levels))
+    for panel, frequency in zip(panels, frequencies, strict=False):
+        _draw_frequency(panel, [trial for trial in measured if trial.frequency_hz == frequency])
+        newton_ticks(panel.xaxis, min(levels), max(levels))
+        panel.set_title(f"{frequency:g} Hz", fontsize=10, loc="left")
+    for panel in panels[len(frequencies) :]:
+        panel.axis("off")
+    panels[-1].legend(handles=_legend(), loc="center", fontsize=9, frameon=False)
+    for line in grid:
+        line[0].set_ylabel("Measured (m/s²)")
+    for column in range(columns):
+        below = [index for index in range(column, len(frequencies), columns)]
+        if below:
+            panels[below[-1]].set_xlabel("Commanded force (N)")
+            panels[below[-1]].tick_params(labelbottom=True)
+    return figure
+
+
+def _draw_frequency(axes: Axes, trials: list[Trial]) -> None:
+    plain_axes(axes)
+    rasterized = len(trials) > _RASTER_FROM
+    levels = np.array([trial.level_n for trial in trials])
+    along = np.array([trial.delivered_mps2 for trial in trials], dtype=np.float64)
+    across = np.array([trial.off_axis_mps2 or np.nan for trial in trials], dtype=np.float64)
+    axes.loglog(levels, along, "o", color=BLUE, markersize=3, alpha=0.5, rasterized=rasterized)
+    axes.loglog(levels, across, "s", color=VERMILLION, markersize=3, alpha=0.5, rasterized=rasterized,
+                markerfacecolor="none")  # fmt: skip
+    span = np.array([levels.min(), levels.max()])
+    axes.loglog(span, span * np.median(along / levels), color=GREY, linewidth=1)
+
+
+def _legend() -> list[Line2D]:
+    return [
+        Line2D([], [], marker="o", color=BLUE, linewidth=0, label="along the direction"),
+        Line2D([], [], marker="s", color=VERMILLION, markerfacecolor="none", linewidth=0, label="off the direction"),
+        Line2D([], [], color=GREY, linewidth=1, label="proportional (median)"),
+    ]

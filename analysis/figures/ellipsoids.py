@@ -1,0 +1,92 @@
+"""Acceleration ellipses by frequency (the published figure 3), in both definitions."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
+
+from analysis.ellipsoid import EllipsoidResult
+from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, say_nothing_to_draw
+
+_COLUMNS = 6
+_COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
+_STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
+
+
+def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
+    """One column per frequency: above by second moments, below by phasors, each scaled to its largest axis.
+
+    The horizontal line is the test direction. Repeats lie over each other; directions differ by colour and dash.
+    """
+    if not results:
+        return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no ellipsoid to draw.")
+    frequencies = sorted({result.frequency_hz for result in results})
+    directions = list(dict.fromkeys(result.along for result in results))
+    height = 1.1 * max(0.4, *(_half_height(result) for result in results))
+    columns = min(_COLUMNS, len(frequencies))
+    blocks = -(-len(frequencies) // columns)
+    figure = new_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * height / 1.15) * blocks + 0.4)
+    grid = figure.subplots(2 * blocks, columns, squeeze=False, sharex=True, sharey=True)
+    for line in grid:
+        for axes in line:
+            axes.axis("off")
+    for index, frequency in enumerate(frequencies):
+        block, column = divmod(index, columns)
+        here = [result for result in results if result.frequency_hz == frequency]
+        _draw_panels(grid[2 * block][column], grid[2 * block + 1][column], here, directions, height)
+    handles = [
+        Line2D([], [], color=_COLOURS[i % 5], linestyle=_STYLES[i % 5], label=direction.replace("_", " "))
+        for i, direction in enumerate(directions)
+    ]
+    handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="test direction"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
+    return figure
+
+
+def _draw_panels(above: Axes, below: Axes, here: list[EllipsoidResult], directions: list[str], height: float) -> None:
+    for axes in (above, below):
+        axes.set_aspect("equal")
+        axes.set_xlim(-1.15, 1.15)
+        axes.set_ylim(-height, height)
+        axes.plot([-1.12, 1.12], [0, 0], color=GREY, linewidth=0.9)
+        axes.plot([0, 0], [-0.06, 0.06], color=GREY, linewidth=0.9)
+    first, alone = here[0], len(here) == 1
+    above.set_title(
+        f"{first.frequency_hz:g} Hz\nmean squares"
+        + (_label(first.moments.normalised_axes[1], first.moments.tilt_deg) if alone else ""),
+        fontsize=9,
+    )
+    below.set_title("phasors" + (_label(first.phasor.ellipticity, first.phasor.tilt_deg) if alone else ""), fontsize=9)
+    for result in here:
+        i = directions.index(result.along)
+        colour, style = _COLOURS[i % 5], _STYLES[i % 5]
+        _draw_ellipse(above, result.moments.normalised_axes[1], result.moments.turn_deg, colour, style)
+        _draw_ellipse(below, result.phasor.ellipticity, result.phasor.turn_deg, colour, style)
+
+
+def _label(ratio: float, tilt_deg: float) -> str:
+    return f"\n1 : {ratio:.2f}, tilt {tilt_deg:.0f}°"
+
+
+def _half_height(result: EllipsoidResult) -> float:
+    """How far the taller of both ellipses rises above the line of the test direction."""
+    shapes = (
+        (result.moments.normalised_axes[1], result.moments.turn_deg),
+        (result.phasor.ellipticity, result.phasor.turn_deg),
+    )
+    return max(float(np.hypot(np.sin(np.radians(turn)), ratio * np.cos(np.radians(turn)))) for ratio, turn in shapes)
+
+
+def _draw_ellipse(axes: Axes, ratio: float, turn_deg: float, colour: str, style: LineStyleType) -> None:
+    angle, turn = np.linspace(0, 2 * np.pi, 181), np.radians(turn_deg)
+    x, y = np.cos(angle), ratio * np.sin(angle)
+    axes.plot(
+        x * np.cos(turn) - y * np.sin(turn),
+        x * np.sin(turn) + y * np.cos(turn),
+        color=colour,
+        linestyle=style,
+        linewidth=1.6,
+    )

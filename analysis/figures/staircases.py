@@ -1,0 +1,82 @@
+"""The tracks of one participant: level by trial, with every answer and every turn."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    VERMILLION,
+    new_figure,
+    newton_ticks,
+    plain_axes,
+    say_nothing_to_draw,
+)
+from analysis.runs import Run
+from protocols.staircase_rule import StaircaseRule
+
+_COLUMNS = 3
+
+
+def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
+    """One panel per run, by frequency. runs: of one participant."""
+    if not runs:
+        return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no run to draw.")
+    lowest_n = 0.75 * min([trial.level_n for run in runs for trial in run.answered], default=rule.start_n)
+    columns = min(_COLUMNS, len(runs) + 1)
+    lines = -(-(len(runs) + 1) // columns)
+    figure = new_figure(8.6, 2.3 * lines)
+    grid = figure.subplots(lines, columns, sharey=True, squeeze=False)
+    ordered = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
+    panels = [panel for line in grid for panel in line]
+    for panel, run in zip(panels, ordered, strict=False):
+        _draw_run(panel, run, rule)
+        panel.set_ylim(lowest_n, 1.25 * rule.cap_n)
+        newton_ticks(panel.yaxis, lowest_n, rule.cap_n)
+    for panel in panels[len(ordered) :]:
+        panel.axis("off")
+    panels[-1].legend(handles=_legend(rule), loc="center", fontsize=9, frameon=False)
+    for line in grid:
+        line[0].set_ylabel("Level (N)")
+    for column in range(columns):
+        lowest = max(index for index in range(column, len(ordered), columns)) if column < len(ordered) else column
+        panels[lowest].set_xlabel("Trial")
+    return figure
+
+
+def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
+    plain_axes(axes)
+    levels = np.array([trial.level_n for trial in run.answered])
+    numbers = np.arange(1, len(levels) + 1)
+    right = np.array([bool(trial.correct) for trial in run.answered], dtype=bool)
+    turns = np.array(run.state.reversal_trials, dtype=int)
+    used = turns[-rule.averaged_reversals :] if run.complete else turns[:0]
+    axes.axhline(rule.cap_n, color=GREY, linestyle="--", linewidth=1)
+    axes.plot(numbers, levels, color=GREY, linewidth=0.9, drawstyle="steps-post", zorder=1)
+    axes.plot(numbers[right], levels[right], "o", color=BLUE, markersize=2.8)
+    axes.plot(numbers[~right], levels[~right], "x", color=VERMILLION, markersize=4.5, markeredgewidth=1.3)
+    axes.plot(numbers[turns], levels[turns], "o", markersize=8, markerfacecolor="none", markeredgecolor=GREY)
+    axes.plot(numbers[used], levels[used], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
+    axes.set_yscale("log")
+    axes.set_title(f"{run.frequency_hz:g} Hz" + ("" if run.complete else " (not complete)"), fontsize=10, loc="left")
+
+
+def _legend(rule: StaircaseRule) -> list[Line2D]:
+    return [
+        Line2D([], [], marker="o", color=BLUE, markersize=4, linewidth=0, label="right"),
+        Line2D([], [], marker="x", color=VERMILLION, linewidth=0, label="wrong"),
+        _ring(BLACK, f"turn, one of the last {rule.averaged_reversals}"),
+        _ring(GREY, "turn, not averaged"),
+        Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {rule.cap_n:g} N"),
+    ]
+
+
+def _ring(colour: str, label: str) -> Line2D:
+    return Line2D(
+        [], [], marker="o", markersize=8, markerfacecolor="none", markeredgecolor=colour, linewidth=0, label=label
+    )

@@ -1,0 +1,40 @@
+"""What all figures share: colours that a colour-blind reader can tell apart, markers that tell them apart again.
+
+Palette: M. Okabe, K. Ito, Color Universal Design (2008).
+"""
+
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+
+BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6B6B6B"
+COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK)
+MARKERS = ("o", "s", "D", "P", "X", "p", "h", "v", "<", ">")
+"""Without the upward triangle, which always means: a lower bound."""
+CENSORED_MARKER = "^"
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    return Figure(figsize=(width_in, height_in), facecolor="white", layout="constrained")
+
+
+def plain_axes(axes: Axes) -> None:
+    """A light grid behind the data and no box around it."""
+    axes.set_axisbelow(True)
+    axes.grid(True, color="#DDDDDD", linewidth=0.6)
+    axes.tick_params(labelsize=9)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
+    """Round levels on a logarithmic axis, written as people say them. Call after the scale is set."""
+    levels = [level for level in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0) if lowest_n <= level <= highest_n]
+    axis.set_ticks(levels, labels=[f"{level:g}" for level in levels])
+    axis.set_ticks([], minor=True)
+
+
+def say_nothing_to_draw(figure: Figure, sentence: str) -> Figure:
+    figure.text(0.5, 0.5, sentence, ha="center", va="center", fontsize=11, color=GREY)
+    return figure

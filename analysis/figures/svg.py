@@ -1,0 +1,30 @@
+"""A figure as SVG text that can stand inside a page, together with others."""
+
+import io
+import re
+
+import matplotlib
+from matplotlib.figure import Figure
+
+
+def inline_svg(figure: Figure, name: str, title: str) -> str:
+    """The <svg> element alone, with a title for those who cannot see it. The same figure gives the same text.
+
+    name: letters, digits, hyphens; put before every id, so that two figures in a page do not share any.
+    """
+    buffer = io.StringIO()
+    # Text stays text: it can be read aloud, searched and copied.
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    svg = text[text.index("<svg") :]
+    svg = re.sub(r'\bid="', f'id="{name}-', svg)
+    svg = svg.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
+    opening, rest = svg.split(">", 1)
+    return (
+        f'{opening} role="img" aria-labelledby="{name}-title"><title id="{name}-title">{_escaped(title)}</title>{rest}'
+    )
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

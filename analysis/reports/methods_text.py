@@ -1,0 +1,105 @@
+"""The methods of a study in words, with the numbers of its protocol."""
+
+from analysis.wording import listed
+from protocols.staircase_rule import StaircaseRule, StepChange
+from protocols.study_protocol import StudyProtocol
+
+_ORDERS = {
+    "random": "in random order",
+    "williams": "in an order balanced for carry-over (Williams)",
+    "as_listed": "in this order",
+}
+_DRAWS = {
+    "independent": "drawn independently for every trial",
+    "balanced": "drawn so that both occurred equally often within every eight trials",
+}
+_LEVELS = {
+    "commanded_force": "commanded force",
+    "delivered_acceleration": "delivered acceleration",
+}
+_STEP_CHANGES = {
+    StepChange.AFTER_REVERSAL: "the reversal that completed a phase still moved by that phase's step",
+    StepChange.AT_REVERSAL: "the reversal that completed a phase already moved by the next step",
+    StepChange.AT_NEXT_REVERSAL: "a phase's step stayed in force for one reversal more",
+}
+_STATISTICS = (
+    "Frequencies are compared as published, by one-way analysis of variance between groups with Tukey-Kramer pairs "
+    "and Hochberg-Tamhane comparison intervals (those that MATLAB's multcompare draws), and, because every "
+    "participant took every frequency, within participants: analysis of variance with the Greenhouse-Geisser "
+    "correction, and Friedman's test on ranks. Lower bounds enter as plain numbers."
+)
+
+
+def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
+    """One paragraph each: task, stimulus, schedule, staircase, threshold, statistics."""
+    rule = protocol.staircase
+    return (
+        _task(protocol),
+        _stimulus(protocol),
+        _schedule(protocol),
+        _staircase(rule),
+        _threshold(rule),
+        _STATISTICS,
+    )
+
+
+def _task(protocol: StudyProtocol) -> str:
+    trial, directions = protocol.trial, protocol.directions
+    first, second = (directions.symmetry_deg + side for side in (45, -45))
+    limit = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
+    told = "was told" if trial.feedback == "after_answer" else "was not told"
+    return (
+        f"Every trial played one sinusoidal force along one of two orthogonal directions, at {first:g}° (1) and "
+        f"{second:g}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
+        f"{directions.symmetry_deg:g}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
+        f"which of the two it was, {limit}, and {told} whether that was right."
+    )
+
+
+def _stimulus(protocol: StudyProtocol) -> str:
+    stimulus = protocol.stimulus
+    polarity = "to either side at random" if stimulus.onset_polarity == "random" else "always to the same side"
+    return (
+        f"The amplitude rose over {stimulus.fade_in_s:g} s ({stimulus.fade_shape.replace('_', ' ')}), was held until "
+        f"the answer, and fell over {stimulus.fade_out_s:g} s; the first half-wave went {polarity}. The level of a "
+        f"trial is the amplitude of the {_LEVELS[stimulus.quantity]}."
+    )
+
+
+def _schedule(protocol: StudyProtocol) -> str:
+    frequencies = listed([f"{frequency:g}" for frequency in protocol.stimulus.frequencies_hz])
+    training = listed([f"{frequency:g} Hz" for frequency in protocol.training.frequencies_hz])
+    rest = f", at least {protocol.rests.after_run_s:g} s apart" if protocol.rests.after_run_s else ""
+    return (
+        f"The frequencies were {frequencies} Hz, one whole staircase each, {_ORDERS[protocol.schedule.order]}{rest}. "
+        + (f"Training came first ({training}) and enters no result." if training else "There was no training.")
+    )
+
+
+def _staircase(rule: StaircaseRule) -> str:
+    phases = listed([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
+    up = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"
+    down = "every right answer" if rule.down_after_right == 1 else f"{rule.down_after_right} right answers in a row"
+    sentences = [
+        f"The level began at {rule.start_n:g} N, rose after {up} and fell after {down}, by {phases}; "
+        f"{_STEP_CHANGES[rule.step_change]}.",
+        f"It never passed {rule.cap_n:g} N; a push against this cap moved nothing and was no reversal.",
+        f"A reversal is a change of the level's direction, and the run ended at once with reversal {rule.reversals}"
+        + (f", or without a threshold after {rule.trial_limit} trials." if rule.trial_limit else "."),
+    ]
+    if rule.initial_one_up_one_down:
+        sentences.insert(1, "Until the first reversal it moved after every answer.")
+    if rule.up_after_wrong == 1:
+        sentences.append(f"Such a run converges where {100 * 0.5 ** (1 / rule.down_after_right):.1f} % are right.")
+    return " ".join(sentences)
+
+
+def _threshold(rule: StaircaseRule) -> str:
+    return (
+        "The threshold is the arithmetic mean, in newtons, of the levels at the last "
+        f"{rule.averaged_reversals} reversals. It was recomputed from the answers, and every level on record was "
+        "checked against the rule. It is marked as a lower bound (≥) when at least one of these reversals is a peak at the "
+        "cap, which a stronger device would have let rise further. Sensitivity d' and criterion are those of "
+        "one-interval identification over all trials of a run, with the log-linear correction; the criterion is "
+        "positive for a liking of direction 2."
+    )

@@ -1,0 +1,112 @@
+"""The report of one study: one page that stands alone."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.ellipsoid import EllipsoidResult
+from analysis.figures.picture import Picture
+from analysis.population import Population
+from analysis.reports.methods_text import methods_text
+from analysis.reports.page import Page, Section, render_page
+from analysis.reports.study_tables import (
+    ellipsoid_table,
+    group_table,
+    one_way_table,
+    pair_table,
+    run_table,
+    threshold_table_text,
+    within_table,
+)
+from analysis.study_analysis import StudyAnalysis
+
+_BANNERS = {
+    Population.PEOPLE: "",
+    Population.SIMULATED: "Simulated participants: no person took part. These numbers test the method and the "
+    "program; they say nothing about human perception.",
+    Population.NOT_FELT: "Nothing was felt: people answered while a simulated device moved nothing. These numbers are "
+    "a rehearsal and must not be used as measurements of people.",
+}
+
+
+def render_study_report(
+    analysis: StudyAnalysis,
+    pictures: Sequence[Picture],
+    provenance: Mapping[str, str],
+    generated_utc: str,
+    ellipsoids: Sequence[EllipsoidResult] = (),
+) -> str:
+    """HTML. pictures: of `analysis.figures.study_pictures`, for the same analysis and ellipsoids."""
+    by_name = {picture.name: picture for picture in pictures}
+    sections = [
+        _warnings(analysis),
+        *_results(analysis, by_name),
+        *_delivery(by_name),
+        *_ellipsoids(ellipsoids, by_name),
+        *_runs(analysis, pictures),
+        Section("Methods", paragraphs=methods_text(analysis.protocol)),
+    ]
+    return render_page(
+        Page(
+            title=analysis.protocol.title,
+            summary=_summary(analysis),
+            banner=_BANNERS[analysis.population] if analysis.population else "",
+            sections=tuple(sections),
+            generated_utc=generated_utc,
+            provenance=provenance,
+        )
+    )
+
+
+def _summary(analysis: StudyAnalysis) -> str:
+    if not analysis.thresholds:
+        return "There is no run to analyse."
+    complete = sum(row.complete for row in analysis.thresholds)
+    people, runs = len(analysis.table.subjects), len(analysis.thresholds)
+    who = analysis.population.value if analysis.population else "participants"
+    return (
+        f"Data of {who}: {people} participant{'s' if people != 1 else ''}, {runs} run{'s' if runs != 1 else ''}, "
+        f"{complete} of them complete, {sum(row.trials for row in analysis.thresholds)} counted trials."
+    )
+
+
+def _warnings(analysis: StudyAnalysis) -> Section:
+    none = ("Nothing stands out: all runs are complete, and no threshold touched the cap.",)
+    return Section(
+        "Before you read the numbers", paragraphs=() if analysis.warnings else none, points=analysis.warnings
+    )
+
+
+def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
+    if not analysis.thresholds:
+        return []
+    pairs = (pair_table(analysis.comparisons),) if analysis.comparisons.pairs else ()
+    thresholds = Section(
+        "Thresholds",
+        pictures=(by_name["thresholds"],) if "thresholds" in by_name else (),
+        tables=(threshold_table_text(analysis), group_table(analysis)),
+    )
+    comparison = Section(
+        "Comparison of the frequencies",
+        paragraphs=(analysis.difference,),
+        tables=(one_way_table(analysis), *pairs, within_table(analysis)),
+    )
+    return [thresholds, comparison]
+
+
+def _delivery(by_name: Mapping[str, Picture]) -> list[Section]:
+    if "delivered" not in by_name:
+        return []
+    return [Section("What the device delivered", pictures=(by_name["delivered"],))]
+
+
+def _ellipsoids(results: Sequence[EllipsoidResult], by_name: Mapping[str, Picture]) -> list[Section]:
+    if not results:
+        return []
+    pictures = (by_name["ellipsoids"],) if "ellipsoids" in by_name else ()
+    return [Section("Acceleration ellipses", pictures=pictures, tables=(ellipsoid_table(results),))]
+
+
+def _runs(analysis: StudyAnalysis, pictures: Sequence[Picture]) -> list[Section]:
+    if not analysis.runs:
+        return []
+    tracks = tuple(picture for picture in pictures if picture.name.startswith("staircases-"))
+    return [Section("Runs", pictures=tracks, tables=(run_table(analysis),))]

@@ -1,0 +1,165 @@
+"""The tables of a study report: numbers become text here and nowhere else."""
+
+from collections.abc import Sequence
+
+from analysis.comparisons import Comparisons
+from analysis.ellipsoid import EllipsoidResult
+from analysis.reports.page import Table
+from analysis.study_analysis import StudyAnalysis
+from analysis.wording import NONE, count, number, p_value
+
+
+def threshold_table_text(analysis: StudyAnalysis) -> Table:
+    table = analysis.table
+    rows = [
+        (subject, *(_bounded(value, cut) for value, cut in zip(values, cuts, strict=True)))
+        for subject, values, cuts in zip(table.subjects, table.values, table.censored, strict=True)
+    ]
+    return Table(
+        caption="Individual thresholds (N)",
+        header=("Participant", *(f"{frequency:g} Hz" for frequency in table.frequencies_hz)),
+        rows=tuple(rows),
+        notes=("≥: a lower bound, cut by the cap. –: no completed run.",),
+    )
+
+
+def group_table(analysis: StudyAnalysis) -> Table:
+    intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
+    bounds = [sum(column) for column in zip(*analysis.table.censored, strict=True)]
+    rows = []
+    for group, bound in zip(analysis.anova.groups, bounds, strict=True):
+        interval = intervals.get(group.name)
+        shown = f"{number(interval.lower)} to {number(interval.upper)}" if interval else NONE
+        rows.append((group.name, str(group.n), number(group.mean), number(group.sd), shown, str(bound)))
+    percent = f"{100 * analysis.comparisons.confidence:g} %"
+    return Table(
+        caption="Groups (N)",
+        header=("Frequency", "n", "Mean", "SD", f"{percent} comparison interval", "Lower bounds"),
+        rows=tuple(rows),
+        notes=("Comparison intervals are for comparing means with each other; they are no confidence intervals.",),
+    )
+
+
+def one_way_table(analysis: StudyAnalysis) -> Table:
+    anova = analysis.anova
+    between_square = None
+    if anova.ss_between is not None and anova.df_between:
+        between_square = anova.ss_between / anova.df_between
+    effect = f"Effect size: η² = {number(anova.eta_squared)}, ω² = {number(anova.omega_squared)}."
+    return Table(
+        caption="One-way analysis of variance, as published",
+        header=("Source", "Sum of squares", "df", "Mean square", "F", "p"),
+        rows=(
+            (
+                "Frequency",
+                number(anova.ss_between, 3),
+                count(anova.df_between),
+                number(between_square, 3),
+                number(anova.f),
+                p_value(anova.p),
+            ),
+            (
+                "Within",
+                number(anova.ss_within, 3),
+                count(anova.df_within),
+                number(anova.mean_square_within, 3),
+                "",
+                "",
+            ),
+        ),
+        notes=((effect,) if anova.f is not None else ()) + anova.notes,
+    )
+
+
+def pair_table(comparisons: Comparisons) -> Table:
+    percent = f"{100 * comparisons.confidence:g} %"
+    return Table(
+        caption="Pairs of frequencies (Tukey-Kramer)",
+        header=("Pair", "Difference (N)", f"{percent} interval", "p"),
+        rows=tuple(
+            (
+                f"{pair.second} − {pair.first}",
+                f"{pair.difference:+.2f}",
+                f"{pair.lower:+.2f} to {pair.upper:+.2f}",
+                p_value(pair.p),
+            )
+            for pair in comparisons.pairs
+        ),
+        notes=comparisons.notes,
+    )
+
+
+def within_table(analysis: StudyAnalysis) -> Table:
+    within, ranks = analysis.within, analysis.ranks
+    effect = (
+        f"Effect size: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
+        f"{number(within.generalized_eta_squared)}; Kendall's W = {number(ranks.kendall_w)}."
+    )
+    corrected = NONE
+    if within.epsilon is not None and within.df_conditions is not None and within.df_error is not None:
+        corrected = f"{within.epsilon * within.df_conditions:.2f}, {within.epsilon * within.df_error:.2f}"
+    plain = f"{count(within.df_conditions)}, {count(within.df_error)}"
+    return Table(
+        caption=f"Within participants ({within.participants} without a gap)",
+        header=("Test", "df", "Statistic", "p"),
+        rows=(
+            (
+                f"Greenhouse-Geisser, ε = {number(within.epsilon)}",
+                corrected,
+                f"F = {number(within.f)}",
+                p_value(within.p),
+            ),
+            ("Without correction", plain, f"F = {number(within.f)}", p_value(within.p_uncorrected)),
+            ("Friedman (ranks)", count(ranks.df), f"χ² = {number(ranks.chi_squared)}", p_value(ranks.p)),
+        ),
+        notes=((effect,) if within.f is not None else ()) + within.notes + ranks.notes,
+    )
+
+
+def run_table(analysis: StudyAnalysis) -> Table:
+    return Table(
+        caption="All runs",
+        header=(
+            "Participant", "Session, run", "Hz", "N", "dB re 1 N", "m/s²", "mm", "Reversals", "at cap", "Trials",
+            "at cap", "pushes", "Spoiled", "% right", "d'", "Criterion",
+        ),
+        rows=tuple(
+            (
+                row.subject, f"{row.session}, {row.run}", f"{row.frequency_hz:g}",
+                _bounded(row.threshold_n, row.censored), number(row.threshold_db), number(row.threshold_mps2), number(row.threshold_mm, 3), str(row.reversals),
+                str(row.cap_reversals), str(row.trials), str(row.trials_at_cap), str(row.pushes_against_cap),
+                str(row.spoiled_trials), number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
+            )
+            for row in analysis.thresholds
+        ),
+        notes=("Reversals at the cap: of the averaged ones. m/s² and mm: as measured at the averaged reversals.",),
+        folded=True,
+    )  # fmt: skip
+
+
+def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
+    return Table(
+        caption="Acceleration ellipses",
+        header=(
+            "Frequency", "Along", "Force (N)", "Along (m/s²)", "Axes, mean squares", "Tilt", "Axes, phasors", "Tilt",
+            "Off / on axis", "Harmonics",
+        ),
+        rows=tuple(
+            (
+                f"{result.frequency_hz:g} Hz", result.along.replace("_", " "), number(result.amplitude_n),
+                number(result.phasor.on_axis_mps2), f"1 : {number(result.moments.normalised_axes[1])}",
+                f"{result.moments.tilt_deg:.0f}°", f"1 : {number(result.phasor.ellipticity)}",
+                f"{result.phasor.tilt_deg:.0f}°", number(result.phasor.off_axis_ratio),
+                f"{100 * result.phasor.harmonic_share:.1f} %",
+            )
+            for result in results
+        ),
+        notes=(
+            "Tilt: of the largest axis from the test direction. Harmonics: energy at 2 to 5 times the driven frequency "
+            "over that of the fundamental.",
+        ),
+    )  # fmt: skip
+
+
+def _bounded(value: float | None, censored: bool) -> str:
+    return f"≥ {number(value)}" if censored and value is not None else number(value)

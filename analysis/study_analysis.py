@@ -1,0 +1,93 @@
+"""Everything that the trials of one study say, in one call."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from analysis.anova import OneWayAnova, one_way
+from analysis.comparisons import Comparisons, compare_all
+from analysis.friedman import Friedman, friedman
+from analysis.population import Population, split_by_population
+from analysis.repeated_measures import RepeatedMeasures, repeated_measures
+from analysis.runs import Run, recompute_runs
+from analysis.study_warnings import design_difference, study_warnings
+from analysis.threshold_table import ThresholdTable, threshold_table
+from analysis.thresholds import Threshold, threshold_of
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase, Trial
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class StudyAnalysis:
+    protocol: StudyProtocol
+    population: Population | None
+    """None when there is no trial at all."""
+    trials: tuple[Trial, ...]
+    """Those of the test phase."""
+    runs: tuple[Run, ...]
+    thresholds: tuple[Threshold, ...]
+    """One per run, in the same order."""
+    table: ThresholdTable
+    anova: OneWayAnova
+    comparisons: Comparisons
+    within: RepeatedMeasures
+    ranks: Friedman
+    difference: str
+    """What separates the published one-way analysis from the one within participants, here."""
+    warnings: tuple[str, ...]
+
+
+def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnalysis:
+    """Thresholds and statistics of trials of one population that followed one protocol.
+
+    Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
+    with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
+    """
+    parts = split_by_population(trials)
+    if len(parts) > 1:
+        raise ValueError(
+            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; "
+            "analyse each kind by itself"
+        )
+    rule = protocol.staircase
+    runs = recompute_runs(trials, rule)
+    rows = tuple(threshold_of(run, rule) for run in runs)
+    tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
+    table = threshold_table(rows, protocol.stimulus.frequencies_hz)
+    anova = one_way(table.groups())
+    within = repeated_measures(table.subjects, table.values)
+    return StudyAnalysis(
+        protocol=protocol,
+        population=next(iter(parts), None),
+        trials=tested,
+        runs=runs,
+        thresholds=rows,
+        table=table,
+        anova=anova,
+        comparisons=compare_all(anova, CONFIDENCE),
+        within=within,
+        ranks=friedman(table.values),
+        difference=design_difference(anova, within),
+        warnings=study_warnings(tested, rows, table, protocol),
+    )
+
+
+def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
+    """The statistics as JSON values: None where the data give no number, with the reason in the notes beside it."""
+    return {
+        "format": "hapteq-anova",
+        "version": 1,
+        "population": analysis.population.value if analysis.population else None,
+        "unit": "N",
+        "participants": list(analysis.table.subjects),
+        "frequencies_hz": list(analysis.table.frequencies_hz),
+        "lower_bounds": sum(map(sum, analysis.table.censored)),
+        "one_way": asdict(analysis.anova),
+        "comparisons": asdict(analysis.comparisons),
+        "within_participants": asdict(analysis.within),
+        "friedman": asdict(analysis.ranks),
+        "difference": analysis.difference,
+        "warnings": list(analysis.warnings),
+    }

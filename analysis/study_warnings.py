@@ -1,0 +1,142 @@
+"""What a reader must know before believing the numbers, in sentences."""
+
+from collections.abc import Iterable, Sequence
+
+from analysis.anova import OneWayAnova
+from analysis.repeated_measures import RepeatedMeasures
+from analysis.threshold_table import ThresholdTable
+from analysis.thresholds import Threshold
+from analysis.wording import f_text, listed, p_text
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Trial, TrialStatus
+
+FEW_PARTICIPANTS = 5
+"""Below this many, means and their comparison say little about people in general."""
+STRONG_BIAS = 0.6
+"""Criterion beyond which a liking for one answer costs a staircase four in a hundred right answers. An observer
+without any exceeds it by chance in about one of 250 runs."""
+
+
+def study_warnings(
+    trials: Sequence[Trial], rows: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
+) -> tuple[str, ...]:
+    """trials: of the test phase. rows, table: what was computed from them."""
+    if not rows:
+        return ("No test trial is there, so there is nothing to analyse.",)
+    candidates = (
+        _incomplete(rows, protocol.staircase.reversals),
+        _missing(table),
+        _censored(table, protocol.staircase.cap_n),
+        _few(table),
+        _unequal(table),
+        _biased(rows),
+        _spoiled(trials),
+        _flagged(trials),
+        _unmeasured(trials),
+        *table.notes,
+    )
+    return tuple(sentence for sentence in candidates if sentence)
+
+
+def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
+    """The published analysis beside the one within participants, in words and numbers."""
+    if anova.p is None or within.p is None:
+        said = "neither" if anova.p is None and within.p is None else "only one"
+        return (
+            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {said} "
+            "can be computed from these data, so they cannot be compared."
+        )
+    agree = (anova.p < 0.05) == (within.p < 0.05)
+    return (
+        "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
+        f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
+        "Every participant took every frequency; the analysis within participants takes those differences out "
+        f"({_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
+        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
+        f"{within.epsilon:.2f}, {p_text(within.p)}. "
+        + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
+        + "The second one fits the design; the first is here to compare with the published result."
+    )
+
+
+def _removed_percent(within: RepeatedMeasures) -> str:
+    between, error = within.ss_participants or 0.0, within.ss_error or 0.0
+    return f"{100 * between / (between + error):.0f} %"
+
+
+def _incomplete(rows: Sequence[Threshold], reversals: int) -> str:
+    cut = [f"{_run(row)} ({row.reversals} of {reversals} reversals)" for row in rows if not row.complete]
+    return f"{_count(cut, 'run')} not complete and without a threshold: {listed(cut)}." if cut else ""
+
+
+def _missing(table: ThresholdTable) -> str:
+    gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.missing()]
+    return f"No threshold for {listed(gaps)}." if gaps else ""
+
+
+def _censored(table: ThresholdTable, cap_n: float) -> str:
+    cut = [
+        f"{subject} at {frequency:g} Hz"
+        for subject, row in zip(table.subjects, table.censored, strict=True)
+        for frequency, censored in zip(table.frequencies_hz, row, strict=True)
+        if censored
+    ]
+    if not cut:
+        return ""
+    return (
+        f"{_count(cut, 'threshold')} only a lower bound, because the cap of {cap_n:g} N cut off peaks of the "
+        f"staircase: {listed(cut)}. As in the published analysis they enter means and tests as plain numbers, so "
+        "means near the cap are too low and differences towards it too small."
+    )
+
+
+def _few(table: ThresholdTable) -> str:
+    count = len(table.subjects)
+    if count >= FEW_PARTICIPANTS:
+        return ""
+    if count == 1:
+        return "There is one participant: individual thresholds can be shown, nothing can be tested."
+    return f"There are only {count} participants: means and tests say little about people in general."
+
+
+def _unequal(table: ThresholdTable) -> str:
+    sizes = {sum(value is not None for value in column) for column in table.groups().values()}
+    if len(sizes) < 2:
+        return ""
+    return "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
+
+
+def _biased(rows: Sequence[Threshold]) -> str:
+    leaning = [
+        f"{_run(row)} (criterion {row.criterion:+.2f})"
+        for row in rows
+        if row.criterion is not None and abs(row.criterion) > STRONG_BIAS
+    ]
+    if not leaning:
+        return ""
+    return f"A liking for one of the two answers, which raises a threshold, shows in {listed(leaning)}."
+
+
+def _spoiled(trials: Iterable[Trial]) -> str:
+    count = sum(trial.status is TrialStatus.SPOILED for trial in trials)
+    return f"{count} spoiled presentation{'s' if count != 1 else ''} drawn again; the answers do not count." * bool(
+        count
+    )
+
+
+def _flagged(trials: Iterable[Trial]) -> str:
+    count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
+    return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus is worth a look." * bool(count)
+
+
+def _unmeasured(trials: Iterable[Trial]) -> str:
+    count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
+    return f"{count} counted trial{'s' if count != 1 else ''} without a measured acceleration." * bool(count)
+
+
+def _run(row: Threshold) -> str:
+    return f"{row.subject} at {row.frequency_hz:g} Hz"
+
+
+def _count(things: Sequence[str], noun: str) -> str:
+    return f"1 {noun} is" if len(things) == 1 else f"{len(things)} {noun}s are"

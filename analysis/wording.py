@@ -1,0 +1,37 @@
+"""Numbers as text: the same everywhere, and a dash where there is none."""
+
+from collections.abc import Sequence
+
+NONE = "–"
+_NAMED = 12
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    return NONE if value is None else f"{value:.{digits}f}"
+
+
+def count(value: int | None) -> str:
+    return NONE if value is None else str(value)
+
+
+def p_value(p: float | None) -> str:
+    if p is None:
+        return NONE
+    return "< 0.0001" if p < 0.0001 else f"{p:.4f}"
+
+
+def p_text(p: float | None) -> str:
+    """With its letter, as it stands in a sentence."""
+    text = p_value(p)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
+
+
+def f_text(df_first: int | None, df_second: int | None, f: float | None) -> str:
+    return f"F({count(df_first)}, {count(df_second)}) = {number(f)}"
+
+
+def listed(things: Sequence[str]) -> str:
+    """ "a, b and c"; a long list is cut and says by how much."""
+    if len(things) > _NAMED:
+        return f"{', '.join(things[:_NAMED])} and {len(things) - _NAMED} more"
+    return " and ".join((", ".join(things[:-1]), things[-1])) if len(things) > 1 else "".join(things)
