@@ -20,9 +20,8 @@ class AnswerCount:
         self._task = self._progress.add_task(title, where="")
 
     def show(self, question: Question) -> None:
-        where = (
-            f"{question.phase.value} run {question.run_number}/{question.runs_in_phase}, trial {question.trial_number}"
-        )
+        run = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
+        where = f"{run}, trial {question.trial_number}"
         self._progress.update(self._task, where=where)
 
     def __enter__(self) -> Self:

@@ -13,7 +13,7 @@ def rehearse(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the population and of all draws.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
 ) -> None:
-    """Simulated participants take the whole study; ends with the report. Run it again to go on after an interruption."""
+    """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
     from study.cli.progress import Bar
     from study.store.protocol_files import read_study_protocol
     from study.workflows.analyze_data import analyze_data

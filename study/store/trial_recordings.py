@@ -27,7 +27,7 @@ def save_trial_recording(
 ) -> SavedRecording:
     """On return it is on the disk. conditions: JSON values that say what was played and how the device fared."""
     path = folder.path / name
-    write_recording(path, replace(recording, meta={**recording.meta, **conditions}))
+    write_recording(path, replace(recording, meta={**recording.meta, **conditions}), precision="float32")
     return SavedRecording(name, _sha256(path))
 
 

@@ -44,19 +44,22 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     """Open the device, then the session, and run it."""
     check_playable(plan.protocol)
     settings = device_settings(plan.protocol)
-    with contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device:
-        equalizer = Identity.name
-        with opened_session(plan, device.info, equalizer, participant.clock) as opened:
-            return _run(opened, device, participant)
+    with (
+        contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
+        opened_session(plan, device.info, Identity.name, participant.clock) as opened,
+    ):
+        return _run(opened, device, participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
     """Fold the log, open the device, and go on where the session stopped."""
     state = fold_session(folder).state
     settings = device_settings(state.protocol)
-    with contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device:
-        with resumed_session(folder, device.info, participant.clock) as opened:
-            return _run(opened, device, participant)
+    with (
+        contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
+        resumed_session(folder, device.info, participant.clock) as opened,
+    ):
+        return _run(opened, device, participant)
 
 
 def _run(opened: OpenedSession, device: Device, participant: Participant) -> Conducted:

@@ -62,7 +62,7 @@ def check_playable(protocol: StudyProtocol) -> None:
     if protocol.stimulus.quantity == "delivered_acceleration":
         raise StudyError(
             "This protocol needs an equalizer",
-            f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and no equalizer model was given.",
+            f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and there is no equalizer model.",
             'Set stimulus.quantity = "commanded_force", or give a model of this device.',
         )
 

@@ -138,7 +138,7 @@ def _measured(
     vector: FloatArray,
     sitting: Sitting,
 ) -> TrialMeasured:
-    saved = _save(present, played, vector, sitting) if played.recording is not None else None
+    saved = _save(present, played.recording, played.health, vector, sitting) if played.recording else None
     return TrialMeasured(
         utc=sitting.clock.utc(),
         run=present.run,

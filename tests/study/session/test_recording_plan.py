@@ -17,9 +17,7 @@ def protocol(*segments, **changes) -> RecordingProtocol:
 
 
 def test_each_frequency_is_a_piece_whose_counted_part_is_steady_whole_loops():
-    plan = pieces(
-        protocol(SineSegment("sine", (5.0, 15.0), 1.0, "direction_1", duration_s=1.1, settle_s=0.4)), RATE_HZ
-    )
+    plan = pieces(protocol(SineSegment("sine", (5.0, 15.0), 1.0, "direction_1", duration_s=1.1, settle_s=0.4)), RATE_HZ)
     assert [piece.frequency_hz for piece in plan] == [5.0, 15.0]
     for piece in plan:
         counted = piece.segment.stop - piece.segment.start

@@ -1,0 +1,63 @@
+"""`hapteq protocol`: the protocols that come with hapteq, what is in one, and how to fix one before data come in."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.study import DataOption
+
+app = typer.Typer(help="List, show and lock protocols.", no_args_is_help=True, rich_markup_mode=None)
+
+NameArgument = Annotated[str, typer.Argument(help="A shipped protocol's name, or a file.")]
+
+
+@app.command("list")
+def list_protocols() -> None:
+    """The shipped protocols, one line each."""
+    from study.store.protocol_files import read_protocol, shipped_protocols
+
+    for name in shipped_protocols():
+        protocol = read_protocol(name).protocol
+        typer.echo(f"{name:22} {protocol.kind:10} {protocol.title}")
+
+
+@app.command("show")
+def show(
+    name: NameArgument,
+    text: Annotated[bool, typer.Option("--text", help="The file as it is, to copy and change.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
+) -> None:
+    """Every key of a protocol with its value, its default and the reason for it."""
+    from protocols.explain import explain
+    from protocols.hashing import protocol_hash
+    from study.store.protocol_files import read_protocol
+
+    file = read_protocol(name)
+    if text:
+        typer.echo(file.text, nl=False)
+        return
+    fields = explain(file.protocol)
+    if as_json:
+        rows = [{"key": f.key, "value": f.value, "default": f.default, "reason": f.description} for f in fields]
+        typer.echo(json.dumps({"hash": protocol_hash(file.protocol), "fields": rows}, indent=2, default=str))
+        return
+    typer.echo(f"{file.protocol.title} (hash {protocol_hash(file.protocol)[:12]})")
+    for field in fields:
+        typer.echo(f"\n{field.key} = {field.value}")
+        typer.echo(f"    {field.description}")
+
+
+@app.command("lock")
+def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
+    """Fix a protocol before data come in: sessions in the data folder then refuse any other version of it."""
+    from importlib.metadata import version
+
+    from study.devices.clock import RealClock
+    from study.store.protocol_files import lock_protocol, read_protocol
+
+    file = read_protocol(name, data)
+    data.mkdir(parents=True, exist_ok=True)
+    path = lock_protocol(file, data, RealClock().utc(), version("hapteq"))
+    typer.echo(str(path))

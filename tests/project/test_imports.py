@@ -1,0 +1,35 @@
+"""What is loaded when: help is instant, and the headless packages stay headless."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HEAVY = ("numpy", "scipy", "numba", "pandas", "statsmodels", "matplotlib", "h5py", "textual")
+
+
+def loaded_by(statement: str) -> set[str]:
+    script = f"import sys; sys.argv = ['hapteq']\n{statement}\nprint(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True, timeout=120
+    )
+    return {name.split(".")[0] for name in done.stdout.split()}
+
+
+def test_help_loads_nothing_heavy():
+    loaded = loaded_by(
+        "from study.cli.main import main\n"
+        "import io, contextlib\n"
+        "with contextlib.redirect_stdout(io.StringIO()): main(['--help'])"
+    )
+    assert loaded.isdisjoint(HEAVY), sorted(loaded & set(HEAVY))
+
+
+@pytest.mark.parametrize("package", ["protocols", "equalizer.signals", "study.session", "study.devices.opening"])
+def test_headless_packages_load_no_screen_and_no_plots(package):
+    modules = sorted((ROOT / package.replace(".", "/")).rglob("*.py"))
+    names = [".".join(m.relative_to(ROOT).with_suffix("").parts) for m in modules if m.stem != "__init__"]
+    loaded = loaded_by(f"import {', '.join(names or [package])}")
+    assert loaded.isdisjoint({"textual", "rich", "typer", "matplotlib"})
