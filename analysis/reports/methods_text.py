@@ -98,8 +98,8 @@ def _threshold(rule: StaircaseRule) -> str:
     return (
         "The threshold is the arithmetic mean, in newtons, of the levels at the last "
         f"{rule.averaged_reversals} reversals. It was recomputed from the answers, and every level on record was "
-        "checked against the rule. It is marked as a lower bound (≥) when at least one of these reversals is a peak at the "
-        "cap, which a stronger device would have let rise further. Sensitivity d' and criterion are those of "
+        "checked against the rule. It is marked as a lower bound (≥) when at least one of these reversals is a peak "
+        "at the cap, which a stronger device would have let rise further. Sensitivity d' and criterion are those of "
         "one-interval identification over all trials of a run, with the log-linear correction; the criterion is "
         "positive for a liking of direction 2."
     )

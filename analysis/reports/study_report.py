@@ -61,9 +61,9 @@ def _summary(analysis: StudyAnalysis) -> str:
         return "There is no run to analyse."
     complete = sum(row.complete for row in analysis.thresholds)
     people, runs = len(analysis.table.subjects), len(analysis.thresholds)
-    who = analysis.population.value if analysis.population else "participants"
+    simulated = "simulated " if analysis.population is Population.SIMULATED else ""
     return (
-        f"Data of {who}: {people} participant{'s' if people != 1 else ''}, {runs} run{'s' if runs != 1 else ''}, "
+        f"{people} {simulated}participant{'s' if people != 1 else ''}, {runs} run{'s' if runs != 1 else ''}, "
         f"{complete} of them complete, {sum(row.trials for row in analysis.thresholds)} counted trials."
     )
 

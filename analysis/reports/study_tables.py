@@ -1,11 +1,12 @@
 """The tables of a study report: numbers become text here and nowhere else."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from analysis.comparisons import Comparisons
 from analysis.ellipsoid import EllipsoidResult
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
+from analysis.thresholds import Threshold
 from analysis.wording import NONE, count, number, p_value
 
 
@@ -41,33 +42,20 @@ def group_table(analysis: StudyAnalysis) -> Table:
 
 
 def one_way_table(analysis: StudyAnalysis) -> Table:
+    """Without rows where nothing can be computed: the notes say why."""
     anova = analysis.anova
-    between_square = None
-    if anova.ss_between is not None and anova.df_between:
-        between_square = anova.ss_between / anova.df_between
-    effect = f"Effect size: η² = {number(anova.eta_squared)}, ω² = {number(anova.omega_squared)}."
+    rows: tuple[tuple[str, ...], ...] = ()
+    effect: tuple[str, ...] = ()
+    if anova.f is not None and anova.ss_between is not None and anova.df_between:
+        between = (number(anova.ss_between, 3), count(anova.df_between), number(anova.ss_between / anova.df_between, 3))
+        within = (number(anova.ss_within, 3), count(anova.df_within), number(anova.mean_square_within, 3))
+        rows = (("Frequency", *between, number(anova.f), p_value(anova.p)), ("Within", *within, "", ""))
+        effect = (f"Effect size: η² = {number(anova.eta_squared)}, ω² = {number(anova.omega_squared)}.",)
     return Table(
         caption="One-way analysis of variance, as published",
         header=("Source", "Sum of squares", "df", "Mean square", "F", "p"),
-        rows=(
-            (
-                "Frequency",
-                number(anova.ss_between, 3),
-                count(anova.df_between),
-                number(between_square, 3),
-                number(anova.f),
-                p_value(anova.p),
-            ),
-            (
-                "Within",
-                number(anova.ss_within, 3),
-                count(anova.df_within),
-                number(anova.mean_square_within, 3),
-                "",
-                "",
-            ),
-        ),
-        notes=((effect,) if anova.f is not None else ()) + anova.notes,
+        rows=rows,
+        notes=effect + anova.notes,
     )
 
 
@@ -90,51 +78,62 @@ def pair_table(comparisons: Comparisons) -> Table:
 
 
 def within_table(analysis: StudyAnalysis) -> Table:
+    """Only the tests that can be computed: the notes say why others cannot."""
     within, ranks = analysis.within, analysis.ranks
-    effect = (
-        f"Effect size: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
-        f"{number(within.generalized_eta_squared)}; Kendall's W = {number(ranks.kendall_w)}."
-    )
-    corrected = NONE
+    rows: list[tuple[str, ...]] = []
+    effects = []
     if within.epsilon is not None and within.df_conditions is not None and within.df_error is not None:
+        f = f"F = {number(within.f)}"
         corrected = f"{within.epsilon * within.df_conditions:.2f}, {within.epsilon * within.df_error:.2f}"
-    plain = f"{count(within.df_conditions)}, {count(within.df_error)}"
+        rows.append((f"Greenhouse-Geisser, ε = {number(within.epsilon)}", corrected, f, p_value(within.p)))
+        rows.append(
+            ("Without correction", f"{within.df_conditions}, {within.df_error}", f, p_value(within.p_uncorrected))
+        )
+        effects.append(
+            f"Effect size: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
+            f"{number(within.generalized_eta_squared)}."
+        )
+    if ranks.p is not None:
+        rows.append(("Friedman (ranks)", count(ranks.df), f"χ² = {number(ranks.chi_squared)}", p_value(ranks.p)))
+        effects.append(f"Agreement of the rankings: Kendall's W = {number(ranks.kendall_w)}.")
     return Table(
         caption=f"Within participants ({within.participants} without a gap)",
         header=("Test", "df", "Statistic", "p"),
-        rows=(
-            (
-                f"Greenhouse-Geisser, ε = {number(within.epsilon)}",
-                corrected,
-                f"F = {number(within.f)}",
-                p_value(within.p),
-            ),
-            ("Without correction", plain, f"F = {number(within.f)}", p_value(within.p_uncorrected)),
-            ("Friedman (ranks)", count(ranks.df), f"χ² = {number(ranks.chi_squared)}", p_value(ranks.p)),
-        ),
-        notes=((effect,) if within.f is not None else ()) + within.notes + ranks.notes,
+        rows=tuple(rows),
+        notes=(*effects, *within.notes, *ranks.notes),
     )
 
 
 def run_table(analysis: StudyAnalysis) -> Table:
+    columns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
+        ("Participant", lambda row: row.subject),
+        ("Session", lambda row: row.session),
+        ("Run", lambda row: str(row.run)),
+        ("Hz", lambda row: f"{row.frequency_hz:g}"),
+        ("N", lambda row: _bounded(row.threshold_n, row.censored)),
+        ("dB re 1 N", lambda row: number(row.threshold_db)),
+        ("m/s²", lambda row: number(row.threshold_mps2)),
+        ("mm", lambda row: number(row.threshold_mm, 3)),
+        ("Reversals", lambda row: str(row.reversals)),
+        ("at cap", lambda row: str(row.cap_reversals)),
+        ("Trials", lambda row: str(row.trials)),
+        ("at cap", lambda row: str(row.trials_at_cap)),
+        ("Pushes", lambda row: str(row.pushes_against_cap)),
+        ("Spoiled", lambda row: str(row.spoiled_trials)),
+        ("% right", lambda row: number(row.percent_correct, 0)),
+        ("d'", lambda row: number(row.d_prime)),
+        ("Criterion", lambda row: number(row.criterion)),
+    )
     return Table(
         caption="All runs",
-        header=(
-            "Participant", "Session, run", "Hz", "N", "dB re 1 N", "m/s²", "mm", "Reversals", "at cap", "Trials",
-            "at cap", "pushes", "Spoiled", "% right", "d'", "Criterion",
+        header=tuple(name for name, _ in columns),
+        rows=tuple(tuple(text(row) for _, text in columns) for row in analysis.thresholds),
+        notes=(
+            "Reversals at the cap: of the averaged ones. Pushes: how often the rule asked for more than the cap. "
+            "m/s² and mm: as measured at the averaged reversals.",
         ),
-        rows=tuple(
-            (
-                row.subject, f"{row.session}, {row.run}", f"{row.frequency_hz:g}",
-                _bounded(row.threshold_n, row.censored), number(row.threshold_db), number(row.threshold_mps2), number(row.threshold_mm, 3), str(row.reversals),
-                str(row.cap_reversals), str(row.trials), str(row.trials_at_cap), str(row.pushes_against_cap),
-                str(row.spoiled_trials), number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
-            )
-            for row in analysis.thresholds
-        ),
-        notes=("Reversals at the cap: of the averaged ones. m/s² and mm: as measured at the averaged reversals.",),
         folded=True,
-    )  # fmt: skip
+    )
 
 
 def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
