@@ -39,8 +39,10 @@ def load_protocol(text: str, source: str) -> Protocol:
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        # Its message ends with the line and the column.
-        raise ProtocolError(source, (Problem("The text", f"is not TOML: {error}", "TOML 1.0"),)) from error
+        # Its message ends with line and column, but for one case.
+        end = f"(at line {len(text.splitlines())}, the end of the text)"
+        problem = f"is not TOML: {error}".replace("(at end of document)", end)
+        raise ProtocolError(source, (Problem("The text", problem, "TOML 1.0"),)) from error
     return protocol_from_values(values, source)
 
 

@@ -186,6 +186,10 @@ def test_broken_toml_is_told_with_its_line(threshold_text):
     assert "line 2" in error.problem
 
 
+def test_a_text_that_ends_too_early_is_told_with_its_last_line():
+    assert "(at line 2, the end of the text)" in refused("name = 'x'\nkind = ").problem
+
+
 def test_a_key_twice_is_broken_toml():
     assert "(at line 2" in refused("name = 'x'\nname = 'y'\n").problem
 

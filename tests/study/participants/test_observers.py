@@ -1,0 +1,199 @@
+"""Simulated participants do what they are said to do: curves recovered from answers, controls at chance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.schedule import draw_trial
+from protocols.study_protocol import ScheduleSettings
+from protocols.trial import Phase
+from study.errors import WrongUseError
+from study.participants.direction_feeler import DirectionFeeler
+from study.participants.intensity_cue import IntensityCue
+from study.participants.observer import Felt, Observer
+from study.participants.observers import OBSERVERS, observer_named
+from study.participants.population import TYPICAL_THRESHOLDS_N
+
+FELT = Felt(
+    run=0, trial=0, attempt=0, phase=Phase.TEST, frequency_hz=15.0, level_n=0.6, direction_shown=1, trials_before=0
+)
+N = 4000
+FOUR_ERRORS = 4 * np.sqrt(0.25 / N)
+
+
+def shown(trial: int, seed: int = 1) -> int:
+    return draw_trial(ScheduleSettings(), "random", seed, 0, trial, 0).direction
+
+
+def trials(frequency_hz: float = 15.0, level_n: float = 0.6, seed: int = 1) -> list[Felt]:
+    """N trials of one run, directions drawn as a session draws them."""
+    return [
+        replace(
+            FELT,
+            trial=trial,
+            trials_before=trial,
+            frequency_hz=frequency_hz,
+            level_n=level_n,
+            direction_shown=shown(trial, seed),
+        )
+        for trial in range(N)
+    ]
+
+
+def share_right(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
+    return float(np.mean([observer.reply(one, seed).answer == one.direction_shown for one in felt]))
+
+
+def share_of_1(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
+    return float(np.mean([observer.reply(one, seed).answer == 1 for one in felt]))
+
+
+@pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_THRESHOLDS_N)
+def test_the_ideal_observer_is_right_79_percent_of_the_time_at_threshold(frequency_hz, threshold_n):
+    ideal = observer_named("ideal", 0)
+    assert share_right(ideal, trials(frequency_hz, threshold_n)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
+
+
+@pytest.mark.parametrize("level_n", [0.1, 0.3, 0.6, 1.2, 3.0])
+def test_the_ideal_observers_answers_follow_the_weibull_curve(level_n):
+    """Textbook form: 0.5 + 0.5 (1 - exp(-(x/a)^b)), a put so that 0.6 N gives the cube root of one half."""
+    a = 0.6 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2)
+    expected = 0.5 + 0.5 * (1 - np.exp(-((level_n / a) ** 2)))
+    assert share_right(observer_named("ideal", 0), trials(level_n=level_n)) == pytest.approx(expected, abs=FOUR_ERRORS)
+
+
+def test_the_lapsing_observer_stays_below_certainty_where_the_ideal_one_is_certain():
+    assert share_right(observer_named("lapsing", 0), trials(level_n=3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
+    assert share_right(observer_named("ideal", 0), trials(level_n=3.0)) == 1.0
+
+
+@pytest.mark.parametrize(("criterion", "expected"), [(0.0, 0.7937), (0.25, 0.786), (0.5, 0.766), (1.0, 0.697)])
+def test_a_liking_for_one_answer_lowers_the_share_of_right_ones_as_detection_theory_says(criterion, expected):
+    biased = DirectionFeeler("biased", TYPICAL_THRESHOLDS_N, criterion=criterion)
+    both = [biased.share_right(replace(FELT, direction_shown=direction)) for direction in (1, 2)]
+    assert np.mean(both) == pytest.approx(expected, abs=0.0006)
+    assert share_right(biased, trials()) == pytest.approx(expected, abs=FOUR_ERRORS)
+
+
+def test_the_biased_observer_says_1_more_often_and_the_ideal_one_does_not():
+    felt = trials(level_n=0.05)
+    assert share_of_1(observer_named("biased", 0), felt) == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)
+    assert share_of_1(observer_named("ideal", 0), felt) == pytest.approx(0.50, abs=FOUR_ERRORS)
+
+
+@pytest.mark.parametrize("name", ["guesser", "alternator", "always_1", "always_2"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_who_feels_nothing_is_at_chance_even_at_the_cap_and_with_the_sessions_seed(name, seed):
+    felt = trials(level_n=3.0, seed=seed)
+    assert share_right(observer_named(name, seed), felt, seed) == pytest.approx(0.5, abs=FOUR_ERRORS)
+
+
+def test_the_alternator_alternates_over_the_whole_session():
+    alternator = observer_named("alternator", 0)
+    answers = [alternator.reply(replace(FELT, run=n // 3, trial=n % 3, trials_before=n), 1).answer for n in range(7)]
+    assert answers == [1, 2, 1, 2, 1, 2, 1]
+
+
+def test_the_constant_observers_are_constant():
+    assert share_of_1(observer_named("always_1", 0), trials()) == 1.0
+    assert share_of_1(observer_named("always_2", 0), trials()) == 0.0
+
+
+def test_vibration_without_direction_above_its_frequency_and_full_sense_below():
+    observer = observer_named("vibration_only", 0)
+    assert share_right(observer, trials(25.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
+    assert share_right(observer, trials(15.0, 3.0)) == 1.0
+
+
+@pytest.mark.parametrize(("level_n", "expected"), [(3.0, 0.9331), (0.1, 0.8556), (0.01, 0.5594)])
+def test_the_intensity_cue_works_wherever_strength_can_be_judged(level_n, expected):
+    """Phi(3 dB / (2 x 1 dB sqrt(1 + (0.1 N / level)^2)))."""
+    assert share_right(observer_named("intensity_cue", 0), trials(level_n=level_n)) == pytest.approx(
+        expected, abs=FOUR_ERRORS
+    )
+
+
+def test_without_a_difference_in_strength_the_intensity_cue_is_chance():
+    assert share_right(IntensityCue("cue", difference_db=0.0), trials(level_n=3.0)) == pytest.approx(
+        0.5, abs=FOUR_ERRORS
+    )
+
+
+def test_the_drifting_observers_threshold_rises_by_a_decibel_in_100_trials():
+    drifting, ideal = observer_named("drifting", 0), observer_named("ideal", 0)
+    assert isinstance(drifting, DirectionFeeler)
+    assert isinstance(ideal, DirectionFeeler)
+    late = replace(FELT, trials_before=300, level_n=0.6 * 10 ** (3 / 20))
+    assert drifting.share_right(late) == pytest.approx(ideal.share_right(FELT))
+    assert drifting.share_right(FELT) == ideal.share_right(FELT)
+
+
+def test_between_frequencies_thresholds_lie_between_and_beyond_the_ends_they_stay():
+    ideal = observer_named("ideal", 0)
+    assert isinstance(ideal, DirectionFeeler)
+    shares = [ideal.share_right(replace(FELT, frequency_hz=f)) for f in (1.0, 5.0, 10.0, 15.0, 45.0, 200.0)]
+    assert shares[0] == shares[1] > shares[2] > shares[3] > shares[4] == shares[5]
+
+
+def test_the_scripted_observer_looks_at_run_and_trial_alone():
+    scripted = observer_named("scripted", 0)
+
+    def right(direction: int, attempt: int, level_n: float, seed: int) -> list[bool]:
+        felt = [
+            replace(FELT, trial=t, attempt=attempt, level_n=level_n, direction_shown=direction, trials_before=9)
+            for t in range(40)
+        ]
+        return [scripted.reply(one, seed).answer == direction for one in felt]
+
+    script = [letter == "1" for letter in "1111110111011100111111011100111011101111"]
+    assert right(1, 0, 1.0, 1) == script
+    assert right(2, 3, 0.1, 99) == script
+
+
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_the_same_trial_gets_the_same_reply_in_any_order_of_asking(name):
+    felt = trials()[:200]
+    forward = [observer_named(name, 5).reply(one, 5) for one in felt]
+    backward = [observer_named(name, 5).reply(one, 5) for one in reversed(felt)]
+    assert forward == backward[::-1]
+    assert all(reply.answer in (1, 2) for reply in forward)
+
+
+@pytest.mark.parametrize("change", [{"run": 1}, {"attempt": 1}])
+def test_another_key_is_other_luck(change):
+    guesser = observer_named("guesser", 0)
+    here = [guesser.reply(one, 1).answer for one in trials()[:200]]
+    there = [guesser.reply(replace(one, **change), 1).answer for one in trials()[:200]]
+    assert abs(np.corrcoef(here, there)[0, 1]) < 4 / np.sqrt(200)
+    assert here != [guesser.reply(one, 2).answer for one in trials()[:200]]
+
+
+def test_response_times_are_those_of_people_and_say_nothing_about_the_answer():
+    replies = [observer_named("guesser", 0).reply(one, 1) for one in trials()]
+    times_s = np.array([reply.response_time_s for reply in replies])
+    assert np.mean((times_s > 1.2) & (times_s < 2.5)) == pytest.approx(0.95, abs=0.015)
+    assert np.median(times_s) == pytest.approx(3**0.5, abs=0.03)
+    assert abs(np.corrcoef(times_s, [reply.answer for reply in replies])[0, 1]) < 4 / np.sqrt(N)
+
+
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_every_listed_name_is_an_observer(name):
+    assert observer_named(name, 3).name == ("person_1_seed_3" if name == "person" else name)
+
+
+def test_a_hyphen_does_for_an_underscore():
+    assert observer_named("vibration-only", 0) == observer_named("vibration_only", 0)
+
+
+def test_an_unknown_name_is_refused_with_the_names_there_are():
+    with pytest.raises(WrongUseError) as caught:
+        observer_named("gueser", 0)
+    assert caught.value.happened == "No observer is called gueser. Did you mean guesser?"
+    assert caught.value.do_now == f"Choose one of {', '.join(OBSERVERS)}."
+
+
+def test_a_name_like_nothing_gets_no_guess():
+    with pytest.raises(WrongUseError) as caught:
+        observer_named("xyz", 0)
+    assert caught.value.happened == "No observer is called xyz."

@@ -1,0 +1,100 @@
+"""Simulated people: thresholds that rise as in the published figure, and a study of ten that shows it."""
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from scipy.stats import tukey_hsd
+
+from protocols.loading import load_protocol
+from protocols.schedule import draw_trial, runs
+from protocols.staircase import begin, finished, level_n, step, to_newton
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase
+from study.participants.observer import Felt, Observer
+from study.participants.observers import observer_named
+from study.participants.population import population
+
+FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)
+
+
+def sitting(protocol: StudyProtocol, observer: Observer, seed: int) -> dict[float, float]:
+    """Threshold in N of every test run; staircase and draws alone, no device."""
+    found, answered = {}, 0
+    for run in runs(protocol, seed, 0):
+        state = begin(protocol.staircase)
+        while not finished(protocol.staircase, state):
+            draw = draw_trial(protocol.schedule, "random", seed, run.index, state.trials, 0)
+            level = level_n(protocol.staircase, state)
+            felt = Felt(run.index, state.trials, 0, run.phase, run.frequency_hz, level, draw.direction, answered)
+            answered += 1
+            state = step(protocol.staircase, state, observer.reply(felt, seed).answer == draw.direction)
+        if run.phase is Phase.TEST:
+            found[run.frequency_hz] = float(np.mean([to_newton(db) for db in state.reversal_levels_db[-10:]]))
+    return found
+
+
+@pytest.fixture(scope="module")
+def protocol() -> StudyProtocol:
+    loaded = load_protocol(files("protocols").joinpath("direction_threshold.toml").read_text("utf-8"), "shipped")
+    assert isinstance(loaded, StudyProtocol)
+    return loaded
+
+
+@pytest.fixture(scope="module")
+def measured_n(protocol) -> np.ndarray:
+    """(40, 5) thresholds in N: four studies of ten, participants by frequencies."""
+    sittings = [sitting(protocol, person, seed) for seed, person in enumerate(population(40, seed=1))]
+    return np.array([[found[frequency] for frequency in FREQUENCIES] for found in sittings])
+
+
+def test_measured_means_rise_with_frequency_up_to_35_hz(measured_n):
+    means = measured_n.mean(axis=0)
+    assert (np.diff(means[:4]) > 0.1).all()
+    assert means[4] == pytest.approx(means[3], rel=0.15)
+
+
+def test_some_are_pinned_at_the_cap_at_35_hz_and_nobody_is_at_5_hz(measured_n):
+    pinned = (measured_n > 2.4).mean(axis=0)
+    assert 0.1 < pinned[3] < 0.5
+    assert pinned[0] == 0.0
+
+
+@pytest.mark.parametrize("study", range(4))
+def test_a_study_of_ten_finds_the_rise_at_35_hz_significant(measured_n, study):
+    p_values = tukey_hsd(*measured_n[10 * study : 10 * study + 10].T).pvalue
+    assert p_values[2, 3] < 0.05
+    assert p_values[0, 3] < 0.05
+
+
+def test_people_who_are_all_the_same_show_no_rise(protocol):
+    """Negative control: guessers have one threshold at every frequency."""
+    guesser = observer_named("guesser", 0)
+    sittings = [sitting(protocol, guesser, seed) for seed in range(10)]
+    groups = np.array([[found[frequency] for frequency in FREQUENCIES] for found in sittings]).T
+    assert tukey_hsd(*groups).pvalue.min() > 0.05
+
+
+def test_people_differ_by_about_three_decibels():
+    thresholds_db = 20 * np.log10([[n for _, n in person.thresholds_n] for person in population(400, seed=2)])
+    assert thresholds_db.std(axis=0, ddof=1) == pytest.approx(np.full(5, 3.02), abs=0.4)
+    # Who is good at one frequency is good at another: 2.5^2 / (2.5^2 + 1.7^2).
+    assert np.corrcoef(thresholds_db.T)[np.triu_indices(5, 1)].mean() == pytest.approx(0.68, abs=0.08)
+
+
+def test_a_larger_population_begins_with_the_same_people():
+    assert population(5, seed=3) == population(9, seed=3)[:5]
+
+
+def test_another_seed_is_other_people():
+    assert not set(population(5, seed=3)) & set(population(5, seed=4))
+
+
+def test_a_logged_name_calls_the_same_person_back():
+    person = population(7, seed=12)[6]
+    assert person.name == "person_7_seed_12"
+    assert observer_named(person.name, seed=99) == person
+
+
+def test_every_scripted_run_ends(protocol):
+    assert set(sitting(protocol, observer_named("scripted", 0), seed=1)) == set(FREQUENCIES)
