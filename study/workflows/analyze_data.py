@@ -1,0 +1,132 @@
+"""From a folder of sessions to thresholds.csv, anova.json, figures and one report."""
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.figures.picture import Picture
+from analysis.figures.study_pictures import study_pictures
+from analysis.reports.study_report import render_study_report
+from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
+from study.devices.clock import RealClock
+from study.errors import StudyError
+from study.store.atomic_write import write_atomically
+from study.store.file_errors import CannotWriteError
+from study.store.json_document import write_json
+from study.store.provenance import Provenance, gather_provenance
+from study.store.recording_file import read_recording
+from study.store.text_file import write_text
+from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
+from study.workflows.collect_sessions import Collected, collect_sessions
+
+FIGURE_DPI = 150
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenAnalysis:
+    table: tuple[str, ...]
+    """Group means by frequency, as lines of text."""
+    warnings: tuple[str, ...]
+    report: Path
+
+
+def analyze_data(
+    data: Path, out: Path, ellipsoid: Path | None = None, protocol_name: str | None = None
+) -> WrittenAnalysis:
+    """Analyse all sessions in `data`; what `out` holds from an earlier analysis is replaced.
+
+    Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
+    """
+    collected = collect_sessions(data, protocol_name)
+    try:
+        analysis = analyse_study(collected.trials, collected.protocol)
+    except ValueError as problem:
+        raise StudyError(
+            "The data contradict their protocol", f"{problem}.", "Nothing was written; look at the sessions named."
+        ) from problem
+    shapes = _ellipsoids(ellipsoid)
+    parents = [folder.log for folder in collected.sessions] + ([ellipsoid] if ellipsoid else [])
+    provenance = gather_provenance(
+        protocol_hash=collected.protocol_hash,
+        seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
+        parents=parents,
+    )
+    pictures = study_pictures(analysis, shapes)
+    _write(out, analysis, pictures, shapes, provenance, collected)
+    return WrittenAnalysis(
+        table=tuple(text_table(analysis)),
+        warnings=(*collected.left_out, *analysis.warnings),
+        report=out / "report.html",
+    )
+
+
+def text_table(analysis: StudyAnalysis) -> list[str]:
+    """Thresholds as lines: one per frequency, with mean and number of participants."""
+    if not any(row.complete for row in analysis.thresholds):
+        return ["No complete test run: there is no threshold yet."]
+    lines = [f"{'frequency':>10}  {'threshold':>10}  {'at the cap':>10}  participants"]
+    for column, frequency_hz in enumerate(analysis.table.frequencies_hz):
+        values = [row[column] for row in analysis.table.values if row[column] is not None]
+        censored = sum(row[column] for row in analysis.table.censored)
+        mean = sum(v for v in values if v is not None) / len(values) if values else None
+        shown = f"{mean:8.3f} N" if mean is not None else "         -"
+        lines.append(f"{frequency_hz:7g} Hz  {shown}  {censored:>10}  {len(values):>12}")
+    return lines
+
+
+def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
+    if path is None:
+        return ()
+    recording = read_recording(path)
+    try:
+        return ellipsoids(recording)
+    except ValueError as problem:
+        raise StudyError(
+            "No ellipsoids can be computed",
+            f"{path.name}: {problem}.",
+            "Give a recording made with: hapteq record ellipsoid",
+            saved="Nothing was written.",
+        ) from problem
+
+
+def _write(
+    out: Path,
+    analysis: StudyAnalysis,
+    pictures: tuple[Picture, ...],
+    shapes: tuple[EllipsoidResult, ...],
+    provenance: Provenance,
+    collected: Collected,
+) -> None:
+    figures = out / "figures"
+    try:
+        figures.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(figures, problem) from problem
+    write_thresholds(out / THRESHOLDS_NAME, analysis.thresholds)
+    document = anova_document(analysis)
+    format_name, version = document.pop("format"), document.pop("version")
+    write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
+    for picture in pictures:
+        for kind in ("svg", "png"):
+            write_atomically(figures / f"{picture.name}.{kind}", _drawn(picture, kind), overwrite=True)
+    page = render_study_report(analysis, pictures, _shown(provenance, collected), RealClock().utc(), shapes)
+    write_text(out / "report.html", page, overwrite=True)
+
+
+def _drawn(picture: Picture, kind: str) -> bytes:
+    buffer = io.BytesIO()
+    picture.figure.savefig(buffer, format=kind, dpi=FIGURE_DPI)
+    return buffer.getvalue()
+
+
+def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:
+    """What the report's last section shows."""
+    return {
+        "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
+        "sessions": ", ".join(folder.name for folder in collected.sessions) or "none",
+        "left out": " ".join(collected.left_out) or "nothing",
+        "seeds": ", ".join(str(seed) for seed in collected.seeds) or "none",
+        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
+        "command": " ".join(provenance.command),
+    }

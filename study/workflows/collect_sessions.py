@@ -1,0 +1,109 @@
+"""Which sessions enter one analysis: one protocol, one kind of participant, nothing withdrawn or contradictory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.population import Population, split_by_population
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Trial
+from study.errors import StudyError, WrongUseError
+from study.session.state import SessionState
+from study.store.archive import SessionFolder, session_folders
+from study.store.event_log import LOG_NAME
+from study.workflows.fold_session import fold_session
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    protocol: StudyProtocol
+    protocol_hash: str
+    trials: tuple[Trial, ...]
+    sessions: tuple[SessionFolder, ...]
+    seeds: tuple[int, ...]
+    left_out: tuple[str, ...]
+    """What did not enter, and why, in sentences."""
+
+
+def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
+    """All sessions below `data` (or `data` itself, a session) that belong together.
+
+    Of several protocols the one named, else the one with most sessions; people before simulated participants before
+    those who felt nothing. Raises StudyError where there is nothing to analyse.
+    """
+    folders = _folders(data)
+    folded, left_out = _fold_all(folders)
+    chosen_hash = _choose_protocol(folded, protocol_name, data)
+    chosen = [(folder, state) for folder, state in folded if state.opened.protocol_hash == chosen_hash]
+    left_out += [
+        f"{folder.name} follows another protocol ('{state.protocol.name}')."
+        for folder, state in folded
+        if state.opened.protocol_hash != chosen_hash
+    ]
+    parts = split_by_population([trial for _, state in chosen for trial in state.trials])
+    kind = next((kind for kind in Population if kind in parts), None)
+    left_out += [
+        f"{len(parts[other])} trials of {other.value} are not analysed together with {kind.value}."
+        for other in parts
+        if kind is not None and other is not kind
+    ]
+    trials = parts[kind] if kind is not None else ()
+    names = {trial.session for trial in trials}
+    entering = [(folder, state) for folder, state in chosen if folder.name in names]
+    return Collected(
+        protocol=chosen[0][1].protocol,
+        protocol_hash=chosen_hash,
+        trials=trials,
+        sessions=tuple(folder for folder, _ in entering),
+        seeds=tuple(state.opened.seed for _, state in entering),
+        left_out=tuple(left_out),
+    )
+
+
+def _folders(data: Path) -> tuple[SessionFolder, ...]:
+    if (data / LOG_NAME).exists():
+        return (SessionFolder(data.resolve()),)
+    folders = session_folders(data)
+    if not folders:
+        raise WrongUseError(
+            "There is nothing to analyse",
+            f"{data} is neither a session nor a folder with sessions in it.",
+            "Give the data folder of a study; hapteq rehearse makes one with simulated participants.",
+        )
+    return folders
+
+
+def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, SessionState]], list[str]]:
+    folded: list[tuple[SessionFolder, SessionState]] = []
+    left_out: list[str] = []
+    for folder in folders:
+        if folder.withdrawn:
+            left_out.append(f"{folder.name} was withdrawn by the participant.")
+            continue
+        try:
+            folded.append((folder, fold_session(folder).state))
+        except StudyError as problem:
+            left_out.append(f"{folder.name} cannot be used. {problem.happened}")
+    if not folded:
+        raise StudyError("There is nothing to analyse", " ".join(left_out), "Mend these sessions, or record new ones.")
+    return folded, left_out
+
+
+def _choose_protocol(
+    folded: Sequence[tuple[SessionFolder, SessionState]], protocol_name: str | None, data: Path
+) -> str:
+    counted: dict[str, list[SessionState]] = {}
+    for _, state in folded:
+        counted.setdefault(state.opened.protocol_hash, []).append(state)
+    named = {
+        key: states for key, states in counted.items() if protocol_name in (None, states[0].protocol.name, key[:12])
+    }
+    if not named:
+        there = ", ".join(f"{states[0].protocol.name} ({key[:12]})" for key, states in counted.items())
+        raise WrongUseError(
+            "No session follows that protocol",
+            f"'{protocol_name}' was asked for; {data} holds sessions of {there}.",
+            "Give one of these names, or the first twelve digits of its hash.",
+        )
+    # A protocol without test runs (practice) has nothing to analyse; it is chosen only where there is no other.
+    return max(named, key=lambda key: (bool(named[key][0].protocol.stimulus.frequencies_hz), len(named[key])))

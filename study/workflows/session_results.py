@@ -1,0 +1,63 @@
+"""What is written from a session's log, at will: its tables, and its own small report."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from analysis.thresholds import thresholds
+from study.session.state import SessionState
+from study.store.archive import SessionFolder
+from study.store.json_document import write_json
+from study.store.provenance import gather_provenance
+from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
+from study.store.trials_file import TRIALS_NAME, write_trials
+from study.workflows.analyze_data import analyze_data
+from study.workflows.fold_session import fold_session
+
+SUMMARY_NAME = "session.json"
+SUMMARY_FORMAT = "hapteq-session-summary"
+SUMMARY_VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class SessionResults:
+    table: tuple[str, ...]
+    report: Path
+
+
+def write_tables(folder: SessionFolder) -> SessionState:
+    """trials.csv, thresholds.csv and session.json, from the log alone."""
+    state = fold_session(folder).state
+    write_trials(folder.path / TRIALS_NAME, state.trials)
+    rows = thresholds(state.trials, state.protocol.staircase)
+    write_thresholds(folder.path / THRESHOLDS_NAME, rows)
+    _write_summary(folder, state)
+    return state
+
+
+def write_results(folder: SessionFolder) -> SessionResults:
+    """The tables, and the analysis of this session alone beside them."""
+    write_tables(folder)
+    written = analyze_data(folder.path, folder.path / "analysis")
+    return SessionResults(written.table, written.report)
+
+
+def _write_summary(folder: SessionFolder, state: SessionState) -> None:
+    opened = state.opened
+    payload = {
+        "session": opened.session,
+        "subject": opened.subject,
+        "observer": opened.observer,
+        "participant_number": opened.participant_number,
+        "protocol": {"name": state.protocol.name, "hash": opened.protocol_hash, "locked": opened.protocol_locked},
+        "device": asdict(opened.device),
+        "equalizer": opened.equalizer,
+        "begun_utc": opened.utc,
+        "closed": state.closed,
+        "runs": [{"index": r.index, "phase": r.phase.value, "frequency_hz": r.frequency_hz} for r in state.runs],
+        "answers": state.answers,
+        "presentations": len(state.trials),
+    }
+    provenance = gather_provenance(
+        protocol_hash=opened.protocol_hash, seeds={"session": opened.seed}, parents=[folder.log]
+    )
+    write_json(folder.path / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION, payload, provenance, overwrite=True)
