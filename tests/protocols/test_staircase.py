@@ -143,10 +143,32 @@ def test_a_push_against_the_cap_is_counted_and_turns_nothing(published):
     assert (end.reversals, end.pushes_against_cap, end.trials_at_cap) == (0, 3, 2)
 
 
+def test_a_push_against_the_cap_begins_the_count_afresh(published):
+    rule = replace(published, start_n=3.0, up_after_wrong=2)
+    assert [state.pushes_against_cap for state in states(rule, "00000")] == [0, 0, 1, 1, 2, 2]
+
+
 def test_after_the_cap_levels_hang_below_it_and_not_on_the_old_grid(published):
     end = states(published, "000111")[-1]
     assert end.level_db == pytest.approx(to_db(3.0) - 4.0)
     assert (end.reversals, end.reversals_at_cap) == (1, 1)
+
+
+def test_only_peaks_at_the_cap_count_as_reversals_there(published):
+    end = states(published, "0001110")[-1]
+    assert (end.reversals, end.reversals_at_cap) == (2, 1)
+
+
+@given(cap_n=st.floats(0.01, 3.0))
+@settings(max_examples=60, deadline=None)
+def test_no_rounding_of_decibels_leads_above_the_cap(published, cap_n):
+    rule = replace(published, start_n=cap_n, cap_n=cap_n)
+    assert level_n(rule, begin(rule)) <= cap_n
+
+
+@pytest.mark.parametrize(("change", "last_db"), [(A, -3.0), (B, -6.0), (C, -3.0)])
+def test_also_the_last_movement_is_one_of_the_last_phase(published, change, last_db):
+    assert states(replace(published, step_change=change), S1)[-1].level_db == pytest.approx(last_db)
 
 
 def test_a_run_that_starts_at_the_cap_has_nothing_to_turn_from(published):
