@@ -7,7 +7,8 @@ from equalizer.signals.signal import FloatArray
 
 def sine(frequency_hz: float, amplitude: float, n: int, sample_rate_hz: float) -> FloatArray:
     """n samples of a sinusoid that starts at phase zero. Shape (n,)."""
-    return amplitude * np.sin(2 * np.pi * frequency_hz / sample_rate_hz * np.arange(n))
+    wave: FloatArray = amplitude * np.sin(2 * np.pi * frequency_hz / sample_rate_hz * np.arange(n))
+    return wave
 
 
 def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rate_hz: float) -> FloatArray:
@@ -25,7 +26,8 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
     octaves = np.log(to_hz / from_hz)
     cycles = from_hz * duration_s / octaves * (np.exp(octaves * np.arange(n) / n) - 1.0)
     whole = from_hz * duration_s / octaves * (np.exp(octaves) - 1.0)
-    return amplitude * np.sin(2 * np.pi * cycles * np.floor(whole) / whole)
+    wave: FloatArray = amplitude * np.sin(2 * np.pi * cycles * np.floor(whole) / whole)
+    return wave
 
 
 def faded(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:

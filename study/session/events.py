@@ -13,8 +13,8 @@ from protocols.trial import Phase
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-SESSION_FORMAT = "hapteq-session"
-SESSION_VERSION = 1
+SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
+SESSION_VERSION: Literal[1] = 1
 
 
 @dataclass(frozen=True, config=FACT)

@@ -40,7 +40,8 @@ def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, .
 def unit_vector(directions: TestDirections, along: str) -> FloatArray:
     """(3,): a device axis, or a test direction."""
     if along in ("x", "y", "z"):
-        return np.eye(3)["xyz".index(along)]
+        axis: FloatArray = np.eye(3)["xyz".index(along)]
+        return axis
     return direction_vector(directions, int(along.removeprefix("direction_")))
 
 

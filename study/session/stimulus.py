@@ -1,7 +1,6 @@
 """From a level to a force that can be held: one loop of whole periods along one of the two directions."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,20 +8,9 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.equalizer import Equalizer
 from protocols.apparatus import TestDirections
 from protocols.study_protocol import StimulusSettings
+from study.session.held_stimulus import HeldStimulus
 
 AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}
-
-
-@dataclass(frozen=True, slots=True)
-class HeldStimulus:
-    """A force to be held: one loop of whole periods, repeated, with a fade at either end."""
-
-    loop: Signal
-    """(n, 3) in N, axes x, y, z, at the device's rate."""
-    fade_in_s: float
-    fade_out_s: float
-    fade_shape: str
-    """"raised_cosine" or "linear"."""
 
 
 def direction_vector(directions: TestDirections, direction: int) -> FloatArray:

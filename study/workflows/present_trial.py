@@ -7,9 +7,10 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault, Health, Played
 from study.session.delivered import Delivered, delivered
 from study.session.events import AnswerGiven, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.held_stimulus import HeldStimulus
 from study.session.machine import Present
 from study.session.state import SessionState
-from study.session.stimulus import HeldStimulus, direction_vector, held_stimulus
+from study.session.stimulus import direction_vector, held_stimulus
 from study.session.views import Answered, Question, Unanswered
 from study.store.trial_recordings import SavedRecording, recording_name, save_trial_recording
 from study.workflows.judge_trial import judge

@@ -9,6 +9,7 @@ from study.errors import StudyError
 from study.store.file_errors import UnusableFileError
 from study.workflows.file_content import FileContent, open_content
 from study.workflows.recognisers import RECOGNISERS, Recogniser
+from study.workflows.session_recognisers import SESSION_RECOGNISERS
 
 KNOWN = (
     "known are recordings and identified models (HDF5), mechanical models and protocols (TOML), trajectories, forces, "
@@ -25,7 +26,7 @@ class Validation:
     """One sentence each; empty = the file is sound."""
 
 
-def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = RECOGNISERS) -> Validation:
+def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
     """Never raises for what is in a file or for one that is not there."""
     try:
         content = open_content(path)

@@ -1,0 +1,117 @@
+"""Recognisers of what a study leaves behind: session folders and logs, summaries, statistics, locks, tombstones."""
+
+from pathlib import Path
+
+from protocols.lock import FORMAT as LOCK_FORMAT
+from protocols.lock import LockError, lock_from_json
+from study.errors import StudyError
+from study.session.events import SESSION_FORMAT, TrialMeasured
+from study.store.archive import SessionFolder
+from study.store.event_log import LOG_NAME
+from study.store.file_errors import UnusableFileError
+from study.store.json_document import read_json
+from study.store.provenance import sha256_of
+from study.store.trials_file import TRIALS_NAME, read_trials
+from study.workflows.file_content import FileContent
+from study.workflows.fold_session import FoldedSession, fold_session
+from study.workflows.session_results import SUMMARY_FORMAT, SUMMARY_VERSION
+from study.workflows.withdraw_participant import FORMAT as TOMBSTONE_FORMAT
+
+KIND = "session"
+
+DOCUMENTS = {
+    SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
+    "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
+    TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
+}
+"""Format: what it is, and the keys it must have."""
+
+
+def recognise_session(content: FileContent) -> str | None:
+    """A session folder, or its log."""
+    if content.is_folder:
+        folder = SessionFolder(content.path.resolve())
+        if folder.withdrawn:
+            return "withdrawn session; nothing is left of it but its tombstone"
+        return _checked(folder, content.path) if folder.log.exists() else None
+    if content.path.name == LOG_NAME or f'"{SESSION_FORMAT}"' in (content.text or "")[:1000]:
+        return _described(_folded(SessionFolder(content.path.resolve().parent), content.path))
+    return None
+
+
+def recognise_document(content: FileContent) -> str | None:
+    if content.json_format not in DOCUMENTS:
+        return None
+    kind, needed = DOCUMENTS[content.json_format]
+    document = read_json(content.path, content.json_format, SUMMARY_VERSION)
+    missing = [key for key in needed if key not in document]
+    if missing:
+        raise UnusableFileError(content.path, kind, (f"it lacks {', '.join(missing)}",))
+    return kind
+
+
+def recognise_lock(content: FileContent) -> str | None:
+    if content.json_format != LOCK_FORMAT:
+        return None
+    try:
+        lock = lock_from_json(content.text or "")
+    except LockError as error:
+        raise UnusableFileError(content.path, "protocol lock", (str(error),)) from error
+    return f"lock of protocol '{lock.name}', {lock.locked_utc}"
+
+
+def _checked(folder: SessionFolder, path: Path) -> str:
+    """Beyond the log: every recording is the one that the log speaks of, and the table agrees with it."""
+    folded = _folded(folder, path)
+    problems = [*_recording_problems(folder, folded), *_table_problems(folder, folded)]
+    if problems:
+        raise UnusableFileError(path, KIND, tuple(problems))
+    return _described(folded)
+
+
+def _folded(folder: SessionFolder, path: Path) -> FoldedSession:
+    try:
+        folded = fold_session(folder)
+    except UnusableFileError:
+        raise
+    except StudyError as error:
+        raise UnusableFileError(path, KIND, (error.happened.rstrip("."),)) from error
+    if folded.contents.torn_bytes:
+        torn = f"its last line is torn ({folded.contents.torn_bytes} bytes); hapteq resume mends it"
+        raise UnusableFileError(path, KIND, (torn,))
+    return folded
+
+
+def _recording_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    problems = []
+    for event in folded.contents.events:
+        if not isinstance(event, TrialMeasured) or event.recording is None:
+            continue
+        path = folder.path / event.recording
+        if not path.exists():
+            problems.append(f"{event.recording} is missing")
+        elif sha256_of(path) != event.sha256:
+            problems.append(f"{event.recording} is not the file that was written (its SHA-256 differs from the log)")
+    return problems
+
+
+def _table_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    table = folder.path / TRIALS_NAME
+    if not table.exists():
+        return []
+    try:
+        if read_trials(table) == folded.state.trials:
+            return []
+    except UnusableFileError as error:
+        return [f"{TRIALS_NAME}: {problem}" for problem in error.problems]
+    return [f"{TRIALS_NAME} does not agree with the log; hapteq analyze and hapteq resume read the log alone"]
+
+
+def _described(folded: FoldedSession) -> str:
+    state = folded.state
+    who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
+    end = "finished" if state.closed else "not finished"
+    return f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"
+
+
+SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

@@ -1,0 +1,78 @@
+"""A small session that a test can begin, leave and go on with, in virtual time."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from protocols.study_protocol import StudyProtocol
+from study.devices.clock import VirtualClock
+from study.participants.observers import observer_named
+from study.session.views import Answered, Reply, Unanswered
+from study.store.archive import SessionFolder
+from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.open_session import SessionPlan
+from study.workflows.simulated_display import SimulatedDisplay
+
+
+class LeavesAfter:
+    """A simulated participant who does something else than answering at one question."""
+
+    def __init__(self, display: SimulatedDisplay, questions: int, instead) -> None:
+        self._display = display
+        self._left = questions
+        self._instead = instead
+        self.sentences: list[str] = []
+
+    def ask(self, question, sign_of_life) -> Reply:
+        if self._left == 0:
+            self._left = -1
+            return self._instead()
+        self._left -= 1
+        return self._display.ask(question, sign_of_life)
+
+    def trouble(self, sentence: str) -> None:
+        self.sentences.append(sentence)
+
+    def __getattr__(self, name: str):
+        return getattr(self._display, name)
+
+
+@dataclass
+class Sitter:
+    """Conducts sessions of the small protocol below one data folder."""
+
+    data: Path
+    protocol: StudyProtocol
+    text: str
+    observer: str = "scripted"
+    seed: int = 11
+
+    def plan(self, subject: str = "P01", observer: str | None = "scripted") -> SessionPlan:
+        return SessionPlan(self.protocol, self.text, False, subject, observer, self.seed, self.data)
+
+    def participant(self, after: int | None = None, instead=None) -> Participant:
+        clock = VirtualClock()
+        display = SimulatedDisplay(observer_named(self.observer, self.seed), self.seed, clock)
+        shown = display if after is None else LeavesAfter(display, after, instead)
+        return Participant(display=shown, hand=display, clock=clock)
+
+    def whole(self, subject: str = "P01") -> Conducted:
+        return conduct_new(self.plan(subject), "simulated", self.participant())
+
+    def interrupted(self, after: int, instead=None) -> Conducted:
+        leave = instead or (lambda: Unanswered("the participant left", leave=True))
+        return conduct_new(self.plan(), "simulated", self.participant(after, leave))
+
+    def resumed(self, folder: SessionFolder) -> Conducted:
+        return conduct_resumed(folder, "simulated", self.participant())
+
+
+@pytest.fixture
+def sitter(tmp_path, small_protocol, small_text) -> Sitter:
+    return Sitter(tmp_path / "data", small_protocol, small_text)
+
+
+@pytest.fixture
+def always_one():
+    return lambda: Answered(1, 0.0)
