@@ -11,8 +11,8 @@ from typing import Protocol
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from study.session.held_stimulus import HeldStimulus
 from study.session.limits import Limits
-from study.session.stimulus import HeldStimulus
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,14 +106,16 @@ class Device(Protocol):
     def release(self) -> Played:
         """Fade out, wait until the device is still, and say what happened. To be called after a fault as well.
 
-        Raises `DeviceError` when the device was lost.
+        Does not raise for a lost device, so that the trial can be logged as void; the next `hold` or `play` does.
         """
         ...
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         """Play once through: identification and recordings. Returns when it is over; gives its own signs of life.
 
-        `on_progress(share)` is called now and then with the share that is over.
+        `on_progress(share)` is called now and then with the share that is over; what it raises ends the playing,
+        as Ctrl-C does, with a fade. Raises `DeviceError` for commands that are not within the limits, before
+        anything moves, and for a lost device.
         """
         ...
 

@@ -8,7 +8,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from study.devices import govern
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health
 from study.devices.rig import READING_SIZE
-from study.session.stimulus import HeldStimulus
+from study.session.held_stimulus import HeldStimulus
 
 VELOCITY_CORNER_HZ = 50.0
 """Of the low-pass behind the spring's damping: far above the spring, far below the encoders' chatter."""

@@ -56,6 +56,8 @@ class RealtimeDrive:
         with self._lock:
             if not self._governor.moving:
                 self._awake.clear()
+                if self._closing:
+                    self._awake.set()
                 return
             gap_s, self._last_s = now_s - self._last_s, now_s
             if gap_s > self._longest_gap_s:

@@ -1,6 +1,9 @@
 """The rig port: a bare device, without limits. Only the safety layer (`study.devices.safe`) may drive one.
 
 A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits, `write` (held until t_(k+1)).
+
+The places below are compiled into the safety layer and the simulated devices, and numba's cache on disk does not
+watch this file: whoever changes them deletes the compiled files (`*.nbi`, `*.nbc`) too.
 """
 
 from collections.abc import Callable

@@ -18,7 +18,7 @@ from study.devices.rig import CompiledRig, Rig
 from study.devices.runner import CompiledRunner, Runner, SteppedRunner
 from study.devices.virtual_drive import VirtualDrive
 from study.errors import DeviceError
-from study.session.stimulus import HeldStimulus
+from study.session.held_stimulus import HeldStimulus
 
 BLOCK_S = 0.05
 """The longest stretch in real time during which Python is not asked."""
@@ -67,7 +67,6 @@ class SafeDevice:
         self._governor.ask_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
-        self._must_be_there()
         return played_loop(self._governor, self._info)
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:

@@ -1,0 +1,140 @@
+"""What every device keeps to, whatever stands behind the safety layer."""
+
+import contextlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.devices.clock import VirtualClock
+from study.devices.device import Fault
+from study.devices.opening import open_device
+from study.devices.safe import SafeDevice
+from study.errors import DeviceError
+
+KINDS = ("simulated omega.3", "compiled mass", "stepped mass")
+
+
+@pytest.fixture
+def clock():
+    return VirtualClock()
+
+
+@pytest.fixture(params=KINDS)
+def device(request, rigs, clock):
+    if request.param == "simulated omega.3":
+        opened = open_device("simulated", rigs.SETTINGS, clock, seed=3)
+    else:
+        rig = rigs.compiled_rig() if request.param == "compiled mass" else rigs.ScriptedRig()
+        opened = SafeDevice(rig, rigs.SETTINGS, clock)
+    with contextlib.closing(opened):
+        yield opened
+
+
+def feel(device, clock, seconds: float) -> None:
+    for _ in range(round(seconds / 0.1)):
+        clock.sleep(0.1)
+        device.keep_alive()
+
+
+def test_it_says_what_it_is(device):
+    assert device.info.name
+    assert device.info.sample_rate_hz == 1000.0
+    assert device.info.max_force_n > 0
+    assert device.info.effective_mass_kg > 0
+
+
+def test_a_held_stimulus_is_played_until_it_is_released(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    feel(device, clock, 2.0)
+    assert device.fault() is Fault.NONE
+    played = device.release()
+    recording = played.recording
+    assert len(recording) == 400
+    assert recording.device == device.info.name
+    assert recording.sample_rate_hz == device.info.sample_rate_hz
+    assert recording.command.unit == recording.excitation.unit == "N"
+    assert recording.response.unit == "m/s^2"
+    assert recording.response.channels == ("ax", "ay", "az")
+    assert recording.position.unit == "m"
+    assert np.abs(recording.response.samples).max() > 0.5
+    assert np.linalg.norm(recording.excitation.samples, axis=1).max() == pytest.approx(1.0)
+    assert played.health.missed_ticks == played.health.stimulus_clipped == 0
+    assert played.health.peak_command_n <= rigs.LIMITS.total_cap_n
+
+
+def test_true_acceleration_is_told_by_simulated_devices_only(device, rigs):
+    played = device.play(rigs.sine(1.0).loop)
+    assert (played.truth is not None) == device.info.simulated
+    assert played.truth is None or np.isfinite(played.truth.samples).all()
+
+
+def test_one_trial_follows_another(device, clock, rigs):
+    for _ in range(3):
+        device.hold(rigs.sine(1.0, 25))
+        feel(device, clock, 0.8)
+        assert device.release().recording is not None
+        clock.sleep(5.0)
+
+
+def test_without_signs_of_life_the_force_is_off(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    clock.sleep(rigs.LIMITS.watchdog_s + rigs.LIMITS.release_s + 0.01)
+    assert device.fault() is Fault.STALLED
+    played = device.release()
+    assert played.health.fault is Fault.STALLED
+    assert played.health.ticks <= 1000 * (rigs.LIMITS.watchdog_s + rigs.LIMITS.release_s) + 2
+    device.hold(rigs.sine(1.0))  # the next trial is a new one
+    assert device.fault() is Fault.NONE
+
+
+def test_a_stimulus_that_nobody_answers_is_let_go(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    feel(device, clock, rigs.LIMITS.longest_hold_s + 0.5)
+    assert device.release().health.fault is Fault.HELD_TOO_LONG
+
+
+def test_commands_are_recorded_from_the_first_sample_to_the_last(device, rigs):
+    commands = rigs.force(np.tile(rigs.sine(1.5, 10).loop.samples, (3, 1)))
+    played = device.play(commands)
+    assert len(played.recording) == 300
+    assert np.allclose(played.recording.excitation.samples, commands.samples, atol=1e-9)
+    assert np.isfinite(played.recording.response.samples).all()
+
+
+def test_what_is_not_within_the_limits_is_refused(device, rigs):
+    stimulus = rigs.sine(3.0)
+    with pytest.raises(DeviceError, match="cap of the stimulus"):
+        device.hold(replace(stimulus, loop=rigs.force(2 * stimulus.loop.samples)))
+    with pytest.raises(DeviceError, match="cap of the stimulus"):
+        device.play(rigs.force(2 * stimulus.loop.samples))
+
+
+def test_a_stop_lasts_until_the_device_is_opened_again(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    feel(device, clock, 0.5)
+    device.stop()
+    assert device.fault() is Fault.STOPPED
+    assert device.release().health.fault is Fault.STOPPED
+    with pytest.raises(DeviceError, match="emergency stop"):
+        device.hold(rigs.sine(1.0))
+
+
+def test_it_may_be_closed_at_any_time_and_twice(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    feel(device, clock, 0.5)
+    device.close()
+    device.close()
+    with pytest.raises(DeviceError, match="is closed"):
+        device.hold(rigs.sine(1.0))
+
+
+def test_the_same_seed_and_calls_give_the_same_recording(rigs):
+    recordings = []
+    for _ in range(2):
+        clock = VirtualClock()
+        with contextlib.closing(open_device("simulated", rigs.SETTINGS, clock, seed=8)) as device:
+            device.hold(rigs.sine(1.0))
+            feel(device, clock, 1.0)
+            recordings.append(device.release().recording.response.samples)
+    assert (recordings[0] == recordings[1]).all()

@@ -1,0 +1,122 @@
+"""The one door: what it opens, what it refuses, and that there is no other."""
+
+import ast
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from study.devices.clock import VirtualClock
+from study.devices.device import DeviceSettings
+from study.devices.opening import open_device
+from study.errors import DeviceError, ExitCode
+from study.session.limits import Limits
+
+ROOT = Path(__file__).parents[3]
+LIMITS = Limits(
+    stimulus_cap_n=3.0, total_cap_n=4.5, slew_n_per_s=1500.0, longest_hold_s=20.0, watchdog_s=0.3, release_s=0.05
+)
+SETTINGS = DeviceSettings(
+    limits=LIMITS, spring_frequency_hz=3.5, spring_damping_n_s_per_m=0.0, keep_s=0.5, hand_on_handle=True
+)
+
+
+def limited(**changes: float) -> DeviceSettings:
+    return replace(SETTINGS, limits=replace(LIMITS, **changes))
+
+
+def test_the_simulated_device_opens_and_says_that_it_is_simulated():
+    device = open_device("simulated", SETTINGS, VirtualClock(), seed=1)
+    assert device.info.simulated
+    device.close()
+
+
+@pytest.mark.parametrize("name", ["omega3", "replay:x.h5", ""])
+def test_another_name_is_refused_with_the_names_that_work(name):
+    with pytest.raises(DeviceError, match=r"simulated omega\.3 only.*--device simulated") as refusal:
+        open_device(name, SETTINGS, VirtualClock(), seed=1)
+    assert refusal.value.exit_code is ExitCode.DEVICE
+
+
+@pytest.mark.parametrize("name", ["stimulus_cap_n", "total_cap_n", "slew_n_per_s", "watchdog_s", "release_s"])
+@pytest.mark.parametrize("value", [math.nan, -1.0, 0.0, math.inf])
+def test_a_limit_that_is_no_limit_is_refused(name, value):
+    with pytest.raises(DeviceError, match=f"limits are not safe.*{name} is .*at most"):
+        open_device("simulated", limited(**{name: value}), VirtualClock(), seed=1)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        limited(total_cap_n=6.1),
+        limited(stimulus_cap_n=3.1, total_cap_n=6.0),
+        limited(stimulus_cap_n=3.0, total_cap_n=2.0),
+        limited(longest_hold_s=1e4),
+        replace(SETTINGS, spring_frequency_hz=50.0),
+        replace(SETTINGS, spring_damping_n_s_per_m=-1.0),
+        replace(SETTINGS, keep_s=0.0),
+        replace(SETTINGS, place_m=(0.0, math.nan, 0.0)),
+    ],
+)
+def test_with_a_hand_on_the_handle_nothing_goes_beyond_the_ceiling(settings):
+    with pytest.raises(DeviceError):
+        open_device("simulated", settings, VirtualClock(), seed=1)
+
+
+def test_a_place_that_is_no_place_is_named():
+    with pytest.raises(DeviceError, match="place"):
+        open_device("simulated", replace(SETTINGS, place_m=(0.0, math.nan, 0.0)), VirtualClock(), seed=1)
+
+
+def test_without_a_hand_the_ceiling_is_what_the_device_can_do():
+    device = open_device(
+        "simulated", replace(limited(stimulus_cap_n=8.0, total_cap_n=12.0), hand_on_handle=False), VirtualClock(), 1
+    )
+    device.close()
+    with pytest.raises(DeviceError, match=r"total_cap_n is 12\.5"):
+        open_device("simulated", replace(limited(total_cap_n=12.5), hand_on_handle=False), VirtualClock(), 1)
+
+
+def test_the_door_is_light_until_something_is_opened():
+    code = "import sys, study.devices.opening; print(sorted({'numba', 'scipy'} & set(sys.modules)))"
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"
+
+
+BUILDERS = {
+    "SafeDevice": {"study/devices/opening.py"},
+    "build_omega3": {"study/devices/opening.py"},
+    "CompiledRig": {"study/devices/simulated/omega3.py"},
+    "CompiledRunner": {"study/devices/safe.py"},
+    "SteppedRunner": {"study/devices/safe.py"},
+    "run_block": {"study/devices/runner.py"},
+    "advance": {"study/devices/block.py"},
+    "write": {"study/devices/runner.py"},
+}
+"""Who may call what leads to a force. `write` counts inside study/devices only: files are written elsewhere."""
+
+
+def callers(name: str, folder: Path) -> set[str]:
+    found = set()
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call):
+                called = node.func
+                if getattr(called, "id", getattr(called, "attr", None)) == name:
+                    found.add(path.relative_to(ROOT).as_posix())
+    return found
+
+
+@pytest.mark.parametrize("name", BUILDERS)
+def test_nothing_but_the_door_and_its_safety_layer_reaches_a_rig(name):
+    folder = ROOT / "study" / "devices" if name in ("write", "advance") else ROOT / "study"
+    assert callers(name, folder) == BUILDERS[name]
+
+
+def test_the_search_for_callers_would_find_one(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "ROOT", tmp_path)
+    (tmp_path / "around.py").write_text("import x\nx.SafeDevice(1)\n")
+    assert callers("SafeDevice", tmp_path) == {"around.py"}
