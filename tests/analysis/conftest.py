@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from protocols.apparatus import SafetySettings, TestDirections
-from protocols.staircase import begin, finished, level_n, step
+from protocols.staircase import StaircaseState, begin, finished, level_n, step
 from protocols.staircase_rule import StaircaseRule, StepPhase
 from protocols.study_protocol import StimulusSettings, StudyProtocol
 from protocols.trial import Phase, Trial, TrialStatus
@@ -34,72 +34,76 @@ def chance_of_right(level: float, true_n: float, slope: float, lapse: float) -> 
     return 0.5 + (0.5 - lapse) * (1 - math.exp(-((level / scale) ** slope)))
 
 
+TEMPLATE = Trial(
+    subject="s01",
+    session="1",
+    run=1,
+    trial=1,
+    attempt=1,
+    phase=Phase.TEST,
+    frequency_hz=15.0,
+    level_n=1.0,
+    direction_shown=1,
+    answer=1,
+    correct=True,
+    reversal=False,
+    response_time_s=1.0,
+    delivered_mps2=DELIVERED_PER_NEWTON,
+    off_axis_mps2=0.5,
+    displacement_mm=0.1,
+    missed_ticks=0,
+    felt=None,
+    status=TrialStatus.OK,
+)
+
+
 def simulated_run(
     true_n: float,
     generator: np.random.Generator,
     *,
     rule: StaircaseRule = PUBLISHED,
-    subject: str = "s01",
-    run: int = 1,
-    frequency_hz: float = 15.0,
     slope: float = 2.0,
     lapse: float = 0.02,
-    felt: bool | None = None,
+    **columns: object,
 ) -> list[Trial]:
+    """One run of a Weibull observer; columns: values of the trial's columns that differ from the template."""
     state, trials = begin(rule), []
+    template = replace(TEMPLATE, **columns)
     while not finished(rule, state):
         level = level_n(rule, state)
         correct = bool(generator.random() < chance_of_right(level, true_n, slope, lapse))
-        shown = int(generator.integers(1, 3))
-        after = step(rule, state, correct)
-        trials.append(
-            Trial(
-                subject=subject,
-                session="1",
-                run=run,
-                trial=state.trials + 1,
-                attempt=1,
-                phase=Phase.TEST,
-                frequency_hz=frequency_hz,
-                level_n=level,
-                direction_shown=shown,
-                answer=shown if correct else 3 - shown,
-                correct=correct,
-                reversal=after.reversals > state.reversals,
-                response_time_s=1.0,
-                delivered_mps2=DELIVERED_PER_NEWTON * level,
-                off_axis_mps2=0.5 * level,
-                displacement_mm=0.1 * level,
-                missed_ticks=0,
-                felt=felt,
-                status=TrialStatus.OK,
-            )
-        )
-        state = after
+        state, trial = played(rule, state, template, correct, int(generator.integers(1, 3)))
+        trials.append(trial)
     return trials
+
+
+def played(
+    rule: StaircaseRule, state: StaircaseState, template: Trial, correct: bool, shown: int
+) -> tuple[StaircaseState, Trial]:
+    level = level_n(rule, state)
+    after = step(rule, state, correct)
+    trial = replace(
+        template,
+        trial=after.trials,
+        level_n=level,
+        direction_shown=shown,
+        answer=shown if correct else 3 - shown,
+        correct=correct,
+        reversal=after.reversals > state.reversals,
+        delivered_mps2=DELIVERED_PER_NEWTON * level,
+        off_axis_mps2=0.5 * level,
+        displacement_mm=0.1 * level,
+    )
+    return after, trial
 
 
 def answered_run(answers: str, rule: StaircaseRule = PUBLISHED) -> list[Trial]:
     """A run from answers written as 1 (right) and 0 (wrong), directions in turn; the rest after the end is not used."""
-    template = simulated_run(1.0, np.random.default_rng(0))[0]
     state, trials = begin(rule), []
     for index, answer in enumerate(answers):
-        if finished(rule, state):
-            break
-        shown = 1 + index % 2
-        correct = answer == "1"
-        trials.append(
-            replace(
-                template,
-                trial=index + 1,
-                level_n=level_n(rule, state),
-                direction_shown=shown,
-                answer=shown if correct else 3 - shown,
-                correct=correct,
-                delivered_mps2=DELIVERED_PER_NEWTON * level_n(rule, state),
-            )
-        )
-        state = step(rule, state, correct)
+        if not finished(rule, state):
+            state, trial = played(rule, state, TEMPLATE, answer == "1", 1 + index % 2)
+            trials.append(trial)
     return trials
 
 

@@ -55,6 +55,14 @@ def test_differences_between_people_change_nothing():
     assert analysed(shifted).p == pytest.approx(analysed(DRUGS).p)
 
 
+def test_the_correction_keeps_its_promise_where_the_conditions_vary_unequally():
+    generator = np.random.default_rng(10)
+    tables = generator.normal(size=(1500, 10, 5)) * np.array([1.0, 1.0, 1.0, 3.0, 6.0])
+    results = [analysed(table.tolist()) for table in tables]
+    assert 0.03 < np.mean([result.p < 0.05 for result in results]) < 0.07
+    assert np.mean([result.p_uncorrected < 0.05 for result in results]) > 0.075
+
+
 def test_two_conditions_need_no_correction():
     assert greenhouse_geisser(np.random.default_rng(1).normal(size=(8, 2))) == pytest.approx(1.0)
 

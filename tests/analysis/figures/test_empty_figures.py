@@ -1,0 +1,25 @@
+import pytest
+
+from analysis.anova import one_way
+from analysis.comparisons import compare_all
+from analysis.figures.delivered import draw_delivered
+from analysis.figures.ellipsoids import draw_ellipsoids
+from analysis.figures.staircases import draw_staircases
+from analysis.figures.thresholds import draw_thresholds
+from analysis.threshold_table import threshold_table
+
+
+@pytest.mark.parametrize(
+    ("draw", "sentence"),
+    [
+        (
+            lambda rule: draw_thresholds(threshold_table((), (5.0,)), compare_all(one_way({})), 3.0),
+            "There is no completed run to draw.",
+        ),
+        (lambda rule: draw_staircases((), rule), "There is no run to draw."),
+        (lambda rule: draw_delivered(()), "No trial has a measured acceleration."),
+        (lambda rule: draw_ellipsoids(()), "There is no ellipsoid to draw."),
+    ],
+)
+def test_an_empty_figure_says_what_is_missing(draw, sentence, rule):
+    assert [text.get_text() for text in draw(rule).texts] == [sentence]

@@ -1,0 +1,57 @@
+from dataclasses import replace
+
+import pytest
+
+from analysis.reports.methods_text import methods_text
+from protocols.staircase_rule import StepChange
+
+
+def said(protocol):
+    return " ".join(methods_text(protocol))
+
+
+def test_the_numbers_of_the_protocol_are_in_the_text(protocol):
+    text = said(protocol)
+    for words in (
+        "at 135° (1) and 45° (2) in the yz plane",
+        "5, 15, 25, 35 and 45 Hz",
+        "began at 1 N, rose after every wrong answer and fell after 3 right answers in a row",
+        "4 dB for 3 reversals and 1 dB for 10 reversals",
+        "never passed 3 N",
+        "ended at once with reversal 13.",
+        "converges where 79.4 % are right",
+        "the last 10 reversals",
+        "without a limit of time, and was not told",
+        "at least 60 s apart",
+        "There was no training.",
+    ):
+        assert words in text
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "words"),
+    [
+        ("staircase", {"step_change": StepChange.AT_REVERSAL}, "already moved by the next step"),
+        ("staircase", {"trial_limit": 200}, "or without a threshold after 200 trials."),
+        ("staircase", {"initial_one_up_one_down": True}, "Until the first reversal it moved after every answer."),
+        ("staircase", {"up_after_wrong": 2}, "rose after 2 wrong answers in a row"),
+        ("staircase", {"down_after_right": 1}, "fell after every right answer"),
+        ("trial", {"time_limit_s": 8.0}, "within 8 s"),
+        ("trial", {"feedback": "after_answer"}, "and was told whether"),
+        ("stimulus", {"onset_polarity": "positive"}, "always to the same side"),
+        ("stimulus", {"quantity": "delivered_acceleration"}, "amplitude of the delivered acceleration"),
+        ("schedule", {"order": "williams"}, "balanced for carry-over"),
+        ("schedule", {"directions": "balanced"}, "equally often within every eight trials"),
+        ("training", {"frequencies_hz": (5.0,)}, "Training came first (5 Hz) and enters no result."),
+        ("rests", {"after_run_s": 0.0}, "in random order. "),
+    ],
+)
+def test_another_choice_gives_another_sentence(protocol, part, change, words):
+    changed = replace(protocol, **{part: replace(getattr(protocol, part), **change)})
+    assert words in said(changed)
+    assert words not in said(protocol)
+
+
+def test_two_wrong_answers_for_a_step_claim_no_convergence(protocol):
+    changed = replace(protocol, staircase=replace(protocol.staircase, up_after_wrong=2))
+    assert "converges" not in said(changed)

@@ -1,0 +1,160 @@
+import re
+from collections import Counter
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.figures.study_pictures import study_pictures
+from analysis.reports.study_report import render_study_report
+from analysis.study_analysis import analyse_study
+
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+
+
+class Structure(HTMLParser):
+    """Tags that open and close in order, ids, headings, references to the outside."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: Counter[str] = Counter()
+        self.ids: list[str] = []
+        self.outside: list[str] = []
+        self.attributes: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.tags[tag] += 1
+        self.attributes.append((tag, values))
+        self.ids += [values["id"]] if "id" in values else []
+        self.outside += [
+            value
+            for key, value in attrs
+            if key in ("src", "href", "xlink:href") and not value.startswith(("#", "data:"))
+        ]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def parsed(html):
+    structure = Structure()
+    structure.feed(html)
+    assert structure.open == []
+    return structure
+
+
+def ellipsoid():
+    wave = np.exp(2j * np.pi * 25.0 * np.arange(2000) / 1000.0)
+    samples = np.real(np.array([1.0, 0.5, 0.1j])[None, :] * wave[:, None])
+    return EllipsoidResult(25.0, "direction_1", 1.0, moment_ellipsoid(samples), phasor_ellipse(samples, 1000.0, 25.0))
+
+
+@pytest.fixture
+def report(protocol):
+    def render(trials, ellipsoids=(), provenance=None) -> str:
+        analysis = analyse_study(trials, protocol)
+        pictures = study_pictures(analysis, ellipsoids)
+        return render_study_report(
+            analysis, pictures, provenance or {"hapteq": "0.1.0"}, "2026-01-02T03:04:05Z", ellipsoids
+        )
+
+    return render
+
+
+def test_a_full_study_is_one_page_that_needs_nothing_else(report, simulate_study):
+    html = report(simulate_study(subjects=3), (ellipsoid(),))
+    structure = parsed(html)
+    assert structure.outside == []
+    assert [i for i, n in Counter(structure.ids).items() if n > 1] == []
+    assert structure.tags["figure"] == structure.tags["svg"] == 3 + 3
+    assert structure.tags["script"] == 0
+    for words in (
+        "Individual thresholds (N)", "comparison interval", "Tukey-Kramer", "Greenhouse-Geisser", "Friedman",
+        "Acceleration ellipses", "All runs", "Methods", "2026-01-02T03:04:05Z", "There are only 3 participants",
+    ):  # fmt: skip
+        assert words in html
+
+
+def test_the_page_can_be_read_aloud(report, simulate_study):
+    structure = parsed(report(simulate_study(subjects=1)))
+    assert ("html", {"lang": "en"}) in structure.attributes
+    assert structure.tags["h1"] == 1
+    assert structure.tags["caption"] == structure.tags["table"] > 0
+    assert structure.tags["figcaption"] == structure.tags["figure"]
+    assert all("scope" in values for tag, values in structure.attributes if tag == "th")
+    assert all("aria-labelledby" in values for tag, values in structure.attributes if tag == "svg")
+
+
+def test_the_page_follows_the_reader_into_the_dark_and_onto_paper(report):
+    html = report([])
+    assert "prefers-color-scheme: dark" in html
+    assert "@media print" in html
+
+
+@pytest.mark.parametrize(
+    ("felt", "banner"),
+    [(None, "Simulated participants: no person took part."), (False, "Nothing was felt: people answered while")],
+)
+def test_what_is_no_measurement_of_people_says_so_in_a_banner(report, simulate_study, felt, banner):
+    html = report(simulate_study(subjects=1, felt=felt))
+    assert banner in html
+    assert 'class="banner"' in html
+
+
+def test_people_need_no_banner(report, simulate_study):
+    assert 'class="banner"' not in report(simulate_study(subjects=1, felt=True))
+
+
+def test_nothing_usable_is_said(report):
+    html = report([])
+    parsed(html)
+    assert "There is no run to analyse." in html
+    assert "No test trial is there, so there is nothing to analyse." in html
+    assert "<table>" not in html
+
+
+def test_one_participant_is_told_what_cannot_be_computed(report, simulate_study):
+    html = report(simulate_study(subjects=1, felt=True))
+    assert "1 participant, 5 runs, 5 of them complete" in html
+    assert "Every group holds a single value" in html
+    assert "needs two who have every condition; there are 1" in html
+    assert "not computed" in html
+
+
+def test_a_clean_study_says_that_nothing_stands_out(report, simulate_study):
+    html = report(simulate_study(subjects=5, true_n=(0.4,) * 5, seed=2, felt=True))
+    assert "Nothing stands out" in html
+
+
+def test_lower_bounds_are_marked_in_the_table(report, simulate_study):
+    assert "<td>≥ 2." in report(simulate_study(subjects=1, true_n=(0.4, 0.4, 0.4, 0.4, float("inf"))))
+
+
+def test_no_number_is_ever_nan(report, simulate_study):
+    trials = [replace(trial, delivered_mps2=None) for trial in simulate_study(subjects=2) if trial.trial < 12]
+    html = report(trials)
+    assert not re.search(r"\b(nan|inf|None)\b", html)
+
+
+def test_text_from_outside_is_escaped(report, simulate_study):
+    trials = [replace(trial, subject="<script>x</script>") for trial in simulate_study(subjects=1)]
+    html = report(trials, provenance={"parent": "<b>&"})
+    parsed(html)
+    assert "<script>" not in html
+    assert "&lt;b&gt;&amp;" in html
+
+
+def test_the_same_study_gives_the_same_page(report, simulate_study):
+    trials = [trial for trial in simulate_study(subjects=1) if trial.run < 3]
+    assert report(trials) == report(trials)

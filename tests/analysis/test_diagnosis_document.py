@@ -1,0 +1,101 @@
+import copy
+import json
+
+import pytest
+
+from analysis.diagnosis.document import DiagnosisError, diagnosis_from_json, diagnosis_schema, diagnosis_to_json
+
+ERRORS = {"before": 0.4, "retuned": 0.3, "after": 0.011, "noise": 0.01}
+DOCUMENT = {
+    "verdict": "explained",
+    "mismatch": [
+        {"output": "ax", "input": "fx", "band_hz": [0.5, 6.0], "amplitude": 1.5, "state": "near v = 0",
+         "share": 0.8, "p_value": 1e-9}
+    ],
+    "effects": [
+        {"effect": "coulomb_friction", "place": "mechanism", "axis": "x", "share": 0.9, "probability": 0.97,
+         "parameters": {"level": {"value": 0.21, "unit": "N", "ci95": [0.2, 0.22]}},
+         "rivals": [
+             {"effect": "stribeck_friction", "probability": 0.03, "inseparable": False, "why_not": "no slow motion"},
+             {"effect": "body_in_a_box", "probability": 0.02, "inseparable": True, "why_not": "the same at all levels"},
+         ]}
+    ],
+    "retuned": {"mass_kg": 0.29},
+    "remainder": [],
+    "fit": {"fit": ERRORS, "test": {**ERRORS, "noise": None}},
+    "error": "free simulation",
+    "next_experiment": {"command": "hapteq record slow", "splits": ["a", "b"], "why": "slow motion tells them apart"},
+}  # fmt: skip
+
+
+def changed(place, value):
+    document = copy.deepcopy(DOCUMENT)
+    *way, last = place
+    inner = document
+    for step in way:
+        inner = inner[step]
+    inner[last] = value
+    return document
+
+
+def test_a_diagnosis_goes_to_json_and_back():
+    diagnosis = diagnosis_from_json(DOCUMENT)
+    assert json.loads(json.dumps(diagnosis_to_json(diagnosis))) == DOCUMENT
+    assert diagnosis_from_json(diagnosis_to_json(diagnosis)) == diagnosis
+
+
+def test_the_returned_set_is_the_effect_and_its_inseparable_rivals():
+    assert diagnosis_from_json(DOCUMENT).returned_set == ("coulomb_friction", "body_in_a_box")
+
+
+def test_an_effect_outside_the_vocabulary_may_be_named():
+    assert diagnosis_from_json(changed(("effects", 0, "effect"), "joint_slip")).effects[0].effect == "joint_slip"
+
+
+@pytest.mark.parametrize("error", ["free simulation", "windows of 1 s", "windows of 0.5 s", "predicted force"])
+def test_the_ways_to_measure_errors(error):
+    assert diagnosis_from_json(changed(("error",), error)).error == error
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "problem"),
+    [
+        (("verdict",), "maybe", "verdict: Input should be 'no_mismatch', 'parameters', 'explained'"),
+        (("verdict",), "parameters", "the verdict 'parameters' goes with no effects"),
+        (("verdict",), "partly_explained", "the verdict 'partly_explained' goes with a remainder"),
+        (("effects",), [], "the verdict 'explained' goes with one effect or more"),
+        (("mismatch", 0, "share"), 1.2, "mismatch.0.share: Input should be less than or equal to 1"),
+        (("mismatch", 0, "p_value"), -0.1, "mismatch.0.p_value: Input should be greater than or equal to 0"),
+        (("mismatch", 0, "band_hz"), [6.0, 0.5], "mismatch.0: band_hz must rise from 0 or more, not [6.0, 0.5]"),
+        (("mismatch", 0, "amplitude"), "1.5", "mismatch.0.amplitude: Input should be a valid number"),
+        (("effects", 0, "probability"), 97.0, "effects.0.probability: Input should be less than or equal to 1"),
+        (("effects", 0, "effect"), "Coulomb friction", "effects.0.effect: String should match pattern"),
+        (("effects", 0, "place"), "sensor", "effects.0: coulomb_friction sits in the mechanism, not in the sensor"),
+        (("effects", 0, "parameters"), {}, "effects.0: coulomb_friction lacks its main parameter, level (N)"),
+        (("effects", 0, "parameters", "level", "ci95"), [0.3, 0.2], "effects.0.parameters.level: ci95 must rise"),
+        (("effects", 0, "parameters", "level", "unit"), "", "effects.0.parameters.level.unit: String should have at"),
+        (("fit", "fit", "after"), -1.0, "fit.fit.after: Input should be greater than or equal to 0"),
+        (("error",), "by eye", "error: String should match pattern"),
+        (("sure",), True, "sure: this key is not known here"),
+    ],
+)
+def test_what_is_no_diagnosis_is_refused_by_its_place(place, value, problem):
+    with pytest.raises(DiagnosisError) as refused:
+        diagnosis_from_json(changed(place, value))
+    assert any(found.startswith(problem) for found in refused.value.problems), refused.value.problems
+
+
+def test_a_key_that_is_left_out_is_missing():
+    document = {key: value for key, value in DOCUMENT.items() if key != "fit"}
+    with pytest.raises(DiagnosisError, match="fit: this is missing"):
+        diagnosis_from_json(document)
+
+
+def test_an_unexplained_mismatch_is_there():
+    document = {**DOCUMENT, "verdict": "unexplained", "effects": [], "mismatch": []}
+    with pytest.raises(DiagnosisError, match="the verdict 'unexplained' goes with a mismatch"):
+        diagnosis_from_json(document)
+
+
+def test_the_schema_asks_for_every_key_of_the_contract():
+    assert set(diagnosis_schema()["required"]) == set(DOCUMENT)

@@ -1,0 +1,107 @@
+from dataclasses import replace
+
+import pytest
+
+from analysis.anova import one_way
+from analysis.repeated_measures import repeated_measures
+from analysis.study_analysis import analyse_study
+from analysis.study_warnings import design_difference
+from protocols.trial import TrialStatus
+
+
+@pytest.fixture
+def able(simulate_study):
+    """Five able participants: nothing to warn of."""
+    return simulate_study(subjects=5, true_n=(0.4, 0.4, 0.4, 0.4, 0.4), seed=2)
+
+
+def warnings(trials, protocol):
+    return analyse_study(trials, protocol).warnings
+
+
+def test_a_clean_study_has_no_warning(able, protocol):
+    assert warnings(able, protocol) == ()
+
+
+def test_no_trial_is_said(protocol):
+    assert warnings([], protocol) == ("No test trial is there, so there is nothing to analyse.",)
+
+
+def test_a_run_that_was_broken_off_is_named(able, protocol):
+    cut = [trial for trial in able if not (trial.subject == "s02" and trial.run == 5 and trial.trial > 20)]
+    frequency = next(trial.frequency_hz for trial in able if trial.subject == "s02" and trial.run == 5)
+    incomplete, missing, unequal = warnings(cut, protocol)
+    assert incomplete.startswith(f"1 run is not complete and without a threshold: s02 at {frequency:g} Hz (")
+    assert incomplete.endswith(" of 13 reversals).")
+    assert missing == f"No threshold for s02 at {frequency:g} Hz."
+    assert unequal == "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
+
+
+def test_lower_bounds_are_named(simulate_study, protocol):
+    trials = simulate_study(subjects=5, true_n=(0.3, 0.3, 0.3, 0.3, float("inf")), seed=2)
+    (bounds,) = warnings(trials, protocol)
+    assert bounds.startswith("5 thresholds are only a lower bound, because the cap of 3 N cut off peaks")
+    assert "s05 at 45 Hz" in bounds
+
+
+@pytest.mark.parametrize(
+    ("subjects", "sentence"),
+    [
+        (1, "There is one participant: individual thresholds can be shown, nothing can be tested."),
+        (3, "There are only 3 participants: means and tests say little about people in general."),
+    ],
+)
+def test_few_participants_are_said(simulate_study, protocol, subjects, sentence):
+    assert sentence in warnings(simulate_study(subjects=subjects, true_n=(0.4,) * 5), protocol)
+
+
+def test_a_liking_for_one_answer_is_named(able, protocol):
+    # The same answers, right whenever direction 1 was shown: somebody who nearly always says 1.
+    leaning = [
+        replace(trial, direction_shown=1 if trial.correct else 2, answer=1) if trial.run == 1 else trial
+        for trial in able
+    ]
+    (liking,) = warnings(leaning, protocol)
+    assert liking.startswith("A liking for one of the two answers, which raises a threshold, shows in s01 at ")
+    assert "(criterion -" in liking
+
+
+def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):
+    spoiled = replace(able[3], attempt=2, answer=None, correct=None, status=TrialStatus.SPOILED)
+    able[4] = replace(able[4], status=TrialStatus.FLAGGED)
+    able[5] = replace(able[5], status=TrialStatus.UNMEASURED, delivered_mps2=None)
+    assert warnings([*able, spoiled], protocol) == (
+        "1 spoiled presentation drawn again; the answers do not count.",
+        "1 trial flagged: counted, but the stimulus is worth a look.",
+        "1 counted trial without a measured acceleration.",
+    )
+
+
+def test_a_second_run_at_a_frequency_is_named(able, protocol):
+    again = [replace(trial, session="2") for trial in able if trial.subject == "s01" and trial.run == 1]
+    (second,) = warnings([*able, *again], protocol)
+    assert "completed more than one run" in second
+
+
+DRUGS = ((30.0, 28.0, 16.0, 34.0), (14.0, 18.0, 10.0, 22.0), (24.0, 20.0, 18.0, 30.0), (38.0, 34.0, 20.0, 44.0))
+
+
+def both(values):
+    columns = {str(i): column for i, column in enumerate(zip(*values, strict=True))}
+    return one_way(columns), repeated_measures([str(i) for i in range(len(values))], values)
+
+
+def test_the_two_analyses_are_told_apart_in_numbers():
+    anova, within = both(DRUGS)
+    text = design_difference(anova, within)
+    assert f"F(3, 12) = {anova.f:.2f}" in text
+    assert f"F(3, 9) = {within.f:.2f}" in text
+    assert "They disagree at the 5 % level." in text
+    assert "(87 % of the spread within frequencies, 4 participants)" in text
+
+
+@pytest.mark.parametrize(
+    ("values", "word"), [(DRUGS[:1], "neither"), ((*DRUGS[:1], (1.0, None, 2.0, 3.0)), "only one")]
+)
+def test_what_cannot_be_compared_is_said(values, word):
+    assert f"Of the two, {word} can be computed" in design_difference(*both(values))
