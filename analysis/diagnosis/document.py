@@ -175,7 +175,9 @@ def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
         # By way of JSON: strict checking then takes a list for a tuple, but no text for a number.
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        raise DiagnosisError(tuple(_sentence(wrong["loc"], wrong["msg"]) for wrong in error.errors())) from error
+        raise DiagnosisError(
+            tuple(_sentence(wrong["loc"], _PLAIN.get(wrong["type"], wrong["msg"])) for wrong in error.errors())
+        ) from error
 
 
 def diagnosis_schema() -> dict[str, Any]:
@@ -185,6 +187,10 @@ def diagnosis_schema() -> dict[str, Any]:
 
 def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
     return tuple(rival.effect for rival in effect.rivals if rival.inseparable)
+
+
+_PLAIN = {"unexpected_keyword_argument": "this key is not known here", "missing": "this is missing"}
+"""What pydantic says in words of its own trade, by its kind of error."""
 
 
 def _sentence(place: tuple[str | int, ...], message: str) -> str:

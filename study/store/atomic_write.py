@@ -10,10 +10,10 @@ from study.store.file_errors import AlreadyThereError, CannotWriteError
 
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
     """Write beside the final name, sync, rename. Raises AlreadyThereError or CannotWriteError."""
-    if path.exists() and not overwrite:
-        raise AlreadyThereError(path)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
+        if path.exists() and not overwrite:
+            raise AlreadyThereError(path)
         with part.open("xb") as file:
             file.write(content)
             file.flush()

@@ -14,6 +14,7 @@ class UnusableFileError(StudyError):
 
     def __init__(self, path: Path, kind: str, problems: tuple[str, ...]) -> None:
         self.kind = kind
+        self.problems = problems
         self.sentences = tuple(_sentence(problem) for problem in problems)
         super().__init__(
             title=f"{path.name} is not a usable {kind}",

@@ -26,7 +26,7 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
         return default
     values = np.atleast_1d(owner.attrs[name]).ravel().tolist()
     if not all(isinstance(value, str | bytes) for value in values):
-        raise AttributeProblemError(f"{_named(owner, name)} is {owner.attrs[name]!r}; it must be text")
+        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(owner.attrs[name])}; it must be text")
     try:
         return tuple(value.decode("utf-8") if isinstance(value, bytes) else value for value in values)
     except UnicodeDecodeError:
@@ -42,7 +42,7 @@ def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, .
     values = np.atleast_1d(owner.attrs[name]).ravel()
     if values.dtype.kind not in "iuf" or len(values) != count:
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise AttributeProblemError(f"{_named(owner, name)} is {owner.attrs[name]!r}; it must be {wanted}")
+        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(owner.attrs[name])}; it must be {wanted}")
     return tuple(float(value) for value in values)
 
 
@@ -56,6 +56,10 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
         owner.attrs[name] = texts
     else:
         owner.attrs.create(name, list(texts), dtype=h5py.string_dtype())
+
+
+def _shown(value: Any) -> str:
+    return repr(np.asarray(value).tolist())
 
 
 def _named(owner: Any, name: str) -> str:

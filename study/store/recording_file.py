@@ -141,7 +141,10 @@ def _segment(row: Any, scale: float) -> Segment:
 
 def _amplitude_scale(file: Any) -> float:
     """Amplitudes are in the command's unit; where its channels differ in unit, they are left as they are."""
-    factors = {parse_unit(text).factor for text in texts_attribute(file["command"], "unit")}
+    try:
+        factors = {parse_unit(text).factor for text in texts_attribute(file.get("command", file), "unit")}
+    except ValueError:
+        return 1.0  # the command itself reports what is wrong with it
     return factors.pop() if len(factors) == 1 else 1.0
 
 

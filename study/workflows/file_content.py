@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.store.file_errors import UnusableFileError
+from study.store.file_errors import CannotReadError, UnusableFileError
 from study.store.hdf5_file import format_of, is_hdf5
 from study.store.text_file import read_text
 
@@ -39,10 +39,13 @@ class FileContent:
 
 def open_content(path: Path) -> FileContent:
     """Raises CannotReadError, UnusableFileError."""
-    if path.is_dir():
-        return FileContent(path, is_folder=True)
-    if is_hdf5(path):
-        return FileContent(path, hdf5_format=format_of(path))
+    try:
+        if path.is_dir():
+            return FileContent(path, is_folder=True)
+        if is_hdf5(path):
+            return FileContent(path, hdf5_format=format_of(path))
+    except OSError as problem:
+        raise CannotReadError(path, problem) from problem
     if path.is_file() and path.suffix.lower() in (".h5", ".hdf5"):
         raise UnusableFileError(path, "HDF5 file", ("it does not begin as HDF5 files do",))
     text = read_text(path)

@@ -1,0 +1,43 @@
+import re
+from pathlib import Path
+
+import pytest
+
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, PLACES, RESPONSE
+from equalizer.signals.units import parse_unit
+
+DESIGN = Path(__file__).parents[2].parent / "shared" / "design.md"
+
+
+def test_every_effect_of_the_contract_is_there_with_its_place_and_parameters():
+    if not DESIGN.exists():
+        pytest.skip("the contract lies outside the repository and is not here")
+    table = re.search(r"\*\*Effects\*\*[^\n]*\n(.*?)\nMeaning", DESIGN.read_text(), re.DOTALL)[1]
+    agreed = {}
+    for line in table.splitlines():
+        place, _, entries = line.partition(": ")
+        for name, numbers in re.findall(r"`(\w+)`: ([^·;.]*)", entries):
+            agreed[name] = (place, [number.split(" (")[0].strip() for number in numbers.split(",")])
+    ours = {effect.name: (effect.place, [number.name for number in effect.parameters]) for effect in EFFECT_NAMES}
+    assert ours == agreed
+
+
+def test_names_are_unique_and_places_known():
+    assert len(EFFECTS_BY_NAME) == len(EFFECT_NAMES) == 33
+    assert {effect.place for effect in EFFECT_NAMES} == set(PLACES)
+
+
+def test_every_unit_is_one_that_files_may_use():
+    for effect in EFFECT_NAMES:
+        for number in effect.parameters:
+            for unit in (number.unit, number.rotational_unit):
+                assert unit == "ppm" or RESPONSE in unit or parse_unit(unit)
+
+
+def test_units_follow_the_model_and_its_response():
+    level, cubic = EFFECTS_BY_NAME["coulomb_friction"].main, EFFECTS_BY_NAME["sensor_nonlinearity"].main
+    clipping = EFFECTS_BY_NAME["sensor_clipping"].main
+    assert level.unit_in(rotational=False, response_unit="m/s^2") == "N"
+    assert level.unit_in(rotational=True, response_unit="rad") == "N m"
+    assert clipping.unit_in(rotational=False, response_unit="m/s^2") == "m/s^2"
+    assert cubic.unit_in(rotational=False, response_unit="m/s^2") == "1/(m/s^2)^2"

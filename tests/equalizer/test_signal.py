@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from equalizer.signals.signal import Signal
+
+
+def signal(quantity="acceleration", unit="m/s^2", channels=("ax", "ay")):
+    return Signal(np.arange(6.0).reshape(3, 2), 1000.0, quantity, unit, channels)
+
+
+def test_one_word_serves_all_channels():
+    assert signal().quantities == ("acceleration", "acceleration")
+    assert signal().units == ("m/s^2", "m/s^2")
+
+
+def test_equal_words_per_channel_are_folded_into_one():
+    assert signal(quantity=("force", "force"), unit=("N", "N")).quantity == "force"
+
+
+def test_channels_may_differ_in_quantity_and_unit():
+    mixed = signal(quantity=("position", "angle"), unit=("m", "rad"))
+    assert mixed.units == ("m", "rad")
+    assert mixed.part(0, 1).quantity == ("position", "angle")
+
+
+def test_a_list_of_the_wrong_length_is_refused():
+    with pytest.raises(ValueError, match="3 words of unit for 2 channels; one for all, or one per channel"):
+        signal(unit=("m", "m", "rad"))
+
+
+def test_different_quantities_are_not_rotated_into_each_other():
+    with pytest.raises(ValueError, match="channels of different quantities cannot be rotated"):
+        signal(quantity=("position", "angle"), unit=("m", "rad")).rotated(np.eye(2))
+
+
+def test_samples_cannot_be_changed_and_do_not_follow_their_source():
+    source = np.zeros((3, 2))
+    made = Signal(source, 1000.0, "force", "N", ("fx", "fy"))
+    source[0, 0] = 1.0
+    assert made.samples[0, 0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        made.samples[0, 0] = 1.0
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
+def test_a_rate_that_is_no_rate_is_refused(rate):
+    with pytest.raises(ValueError, match="sample_rate_hz must be a positive number"):
+        Signal(np.zeros((3, 1)), rate, "force", "N", ("fx",))

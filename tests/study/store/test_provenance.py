@@ -1,0 +1,42 @@
+import hashlib
+import json
+
+import pytest
+
+from study.store.file_errors import CannotReadError
+from study.store.provenance import PACKAGES, command_line, gather_provenance, sha256_of, versions
+
+
+def test_parents_are_named_without_their_folder_and_with_their_content(tmp_path):
+    (tmp_path / "sweep.h5").write_bytes(b"data")
+    found = gather_provenance(protocol_hash="abc", seeds={"session": 7}, parents=[tmp_path / "sweep.h5"]).as_dict()
+    assert found["parents"] == [{"file": "sweep.h5", "sha256": hashlib.sha256(b"data").hexdigest()}]
+    assert (found["protocol_hash"], found["seeds"]) == ("abc", {"session": 7})
+    assert str(tmp_path) not in json.dumps(found)
+
+
+def test_what_is_not_known_is_left_out():
+    assert set(gather_provenance().as_dict()) == {"versions", "command", "parents"}
+
+
+def test_versions_name_everything_that_computes():
+    assert set(versions()) == {"python", *PACKAGES}
+    assert versions()["numpy"][0].isdigit()
+
+
+def test_the_command_line_keeps_options_and_loses_folders():
+    typed = (
+        "/home/me/bin/hapteq",
+        "identify",
+        "data/sweep.h5",
+        "--out=/data/me/model.h5",
+        "--band",
+        "5",
+        "C:\\me\\a.h5",
+    )
+    assert command_line(typed)[:5] == ("hapteq", "identify", "sweep.h5", "--out=model.h5", "--band")
+
+
+def test_a_parent_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(CannotReadError, match="There is no file"):
+        sha256_of(tmp_path / "none")

@@ -1,0 +1,128 @@
+from dataclasses import fields, replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.thresholds import Threshold
+from protocols.trial import Phase, Trial, TrialStatus
+from study.store.csv_rows import CsvError, in_words, rows_from_csv, rows_to_csv
+from study.store.file_errors import UnusableFileError
+from study.store.thresholds_file import THRESHOLDS_HEADER, read_thresholds, write_thresholds
+from study.store.trials_file import TRIALS_HEADER, read_trials, write_trials
+
+CONTRACT = (
+    "subject, session, run, trial, attempt, phase, frequency_hz, level_n, direction_shown, answer, correct, reversal, "
+    "response_time_s, delivered_mps2, off_axis_mps2, displacement_mm, missed_ticks, felt, status"
+)
+TRIAL = Trial(
+    "P01", "P01_001", 1, 3, 1, Phase.TEST, 25.0, 0.1 + 0.2, 1, 1, True, False, 1.5, 2.5, 0.01, 0.3, 0, False,
+    TrialStatus.OK,
+)  # fmt: skip
+
+floats = st.floats(allow_nan=False)
+trials = st.builds(
+    Trial,
+    subject=st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=8),
+    level_n=floats,
+    frequency_hz=floats,
+    response_time_s=st.none() | floats,
+    delivered_mps2=st.none() | floats,
+    off_axis_mps2=st.none() | floats,
+    displacement_mm=st.none() | floats,
+)
+
+
+@given(st.lists(trials, max_size=5))
+@settings(max_examples=60, deadline=None)
+def test_rows_are_read_back_to_the_last_digit(rows):
+    assert rows_from_csv(rows_to_csv(rows, Trial), Trial) == tuple(rows)
+
+
+def test_the_columns_of_trials_are_those_of_the_contract():
+    assert ", ".join(TRIALS_HEADER) == CONTRACT
+
+
+def test_the_columns_of_thresholds_begin_as_in_the_contract():
+    assert THRESHOLDS_HEADER[:8] == (
+        "subject", "frequency_hz", "threshold_n", "threshold_db", "censored", "reversals", "trials", "cap_reversals",
+    )  # fmt: skip
+
+
+def test_a_row_is_plain_text():
+    unanswered = replace(TRIAL, answer=None, correct=None, felt=None)
+    first, second, third = rows_to_csv([TRIAL, unanswered], Trial).splitlines()
+    assert first == ",".join(TRIALS_HEADER)
+    assert second == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok"
+    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok"
+
+
+def test_tables_are_rewritten_at_will(tmp_path):
+    write_trials(tmp_path / "trials.csv", [TRIAL])
+    write_trials(tmp_path / "trials.csv", [TRIAL, TRIAL])
+    assert read_trials(tmp_path / "trials.csv") == (TRIAL, TRIAL)
+
+
+def test_thresholds_go_to_disk_and_back(tmp_path):
+    row = Threshold(
+        **{field.name: None for field in fields(Threshold)}
+        | {"subject": "P01", "frequency_hz": 35.0, "threshold_n": 1.25, "censored": True, "complete": True}
+        | {name: 3 for name in ("reversals", "trials", "cap_reversals", "trials_at_cap", "pushes_against_cap")}
+        | {"session": "P01_001", "run": 1, "spoiled_trials": 0, "measured_reversals": 0}
+    )
+    write_thresholds(tmp_path / "thresholds.csv", [row])
+    assert read_thresholds(tmp_path / "thresholds.csv") == (row,)
+
+
+def test_columns_after_the_known_ones_do_no_harm():
+    lines = rows_to_csv([TRIAL], Trial).splitlines()
+    assert rows_from_csv(f"{lines[0]},more\r\n{lines[1]},1\r\n", Trial) == (TRIAL,)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("frequency_hz", "freq", "column 7 of the header is 'freq'; it must be 'frequency_hz' (of subject, session"),
+        (",status\n", "\n", "column 19 of the header is missing; it must be 'status'"),
+        (",ok\n", "\n", "line 2 has 18 fields, but the header names 19"),
+        (",3,1,test", ",three,1,test", "line 2, column trial: 'three' is not a whole number"),
+        ("25.0", "high", "line 2, column frequency_hz: 'high' is not a number"),
+        ("25.0", "", "line 2, column frequency_hz: it is empty, but a value is needed"),
+        ("true", "yes", "line 2, column correct: 'yes' is neither true nor false"),
+        ("test", "pause", "line 2, column phase: 'pause' is none of training, detection, test, catch"),
+        ("25.0,0.3", "25.0,-0.3", "line 2: level_n and frequency_hz must be above 0"),
+        ("4,1,1,true", "4,3,1,true", "line 2: direction_shown is 3; directions are 1 and 2"),
+        ("4,1,1,true", "4,1,7,false", "line 2: answer is 7; answers are 1, 2, or empty"),
+        ("4,1,1,true", "4,1,1,false", "line 2: correct does not follow from direction_shown and answer"),
+    ],
+)
+def test_every_fault_of_a_table_is_named_with_its_line(tmp_path, old, new, problem):
+    (tmp_path / "trials.csv").write_text(rows_to_csv([TRIAL], Trial).replace(old, new, 1))
+    with pytest.raises(UnusableFileError) as refused:
+        read_trials(tmp_path / "trials.csv")
+    assert any(found.startswith(problem) for found in refused.value.problems), refused.value.problems
+
+
+def test_a_faulty_table_of_thresholds_is_an_error_of_the_study(tmp_path):
+    (tmp_path / "thresholds.csv").write_text("subject,hz\n")
+    with pytest.raises(
+        UnusableFileError, match=r"thresholds\.csv is not a usable table of thresholds. Column 2 of the"
+    ):
+        read_thresholds(tmp_path / "thresholds.csv")
+
+
+def test_an_empty_text_has_no_header():
+    with pytest.raises(CsvError, match="column 1 of the header is missing; it must be 'subject'"):
+        rows_from_csv("", Trial)
+
+
+def test_of_many_faults_the_first_are_named_and_the_rest_counted():
+    with pytest.raises(CsvError) as refused:
+        rows_from_csv(",".join(TRIALS_HEADER) + "\n" + "x\n" * 20, Trial)
+    assert len(refused.value.problems) == 9
+    assert refused.value.problems[-1] == "and 12 problems more like these"
+
+
+def test_columns_are_described_for_people():
+    assert in_words(bool | None) == "`true` or `false`, or empty"
+    assert in_words(Phase) == "`training`, `detection`, `test`, `catch`"
