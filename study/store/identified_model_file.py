@@ -39,46 +39,13 @@ LAYOUT = (
 
 def read_identified_model(path: Path) -> IdentifiedModel:
     """Raises CannotReadError, or UnusableFileError with everything that is wrong."""
+    problems = Problems()
     with opened_hdf5(path, KIND, FORMAT, VERSION) as file:
-        problems = Problems()
-
-        def matrix(name: str) -> FloatArray:
-            return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
-
-        def texts(name: str) -> tuple[str, ...]:
-            return problems.attempt(lambda: texts_attribute(file, name), ())
-
-        def numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-            return problems.attempt(lambda: numbers_attribute(file, name, count, default), (0.0,) * count)
-
-        (rate_hz,), (low_hz, high_hz) = numbers("sample_rate_hz", 1), numbers("band_hz", 2)
-        (delay_samples,) = numbers("delay_samples", 1, (0.0,))
-        place = problems.attempt(lambda: _place(file), None)
-        provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
-        A, B, C, D = (matrix(name) for name in ("A", "B", "C", "D"))
-        covariance, samples = (matrix(name) if name in file else None for name in ("covariance", "samples"))
-        input_unit, output_unit = texts("input_unit"), texts("output_unit")
-        input_channels, output_channels = texts("input_channels"), texts("output_channels")
+        parts = _parts(file, problems)
     if problems.found:
         raise UnusableFileError(path, KIND, tuple(problems.found))
     try:
-        return IdentifiedModel(
-            A=A,
-            B=B,
-            C=C,
-            D=D,
-            sample_rate_hz=rate_hz,
-            band_hz=(low_hz, high_hz),
-            input_unit=text_or_list(input_unit),
-            output_unit=text_or_list(output_unit),
-            input_channels=input_channels,
-            output_channels=output_channels,
-            delay_samples=delay_samples,
-            place_m=place,
-            covariance=covariance,
-            samples=samples,
-            provenance=provenance,
-        )
+        return IdentifiedModel(**parts)
     except IdentifiedModelError as error:
         raise UnusableFileError(path, KIND, error.problems) from error
 
@@ -101,11 +68,30 @@ def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: boo
     write_hdf5(path, fill, overwrite=overwrite)
 
 
-def _place(file: Any) -> tuple[float, float, float] | None:
-    if "place_m" not in file.attrs:
-        return None
-    x, y, z = numbers_attribute(file, "place_m", 3)
-    return x, y, z
+def _parts(file: Any, problems: Problems) -> dict[str, Any]:
+    """The model's fields, by name."""
+
+    def matrix(name: str) -> FloatArray:
+        return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
+
+    def texts(name: str) -> tuple[str, ...]:
+        return problems.attempt(lambda: texts_attribute(file, name), ())
+
+    def numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+        return problems.attempt(lambda: numbers_attribute(file, name, count, default), (0.0,) * count)
+
+    provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
+    present = [name for name in ("covariance", "samples") if name in file]
+    return {
+        **{name: matrix(name) for name in ("A", "B", "C", "D", *present)},
+        **{name: text_or_list(texts(name)) for name in ("input_unit", "output_unit")},
+        **{name: texts(name) for name in ("input_channels", "output_channels")},
+        "sample_rate_hz": numbers("sample_rate_hz", 1)[0],
+        "band_hz": numbers("band_hz", 2),
+        "delay_samples": numbers("delay_samples", 1, (0.0,))[0],
+        "place_m": numbers("place_m", 3) if "place_m" in file.attrs else None,
+        "provenance": provenance,
+    }
 
 
 def _provenance(file: Any) -> dict[str, Any]:
