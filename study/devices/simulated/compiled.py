@@ -1,0 +1,54 @@
+"""The compiled entry points. Their machine code is kept on disk, so that only a first run waits for the compiler.
+
+numba holds kept code for good as long as the file of that very function is the same. Most of the mechanism stands in
+other files of this folder, so a changed equation would go on running as it was. numba also compares what a function
+encloses: these enclose a fingerprint of all sources here.
+"""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+from numba import njit, types
+from numpy import uint64
+
+from equalizer.signals.signal import FloatArray
+from study.devices.simulated.dynamics import integrate_tick
+from study.devices.simulated.linkage import inverse_kinematics
+from study.devices.simulated.sensors import read_sensors
+
+_VECTOR = types.float64[::1]
+_MATRIX = types.float64[:, ::1]
+_NOISE = types.uint64[::1]
+
+
+def fingerprint(folder: Path) -> int:
+    """Of all Python sources in it; 32 bits."""
+    digest = hashlib.sha256()
+    for source in sorted(folder.glob("*.py")):
+        digest.update(source.read_bytes())
+    return int.from_bytes(digest.digest()[:4], "big")
+
+
+def _entry_points(sources: int) -> tuple[Any, Any, Any]:
+    @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
+    def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[uint64], reading: FloatArray) -> None:
+        _ = sources
+        read_sensors(state, parameters, noise, reading)
+
+    @njit(types.void(_VECTOR, _VECTOR, _VECTOR), cache=True, nogil=True)
+    def advance(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
+        _ = sources
+        integrate_tick(state, parameters, force_n)
+
+    @njit(types.void(_VECTOR, _VECTOR, _VECTOR, _MATRIX), cache=True, nogil=True)
+    def pose(parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray) -> None:
+        _ = sources
+        inverse_kinematics(parameters, position, angles, jacobian)
+
+    return sense, advance, pose
+
+
+sense, advance, pose = _entry_points(fingerprint(Path(__file__).parent))
+"""`sense` and `advance` as `study.devices.rig.CompiledRig` wants them; `pose` is `inverse_kinematics`."""

@@ -1,0 +1,123 @@
+"""One millisecond of the mechanism. Equations and their reasons: docs/simulated_omega3.md.
+
+The linkage (Jacobian, mass matrix) is taken once per tick at the handle's predicted midpoint; what swings fast
+(cables, handle, base, friction) takes finer steps, speeds before positions, which keeps energy from growing.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.simulated.drives import step_drives
+from study.devices.simulated.handle import handle_force, step_bending, step_sensor
+from study.devices.simulated.inertia import SIZE, invert_in_place, mass_matrix, transposed_solve
+from study.devices.simulated.inlined import inlined
+from study.devices.simulated.layout import (
+    ARM_INERTIA,
+    MODES,
+    MOTOR,
+    MOUNT_DAMPING,
+    MOUNT_DIRECTION,
+    MOUNT_STIFFNESS,
+    MOUNTS,
+    RELATIVE,
+    ROCKING,
+    ROCKING_SPEED,
+    STEP_S,
+    SUBSTEPS,
+    TICK_S,
+    VELOCITY,
+)
+from study.devices.simulated.linkage import inverse_kinematics
+from study.devices.simulated.stops import add_stops
+
+
+class Held(NamedTuple):
+    """What one tick holds."""
+
+    command: FloatArray
+    """(3,) motor torques, N m."""
+    jacobian: FloatArray
+    """(3, 3) at the midpoint, rad/m."""
+    inverse_mass: FloatArray
+    """(5, 5), 1/kg."""
+    stretch: FloatArray
+    """(3,) of the cables, rad: this one changes."""
+    centrifugal: FloatArray
+    """(3,) force that keeps the arms on their curved way, N."""
+
+
+@inlined
+def integrate_tick(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
+    """Holds force_n (3,), the force that the controller means to have at the handle, for one tick."""
+    held = _hold(state, parameters, force_n)
+    cables, pulls, force, change = np.empty(3), np.empty(MODES), np.empty(3), np.empty(SIZE)
+    for _ in range(SUBSTEPS):
+        step_drives(state, parameters, held.command, held.jacobian, held.stretch, cables)
+        handle_force(state, parameters, pulls, force)
+        _accelerations(state, parameters, held, cables, force, change)
+        for axis in range(3):
+            state[VELOCITY + axis] += STEP_S * change[axis]
+            state[RELATIVE + axis] += STEP_S * state[VELOCITY + axis]
+        for mode in range(MOUNTS):
+            state[ROCKING_SPEED + mode] += STEP_S * change[3 + mode]
+            state[ROCKING + mode] += STEP_S * state[ROCKING_SPEED + mode]
+        _absolute(parameters, change)
+        step_bending(state, parameters, pulls, change)
+        step_sensor(state, parameters)
+
+
+@inlined
+def _hold(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> Held:
+    angles, midpoint, begin = np.empty(3), np.empty(3), np.empty((3, 3))
+    held = Held(np.empty(3), np.empty((3, 3)), np.empty((SIZE, SIZE)), np.empty(3), np.empty(3))
+    for axis in range(3):
+        midpoint[axis] = state[RELATIVE + axis] + 0.5 * TICK_S * state[VELOCITY + axis]
+    inverse_kinematics(parameters, midpoint, angles, held.jacobian)
+    inverse_kinematics(parameters, state[RELATIVE : RELATIVE + 3], angles, begin)
+    transposed_solve(begin, force_n, held.command)
+    held.centrifugal[:] = 0.0
+    for number in range(3):
+        held.stretch[number] = state[MOTOR + number] - angles[number]
+        turning = 0.0
+        for axis in range(3):
+            turning += (held.jacobian[number, axis] - begin[number, axis]) * state[VELOCITY + axis]
+        for axis in range(3):
+            held.centrifugal[axis] -= parameters[ARM_INERTIA] * held.jacobian[number, axis] * turning * 2.0 / TICK_S
+    mass_matrix(parameters, held.jacobian, held.inverse_mass)
+    invert_in_place(held.inverse_mass)
+    return held
+
+
+@inlined
+def _accelerations(
+    state: FloatArray, parameters: FloatArray, held: Held, cables: FloatArray, force: FloatArray, change: FloatArray
+) -> None:
+    """Fills change (5,): accelerations of the handle against the base, and of the rocking."""
+    pull = np.empty(SIZE)
+    for axis in range(3):
+        pull[axis] = force[axis] + held.centrifugal[axis]
+        for number in range(3):
+            pull[axis] += held.jacobian[number, axis] * cables[number]
+    add_stops(state, parameters, pull)
+    for mode in range(MOUNTS):
+        pull[3 + mode] = -(
+            parameters[MOUNT_STIFFNESS + mode] * state[ROCKING + mode]
+            + parameters[MOUNT_DAMPING + mode] * state[ROCKING_SPEED + mode]
+        )
+        for axis in range(3):
+            pull[3 + mode] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * force[axis]
+    for row in range(SIZE):
+        total = 0.0
+        for column in range(SIZE):
+            total += held.inverse_mass[row, column] * pull[column]
+        change[row] = total
+
+
+@inlined
+def _absolute(parameters: FloatArray, change: FloatArray) -> None:
+    """Turns the handle's acceleration against the base into the one against the room."""
+    for mode in range(MOUNTS):
+        for axis in range(3):
+            change[axis] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * change[3 + mode]

@@ -1,0 +1,72 @@
+"""Inertia of what the cables pull: platform, handle and arms on a base that rocks."""
+
+from equalizer.signals.signal import FloatArray
+from study.devices.simulated.inlined import inlined
+from study.devices.simulated.layout import ARM_INERTIA, MOUNT_DIRECTION, MOUNT_MASS, MOUNTS, PLATFORM_MASS
+
+SIZE = 3 + MOUNTS
+
+
+@inlined
+def mass_matrix(parameters: FloatArray, jacobian: FloatArray, mass: FloatArray) -> None:
+    """Fills mass (5, 5) of (handle against base, rocking): from
+    2 T = |v + N r|² S + I |J v|² + r² M  with v the handle's velocity against the base, r the rocking speeds,
+    N their directions, S what moves with the handle, I the arms and M the base's modal masses."""
+    directions = parameters[MOUNT_DIRECTION : MOUNT_DIRECTION + 3 * MOUNTS].reshape((MOUNTS, 3))
+    carried = parameters[PLATFORM_MASS : PLATFORM_MASS + 9].reshape((3, 3))
+    for row in range(3):
+        for column in range(3):
+            arms = 0.0
+            for number in range(3):
+                arms += jacobian[number, row] * jacobian[number, column]
+            mass[row, column] = carried[row, column] + parameters[ARM_INERTIA] * arms
+        for mode in range(MOUNTS):
+            shared = 0.0
+            for axis in range(3):
+                shared += carried[row, axis] * directions[mode, axis]
+            mass[row, 3 + mode] = shared
+            mass[3 + mode, row] = shared
+    for mode in range(MOUNTS):
+        for other in range(MOUNTS):
+            shared = 0.0
+            for axis in range(3):
+                shared += directions[mode, axis] * mass[axis, 3 + other]
+            mass[3 + mode, 3 + other] = shared
+        mass[3 + mode, 3 + mode] += parameters[MOUNT_MASS + mode]
+
+
+@inlined
+def invert_in_place(matrix: FloatArray) -> None:
+    """Gauss and Jordan without pivots: for a positive definite matrix of five rows."""
+    for pivot in range(SIZE):
+        scale = 1.0 / matrix[pivot, pivot]
+        matrix[pivot, pivot] = 1.0
+        for column in range(SIZE):
+            matrix[pivot, column] *= scale
+        for row in range(SIZE):
+            if row != pivot:
+                factor = matrix[row, pivot]
+                matrix[row, pivot] = 0.0
+                for column in range(SIZE):
+                    matrix[row, column] -= factor * matrix[pivot, column]
+
+
+@inlined
+def transposed_solve(jacobian: FloatArray, force: FloatArray, torque: FloatArray) -> None:
+    """Fills torque (3,) with jacobian^T torque = force, by cofactors."""
+    j = jacobian
+    c0 = j[1, 1] * j[2, 2] - j[1, 2] * j[2, 1]
+    c1 = j[1, 2] * j[2, 0] - j[1, 0] * j[2, 2]
+    c2 = j[1, 0] * j[2, 1] - j[1, 1] * j[2, 0]
+    scale = 1.0 / (j[0, 0] * c0 + j[0, 1] * c1 + j[0, 2] * c2)
+    torque[0] = scale * (force[0] * c0 + force[1] * c1 + force[2] * c2)
+    torque[1] = scale * (
+        force[0] * (j[0, 2] * j[2, 1] - j[0, 1] * j[2, 2])
+        + force[1] * (j[0, 0] * j[2, 2] - j[0, 2] * j[2, 0])
+        + force[2] * (j[0, 1] * j[2, 0] - j[0, 0] * j[2, 1])
+    )
+    torque[2] = scale * (
+        force[0] * (j[0, 1] * j[1, 2] - j[0, 2] * j[1, 1])
+        + force[1] * (j[0, 2] * j[1, 0] - j[0, 0] * j[1, 2])
+        + force[2] * (j[0, 0] * j[1, 1] - j[0, 1] * j[1, 0])
+    )

@@ -1,0 +1,7 @@
+"""How every function within a tick is compiled."""
+
+from numba import njit
+
+inlined = njit(forceinline=True, error_model="numpy")
+"""A third faster than calls. Division by zero gives inf or NaN, which the safety layer knows, and never an exception
+halfway through a tick."""

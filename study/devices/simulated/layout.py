@@ -1,0 +1,77 @@
+"""Where each number stands in the flat arrays that the compiled functions share."""
+
+MODES = 6
+"""Handle modes; a shape, so known when compiled."""
+MOUNTS = 2
+SUBSTEPS = 10
+"""Steps of integration in a tick."""
+TICK_S = 1e-3
+STEP_S = TICK_S / SUBSTEPS
+
+# State, SI units.
+RELATIVE = 0
+"""Handle's position and then velocity, against the base."""
+VELOCITY = RELATIVE + 3
+MOTOR = VELOCITY + 3
+"""Motor angles, behind the capstans, and then speeds."""
+MOTOR_SPEED = MOTOR + 3
+ROCKING = MOTOR_SPEED + 3
+"""The mount's modal displacements at the handle, and speeds."""
+ROCKING_SPEED = ROCKING + MOUNTS
+BENDING = ROCKING_SPEED + MOUNTS
+"""The handle modes' displacements against the platform, and speeds."""
+BENDING_SPEED = BENDING + MODES
+TORQUE = BENDING_SPEED + MODES
+"""Motor torques behind the amplifiers' bandwidth."""
+BRISTLE = TORQUE + 3
+FILTERED = BRISTLE + 3
+"""Acceleration behind the accelerometer's bandwidth."""
+TRUE = FILTERED + 3
+"""Acceleration of the accelerometer's place."""
+STATE_SIZE = TRUE + 3
+
+# Parameters, SI units.
+UPPER_ARM = 0
+FOREARM = 1
+RADIUS = 2
+PLATFORM_DEPTH = 3
+AZIMUTH = 4
+"""Cosine and sine of each leg's azimuth."""
+PLATFORM_MASS = AZIMUTH + 6
+"""(3, 3): what moves with the platform and is no handle mode; with the hand's mass."""
+ARM_INERTIA = PLATFORM_MASS + 9
+DRIVE_INERTIA = ARM_INERTIA + 1
+AMPLIFIER = DRIVE_INERTIA + 1
+"""Part of the way that the torque goes in one step."""
+FRICTION = AMPLIFIER + 1
+PRESLIDING = FRICTION + 1
+DRIVE_DAMPING = PRESLIDING + 1
+CABLE = DRIVE_DAMPING + 1
+CABLE_DAMPING = CABLE + 3
+COUNT = CABLE_DAMPING + 3
+"""One encoder count, rad."""
+MOUNT_MASS = COUNT + 1
+MOUNT_STIFFNESS = MOUNT_MASS + MOUNTS
+MOUNT_DAMPING = MOUNT_STIFFNESS + MOUNTS
+MOUNT_DIRECTION = MOUNT_DAMPING + MOUNTS
+"""(MOUNTS, 3), unit vectors."""
+MODE_MASS = MOUNT_DIRECTION + 3 * MOUNTS
+MODE_STIFFNESS = MODE_MASS + MODES
+MODE_DAMPING = MODE_STIFFNESS + MODES
+MODE_GAIN = MODE_DAMPING + MODES
+MODE_DIRECTION = MODE_GAIN + MODES
+"""(MODES, 3), unit vectors."""
+HAND_DAMPING = MODE_DIRECTION + 3 * MODES
+HAND_STIFFNESS = HAND_DAMPING + 3
+HAND_REST = HAND_STIFFNESS + 3
+STOP_RADIUS = HAND_REST + 3
+STOP_STIFFNESS = STOP_RADIUS + 1
+STOP_DAMPING = STOP_STIFFNESS + 1
+SENSOR_POLE = STOP_DAMPING + 1
+"""Part of the way that the filtered acceleration goes in one step."""
+SENSOR_MATRIX = SENSOR_POLE + 1
+"""(3, 3): from device axes to the sensor's channels."""
+SENSOR_NOISE = SENSOR_MATRIX + 9
+"""Standard deviation of each channel, m/s²."""
+SENSOR_RANGE = SENSOR_NOISE + 3
+PARAMETERS_SIZE = SENSOR_RANGE + 1

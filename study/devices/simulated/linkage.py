@@ -1,0 +1,93 @@
+"""Kinematics of the delta linkage: handle position to joint angles and back, in closed form.
+
+Axes as everywhere: x from the base towards the operator, y right, z up. A leg's plane contains x and the leg's radial
+direction u. Clavel's delta: an actuated upper arm from the base's rim, a parallelogram forearm to the platform, so
+that only the difference of the two radii matters. With the angle q of an upper arm out of the base plane its elbow,
+moved inwards by the platform's radius, is
+
+    e(q) = (radius + upper_arm cos q) u + upper_arm sin q x,     |p - e(q)| = forearm,
+
+three spheres about the handle's position p. Source: R. Clavel, "Conception d'un robot parallèle rapide à 4 degrés de
+liberté", thesis 925, EPFL 1991.
+"""
+
+import math
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.simulated.inlined import inlined
+from study.devices.simulated.layout import AZIMUTH, FOREARM, PLATFORM_DEPTH, RADIUS, UPPER_ARM
+
+
+@inlined
+def leg(parameters: FloatArray, position: FloatArray, number: int, row: FloatArray) -> float:
+    """Joint angle of one leg, rad, elbow outwards; `row` becomes d angle / d position, rad/m.
+
+    Out of reach the arm points at the handle: finite, and never met inside the stops.
+    """
+    upper, forearm = parameters[UPPER_ARM], parameters[FOREARM]
+    cosine, sine = parameters[AZIMUTH + 2 * number], parameters[AZIMUTH + 2 * number + 1]
+    depth = position[0] + parameters[PLATFORM_DEPTH]
+    inward = position[1] * cosine + position[2] * sine - parameters[RADIUS]
+    across = position[2] * cosine - position[1] * sine
+    reach = math.sqrt(inward * inward + depth * depth)
+    closing = (reach * reach + across * across + upper * upper - forearm * forearm) / (2.0 * upper * reach)
+    closing = min(1.0, max(-1.0, closing))
+    opening = math.sqrt(1.0 - closing * closing)
+    cos_q = (inward * closing + depth * opening) / reach
+    sin_q = (depth * closing - inward * opening) / reach
+    radial = inward - upper * cos_q
+    axial = depth - upper * sin_q
+    lever = upper * (axial * cos_q - radial * sin_q)
+    row[0] = axial / lever
+    row[1] = (radial * cosine - across * sine) / lever
+    row[2] = (radial * sine + across * cosine) / lever
+    return math.atan2(sin_q, cos_q)
+
+
+@inlined
+def inverse_kinematics(parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray) -> None:
+    """Fills angles (3,), rad, and jacobian (3, 3), joint speeds = jacobian @ handle velocity, rad/m."""
+    for number in range(3):
+        angles[number] = leg(parameters, position, number, jacobian[number])
+
+
+@inlined
+def forward_kinematics(parameters: FloatArray, angles: FloatArray, position: FloatArray) -> None:
+    """Fills position (3,), m: the outer one of the two points at forearm's length from all three elbows."""
+    elbows = np.empty((3, 3))
+    for number in range(3):
+        radial = parameters[RADIUS] + parameters[UPPER_ARM] * math.cos(angles[number])
+        elbows[number, 0] = parameters[UPPER_ARM] * math.sin(angles[number])
+        elbows[number, 1] = radial * parameters[AZIMUTH + 2 * number]
+        elbows[number, 2] = radial * parameters[AZIMUTH + 2 * number + 1]
+    first, second, normal = np.empty(3), np.empty(3), np.empty(3)
+    for axis in range(3):
+        first[axis] = elbows[1, axis] - elbows[0, axis]
+        second[axis] = elbows[2, axis] - elbows[0, axis]
+    _cross(first, second, normal)
+    g11, g12, g22 = _dot(first, first), _dot(first, second), _dot(second, second)
+    area = g11 * g22 - g12 * g12
+    along_first = 0.5 * g22 * (g11 - g12) / area
+    along_second = 0.5 * g11 * (g22 - g12) / area
+    centre = along_first * along_first * g11 + 2.0 * along_first * along_second * g12 + along_second**2 * g22
+    height = math.sqrt(max(parameters[FOREARM] ** 2 - centre, 0.0) / area)
+    if normal[0] < 0.0:
+        height = -height
+    for axis in range(3):
+        in_plane = along_first * first[axis] + along_second * second[axis]
+        position[axis] = elbows[0, axis] + in_plane + height * normal[axis]
+    position[0] -= parameters[PLATFORM_DEPTH]
+
+
+@inlined
+def _dot(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@inlined
+def _cross(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,42 @@
+"""The simulated omega.3 as a rig. What it is and is not: docs/simulated_omega3.md."""
+
+import math
+
+import numpy as np
+
+from study.devices.device import DeviceInfo
+from study.devices.rig import CompiledRig
+from study.devices.simulated.compiled import advance, sense
+from study.devices.simulated.layout import TICK_S
+from study.devices.simulated.packing import effective_mass_kg, pack_parameters, state_at_rest
+from study.devices.simulated.parameters import Omega3Parameters, Vector
+
+NAME = "simulated omega.3"
+MAX_FORCE_N = 12.0
+
+
+def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0)) -> CompiledRig:
+    """A device at rest at place_m, gravity compensated. `seed`: of the accelerometer's noise, any integer >= 0.
+
+    Raises ValueError for a place within the stops.
+    """
+    parameters = Omega3Parameters()
+    if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
+        raise ValueError(f"place_m must be within {parameters.stops.radius_m} m of the centre, not {place_m}")
+    packed = pack_parameters(parameters, hand, place_m)
+    info = DeviceInfo(
+        name=NAME,
+        simulated=True,
+        sample_rate_hz=1.0 / TICK_S,
+        max_force_n=MAX_FORCE_N,
+        effective_mass_kg=effective_mass_kg(parameters, packed),
+        details=f"parameter set 1, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}",
+    )
+    return CompiledRig(
+        info=info,
+        state=state_at_rest(packed, place_m),
+        parameters=packed,
+        noise=np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64),
+        sense=sense,
+        advance=advance,
+    )

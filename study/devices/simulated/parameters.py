@@ -1,0 +1,136 @@
+"""The one parameter set of the simulated omega.3. Not tuned per figure; see docs/simulated_omega3.md.
+
+No link length, inertia, friction or stiffness of the omega.3 is public. What follows is a device of its size, with
+the reason for each number: a source where there is one, otherwise the feature of the published measurements that the
+number was chosen to give.
+"""
+
+from dataclasses import dataclass, field
+
+Vector = tuple[float, float, float]
+
+GRAVITY_M_S2 = 9.81
+
+
+@dataclass(frozen=True, slots=True)
+class Linkage:
+    """Falcon geometry (libnifalcon, FalconGeometry.h) times 1.6, which gives the omega.3's workspace of
+    160 mm x 110 mm (its data sheet). Hinge offsets of the Falcon's parallelograms (11 mm) are left out."""
+
+    upper_arm_m: float = 1.6 * 0.060
+    forearm_m: float = 1.6 * 0.1025
+    radius_m: float = 1.6 * (0.040 - 0.01443)
+    """Base radius less platform radius."""
+    azimuths_deg: Vector = (90.0, 210.0, 330.0)
+    """From y towards z. First leg upright, as the omega.3 stands: the x-z plane is a mirror plane."""
+
+
+@dataclass(frozen=True, slots=True)
+class Masses:
+    """Lumped model (Codourey 1998): two thirds of a forearm at its elbow, one third at the platform."""
+
+    handle_kg: float = 0.128
+    """Platform and handle: with the forearms' share the 0.148 kg of CHAI3D-based configurations of the omega.3."""
+    forearm_kg: float = 0.020
+    upper_arm_kg_m2: float = 0.8e-4
+    """Carbon or aluminium arm of 25 g about its pivot. Counterweighted: a moving base does not turn it."""
+    drive_kg_m2: float = 5.3e-4
+    """Rotor of 33 g cm² (a 30 mm precious-metal DC motor) behind a capstan of ratio 12, and the drum."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drives:
+    """One per leg: amplifier, motor, capstan and cable."""
+
+    amplifier_hz: float = 600.0
+    """One-pole current loop: common bandwidth of such amplifiers."""
+    friction_n_m: float = 9.0e-3
+    """Coulomb level (brushes, bearings, cable): 0.20 N at the handle along z, about 2 % of full force."""
+    presliding_rad: float = 2.0e-4
+    """Dahl's break-away length: 18 um at the handle, cable and ball-bearing order."""
+    damping_n_m_s: float = 5.5e-2
+    """Back-EMF and grease: 10 N s/m at the handle, so that friction and damping dominate below 10 Hz."""
+    cable_n_m_per_rad: Vector = (104.0, 92.0, 118.0)
+    """17-22 N/mm at the handle, order of the data sheet's 14.5 N/mm closed loop; puts the first structural modes
+    from 80 Hz. Unequal, as tensioned by hand: this is what couples there."""
+    cable_damping_ratio: float = 0.03
+    counts_per_turn: float = 48000.0
+    """1000 lines, four edges, ratio 12: 9.6 um at the handle; the data sheet says below 10 um."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Base on its feet and table: two rocking modes, seen at the handle along oblique directions. Invented; chosen by
+    the coupling published at 15, 25 and 35 Hz."""
+
+    frequencies_hz: tuple[float, float] = (20.0, 26.6)
+    damping_ratios: tuple[float, float] = (0.06, 0.06)
+    masses_kg: tuple[float, float] = (2.7, 1.1)
+    """Modal, at the handle: a base of 5 kg or so that rocks below the handle's height."""
+    directions: tuple[Vector, Vector] = ((0.88, 0.42, 0.23), (0.18, 0.15, 0.97))
+
+
+@dataclass(frozen=True, slots=True)
+class HandleModes:
+    """What swings on the platform. First the loom, sensor lead and cover that hang on it, lumped, on an oblique soft
+    spring: the coupled resonance near 11 Hz. Then bending and twisting of handle, platform and forearms, more and
+    more coupled. Invented; published are only the 11 Hz and that there are large modes from 80 Hz on."""
+
+    frequencies_hz: tuple[float, ...] = (10.9, 134.0, 188.0, 251.0, 322.0, 391.0)
+    damping_ratios: tuple[float, ...] = (0.028, 0.03, 0.025, 0.025, 0.022, 0.022)
+    masses_kg: tuple[float, ...] = (0.019, 0.008, 0.008, 0.007, 0.006, 0.006)
+    gains: tuple[float, ...] = (0.0, 0.3, 0.35, 0.4, 0.5, 0.6)
+    """How much of a mode's displacement the accelerometer's place shares."""
+    directions: tuple[Vector, ...] = (
+        (0.85, 0.53, -0.02),
+        (0.3, 0.8, 0.5),
+        (0.8, -0.4, 0.5),
+        (0.5, 0.5, -0.7),
+        (-0.6, 0.6, 0.5),
+        (0.4, -0.5, 0.8),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """A light three-finger grip on the handle, resting where the handle starts. Fingers and wrist: order of pen-hold
+    and pinch measurements (Hasser and Cutkosky 2002; Israr, Choi and Tan 2006), well below a whole arm's
+    0.55 kg, 6.5 N s/m, 135 N/m (Sci. Rep. srep18004)."""
+
+    mass_kg: Vector = (0.08, 0.10, 0.09)
+    damping_n_s_per_m: Vector = (4.5, 3.4, 3.8)
+    stiffness_n_per_m: Vector = (150.0, 100.0, 120.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Accelerometer:
+    """ADXL335 (Analog Devices, Rev. B), at 3 V, 10 nF per axis."""
+
+    noise_g_per_rthz: Vector = (150e-6, 150e-6, 300e-6)
+    bandwidth_hz: float = 500.0
+    range_g: float = 3.0
+    turns_deg: Vector = (0.7, -0.8, 0.9)
+    """Mounting error about x, y, z: package tolerance is 1 degree."""
+    cross_axis: Vector = (0.010, -0.008, 0.009)
+    """Of yz, zx, xy: the data sheet's 1 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stops:
+    """Soft ends of the workspace: no force within the radius that CHAI3D states as usable."""
+
+    radius_m: float = 0.075
+    stiffness_n_per_m: float = 2500.0
+    damping_n_s_per_m: float = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class Omega3Parameters:
+    linkage: Linkage = field(default_factory=Linkage)
+    masses: Masses = field(default_factory=Masses)
+    drives: Drives = field(default_factory=Drives)
+    mount: Mount = field(default_factory=Mount)
+    handle_modes: HandleModes = field(default_factory=HandleModes)
+    hand: Hand = field(default_factory=Hand)
+    accelerometer: Accelerometer = field(default_factory=Accelerometer)
+    stops: Stops = field(default_factory=Stops)
