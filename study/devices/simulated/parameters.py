@@ -14,13 +14,14 @@ GRAVITY_M_S2 = 9.81
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """Falcon geometry (libnifalcon, FalconGeometry.h) times 1.6, which gives the omega.3's workspace of
-    160 mm x 110 mm (its data sheet). Hinge offsets of the Falcon's parallelograms (11 mm) are left out."""
+    """Arms of the Falcon (libnifalcon, FalconGeometry.h) times 1.6, which gives about the omega.3's workspace of
+    160 mm x 110 mm (its data sheet). The hinge offsets of the Falcon's parallelograms (11 mm) are left out."""
 
     upper_arm_m: float = 1.6 * 0.060
     forearm_m: float = 1.6 * 0.1025
-    radius_m: float = 1.6 * (0.040 - 0.01443)
-    """Base radius less platform radius."""
+    radius_m: float = 0.055
+    """Base radius less platform radius. The Falcon's would be 0.041 m: without its hinge offsets the legs then fold
+    60 mm behind the isotropic point. With this one they stay well away from folding within the stops."""
     azimuths_deg: Vector = (90.0, 210.0, 330.0)
     """From y towards z. First leg upright, as the omega.3 stands: the x-z plane is a mirror plane."""
 
@@ -32,10 +33,10 @@ class Masses:
     handle_kg: float = 0.128
     """Platform and handle: with the forearms' share the 0.148 kg of CHAI3D-based configurations of the omega.3."""
     forearm_kg: float = 0.020
-    upper_arm_kg_m2: float = 0.8e-4
-    """Carbon or aluminium arm of 25 g about its pivot. Counterweighted: a moving base does not turn it."""
-    drive_kg_m2: float = 5.3e-4
-    """Rotor of 33 g cm² (a 30 mm precious-metal DC motor) behind a capstan of ratio 12, and the drum."""
+    upper_arm_kg_m2: float = 1.5e-4
+    """Aluminium arm of 35 g with its hinge, about its pivot. Counterweighted: a moving base does not turn it."""
+    drive_kg_m2: float = 8.2e-4
+    """Rotor of 30 g cm² (DC motors of 30 mm: 10 to 35) behind a capstan of ratio 16, and the drum."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,18 +45,18 @@ class Drives:
 
     amplifier_hz: float = 600.0
     """One-pole current loop: common bandwidth of such amplifiers."""
-    friction_n_m: float = 9.0e-3
+    friction_n_m: float = 1.1e-2
     """Coulomb level (brushes, bearings, cable): 0.20 N at the handle along z, about 2 % of full force."""
-    presliding_rad: float = 2.0e-4
+    presliding_rad: float = 1.6e-4
     """Dahl's break-away length: 18 um at the handle, cable and ball-bearing order."""
-    damping_n_m_s: float = 5.5e-2
+    damping_n_m_s: float = 8.3e-2
     """Back-EMF and grease: 10 N s/m at the handle, so that friction and damping dominate below 10 Hz."""
-    cable_n_m_per_rad: Vector = (104.0, 92.0, 118.0)
+    cable_n_m_per_rad: Vector = (158.0, 140.0, 179.0)
     """17-22 N/mm at the handle, order of the data sheet's 14.5 N/mm closed loop; puts the first structural modes
     from 80 Hz. Unequal, as tensioned by hand: this is what couples there."""
     cable_damping_ratio: float = 0.03
-    counts_per_turn: float = 48000.0
-    """1000 lines, four edges, ratio 12: 9.6 um at the handle; the data sheet says below 10 um."""
+    counts_per_turn: float = 64000.0
+    """1000 lines, four edges, ratio 16: 8.8 um of motion along one leg's forearm; the data sheet says below 10 um."""
 
 
 @dataclass(frozen=True, slots=True)
