@@ -39,6 +39,9 @@ total_cap_n = 4.5
 frequencies_hz = [5.0]
 trial_limit = 4
 
+[trial]
+pause_between_s = 0.0
+
 [rests]
 after_run_s = 2.0
 
@@ -76,3 +79,10 @@ def rigs() -> ModuleType:
     module = sys.modules["rigs"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture
+def small_file(tmp_path, small_text) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(small_text)
+    return path

@@ -1,6 +1,6 @@
 """Line mode: the participant's part in plain sentences, for any terminal, a screen reader, or a pipe of answers."""
 
-from collections.abc import Callable
+import textwrap
 from typing import TextIO
 
 from protocols.trial import Phase
@@ -11,6 +11,7 @@ from study.tui.line_input import LineInput
 from study.workflows.display import SignOfLife
 
 GLANCE_S = 0.05
+LINE_WIDTH = 78
 KEYS = "Keys: 1 or 2 answers, r plays the trial again (drawn anew), q leaves, ? shows this. Each followed by Enter."
 
 
@@ -20,12 +21,10 @@ class PlainDisplay:
         lines: LineInput,
         out: TextIO,
         clock: Clock,
-        note: Callable[[str], None] | None = None,
     ) -> None:
         self._lines = lines
         self._out = out
         self._clock = clock
-        self._note = note
         self._picture: tuple[str, ...] = ()
 
     def welcome(self, notice: Welcome) -> None:
@@ -130,7 +129,9 @@ class PlainDisplay:
 
     def _say(self, *sentences: str) -> None:
         for text in sentences:
-            self._out.write(text + "\n")
+            # The picture's lines are short enough; sentences break between words.
+            lines = textwrap.wrap(text, LINE_WIDTH) if len(text) > LINE_WIDTH else [text]
+            self._out.write("\n".join(lines) + "\n")
         self._out.flush()
 
     def _prompt(self, text: str) -> None:

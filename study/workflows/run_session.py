@@ -1,12 +1,15 @@
 """The loop of a session: ask the machine what is next, do it, log it, until nothing is left."""
 
+import contextlib
 from dataclasses import dataclass
 
 from protocols.trial import Phase
+from study.errors import StudyError
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.machine import Finish, Present, Rest, next_action
 from study.session.state import SessionState, felt, labels_are_swapped
 from study.session.views import Goodbye, RestNotice, Welcome, picture_of
+from study.workflows.fold_session import fold_session
 from study.workflows.present_trial import present_trial
 from study.workflows.sitting import Sitting, record
 
@@ -26,12 +29,25 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     try:
         sitting.display.welcome(_welcome(state, sitting))
         end = _loop(state, sitting)
+    except KeyboardInterrupt:
+        sitting.device.stop()
+        _say_how_to_go_on(sitting)
+        raise
     except BaseException:
         sitting.device.stop()
         raise
     notice = Goodbye(finished=not end.left, answers=end.state.answers, folder=sitting.folder.name)
     sitting.display.goodbye(notice)
     return end
+
+
+def _say_how_to_go_on(sitting: Sitting) -> None:
+    """The device is free already. Neither a full disk nor a closed terminal may hide why the sitting ended."""
+    with contextlib.suppress(StudyError):
+        sitting.log.append(SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted at the keyboard"))
+    answers = fold_session(sitting.folder).state.answers
+    with contextlib.suppress(OSError):
+        sitting.display.goodbye(Goodbye(finished=False, answers=answers, folder=sitting.folder.name))
 
 
 def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
