@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from study.devices import govern
-from study.devices.block import run_block
+from study.devices.block import parts, run_block
 from study.devices.device import Fault
 from study.devices.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig, Rig
@@ -37,7 +37,7 @@ class CompiledRunner:
     catches_up = True
 
     def __init__(self, rig: CompiledRig, governor: Governor, block_ticks: int) -> None:
-        self._rig = rig
+        self._parts = parts(rig.sense, rig.advance)
         self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
         self._governor = governor
         self._block_ticks = block_ticks
@@ -63,7 +63,7 @@ class CompiledRunner:
     def _run_block(self, ticks: int) -> None:
         governor = self._governor
         arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force)
-        run_block(self._rig.sense, govern.tick, self._rig.advance, self._arrays, arrays, ticks)
+        run_block(*self._parts, self._arrays, arrays, ticks)
 
 
 class SteppedRunner:
