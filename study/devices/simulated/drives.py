@@ -29,19 +29,29 @@ def step_drives(
     stretch: FloatArray,
     cables: FloatArray,
 ) -> None:
-    """One step of the motors. Fills cables (3,), the torques on the arms, and moves stretch (3,) on."""
+    """One step of the motors. Fills cables (3,), the torques on the arms; stretch (3,) of the cables in rad."""
     for drive in range(3):
         arm_speed = 0.0
         for axis in range(3):
             arm_speed += jacobian[drive, axis] * state[VELOCITY + axis]
         speed = state[MOTOR_SPEED + drive]
         slip = speed - arm_speed
-        stretch[drive] += STEP_S * slip
         cables[drive] = parameters[CABLE + drive] * stretch[drive] + parameters[CABLE_DAMPING + drive] * slip
         state[TORQUE + drive] += parameters[AMPLIFIER] * (command[drive] - state[TORQUE + drive])
         bend = bent_bristle(state[BRISTLE + drive], STEP_S * speed, parameters[PRESLIDING])
         state[BRISTLE + drive] = bend
         resistance = parameters[FRICTION] * bend / parameters[PRESLIDING] + parameters[DRIVE_DAMPING] * speed
         torque = state[TORQUE + drive] - cables[drive] - resistance
-        state[MOTOR_SPEED + drive] = speed + STEP_S * torque / parameters[DRIVE_INERTIA]
+        speed += STEP_S * torque / parameters[DRIVE_INERTIA]
+        state[MOTOR_SPEED + drive] = speed
         state[MOTOR + drive] += STEP_S * speed
+
+
+@inlined
+def step_cables(state: FloatArray, jacobian: FloatArray, stretch: FloatArray) -> None:
+    """Moves stretch (3,) on, once motors and handle have their new speeds: with older ones the cables would damp."""
+    for drive in range(3):
+        slip = state[MOTOR_SPEED + drive]
+        for axis in range(3):
+            slip -= jacobian[drive, axis] * state[VELOCITY + axis]
+        stretch[drive] += STEP_S * slip

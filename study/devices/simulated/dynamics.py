@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.devices.simulated.drives import step_drives
+from study.devices.simulated.drives import step_cables, step_drives
 from study.devices.simulated.handle import handle_force, step_bending, step_sensor
 from study.devices.simulated.inertia import SIZE, invert_in_place, mass_matrix, transposed_solve
 from study.devices.simulated.inlined import inlined
@@ -60,6 +60,7 @@ def integrate_tick(state: FloatArray, parameters: FloatArray, force_n: FloatArra
         for axis in range(3):
             state[VELOCITY + axis] += STEP_S * change[axis]
             state[RELATIVE + axis] += STEP_S * state[VELOCITY + axis]
+        step_cables(state, held.jacobian, held.stretch)
         for mode in range(MOUNTS):
             state[ROCKING_SPEED + mode] += STEP_S * change[3 + mode]
             state[ROCKING + mode] += STEP_S * state[ROCKING_SPEED + mode]
