@@ -19,7 +19,7 @@ _RIG = types.Tuple((VECTOR, VECTOR, _NOISE, VECTOR))  # type: ignore[no-untyped-
 _GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR))  # type: ignore[no-untyped-call]
 
 
-class Part(types.WrapperAddressProtocol):  # type: ignore[misc]
+class Part(types.WrapperAddressProtocol):
     """A compiled function as a function pointer that is looked up once.
 
     numba looks a plain one up anew at every call of the loop: 0.3 ms, as long as a hundred ticks take.
@@ -28,7 +28,7 @@ class Part(types.WrapperAddressProtocol):  # type: ignore[misc]
     def __init__(self, function: Any, pointer_type: Any) -> None:
         self._numba_type_ = pointer_type
         self._signature = pointer_type.signature
-        self._address = _get_wrapper_address(function, pointer_type.signature)
+        self._address = _get_wrapper_address(function, pointer_type.signature)  # type: ignore[no-untyped-call]
 
     def __wrapper_address__(self) -> int:
         return int(self._address)
