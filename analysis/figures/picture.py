@@ -1,8 +1,11 @@
 """A figure together with what a page or a folder of files needs to show it."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from matplotlib.figure import Figure
+
+from analysis.figures.svg import inline_svg
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -14,3 +17,9 @@ class Picture:
     figure: Figure
     folded: bool = False
     """Shown in a report only when asked for."""
+
+
+@lru_cache(maxsize=256)
+def picture_svg(picture: Picture) -> str:
+    """As `inline_svg`. Drawn once, because the page and the file beside it want the same."""
+    return inline_svg(picture.figure, picture.name, picture.title)

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from analysis.figures.picture import Picture
-from analysis.figures.svg import inline_svg
+from analysis.figures.picture import Picture, picture_svg
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,4 +55,4 @@ def render_page(page: Page) -> str:
 
 def _svg(picture: Picture) -> Markup:
     # Our own drawing, with its title escaped by inline_svg.
-    return Markup(inline_svg(picture.figure, picture.name, picture.title))
+    return Markup(picture_svg(picture))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.ellipsoid import EllipsoidResult, ellipsoids
-from analysis.figures.picture import Picture
+from analysis.figures.picture import Picture, picture_svg
 from analysis.figures.study_pictures import study_pictures
 from analysis.reports.study_report import render_study_report
 from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
@@ -108,15 +108,16 @@ def _write(
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
     for picture in pictures:
-        for kind in ("svg", "png"):
-            write_atomically(figures / f"{picture.name}.{kind}", _drawn(picture, kind), overwrite=True)
+        write_text(figures / f"{picture.name}.svg", picture_svg(picture), overwrite=True)
+        if not picture.folded:
+            write_atomically(figures / f"{picture.name}.png", _png(picture), overwrite=True)
     page = render_study_report(analysis, pictures, _shown(provenance, collected), RealClock().utc(), shapes)
     write_text(out / "report.html", page, overwrite=True)
 
 
-def _drawn(picture: Picture, kind: str) -> bytes:
+def _png(picture: Picture) -> bytes:
     buffer = io.BytesIO()
-    picture.figure.savefig(buffer, format=kind, dpi=FIGURE_DPI)
+    picture.figure.savefig(buffer, format="png", dpi=FIGURE_DPI)
     return buffer.getvalue()
 
 
