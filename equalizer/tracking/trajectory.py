@@ -60,7 +60,10 @@ class Trajectory:
 
 def parse_trajectory(text: str) -> Trajectory:
     """A table of either kind, told apart by its header. Raises TableError."""
-    rows = list(csv.reader(io.StringIO(text.rstrip())))
+    try:
+        rows = list(csv.reader(io.StringIO(text.rstrip())))
+    except csv.Error as error:
+        raise TableError((f"this is not CSV: {error}",)) from error
     header = tuple(name.strip() for name in rows[0]) if rows else ()
     kind = next((kind for kind in TABLE_KINDS if kind.header == header), None)
     if kind is None:

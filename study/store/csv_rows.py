@@ -5,7 +5,7 @@ True and false as `true` and `false`, nothing as an empty field, numbers with al
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from enum import Enum
 from types import NoneType, UnionType
@@ -31,16 +31,16 @@ def columns(row_type: type[Any]) -> tuple[str, ...]:
 
 def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
     names = columns(row_type)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([_written(getattr(row, name)) for name in names] for row in rows)
-    return text.getvalue()
+    lines = [_line(names), *(_line([_written(getattr(row, name)) for name in names]) for row in rows)]
+    return "\n".join(lines) + "\n"
 
 
 def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
     """Columns beyond the known ones are left out. Raises CsvError."""
-    lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) if text.strip() else [[]]
+    try:
+        lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
+    except csv.Error as error:
+        raise CsvError((f"this is not CSV: {error}",)) from error
     problem = header_problem(tuple(lines[0]), columns(row_type))
     if problem:
         raise CsvError((problem,))
@@ -74,6 +74,13 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
             found = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
             return f"column {position} of the header {found}; it must be '{name}' (of {', '.join(expected)})"
     return ""
+
+
+def _line(fields_of_row: Sequence[str]) -> str:
+    text = io.StringIO()
+    # Only the characters of its own line end make the writer quote a field: with both, a carriage return is safe.
+    csv.writer(text, lineterminator="\r\n").writerow(fields_of_row)
+    return text.getvalue().removesuffix("\r\n")
 
 
 def in_words(hint: Any) -> str:

@@ -92,7 +92,8 @@ def _opened(path: Path, kind: str) -> Iterator[Any]:
     try:
         with h5py.File(path, "r") as file:
             yield file
-    except (OSError, RuntimeError, KeyError) as problem:
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError) as problem:
+        # All of these come out of h5py for damaged files; what is ours to say was said as an UnusableFileError.
         raise UnusableFileError(
             path, kind, (f"it is not HDF5 that can be read, or it is cut off ({problem})",)
         ) from problem

@@ -34,7 +34,10 @@ class FileContent:
     def header(self) -> tuple[str, ...]:
         """The first line's fields, if this were a table."""
         rows = csv.reader(io.StringIO((self.text or "").partition("\n")[0]))
-        return tuple(name.strip() for name in next(rows, []))
+        try:
+            return tuple(name.strip() for name in next(rows, []))
+        except csv.Error:
+            return ()
 
 
 def open_content(path: Path) -> FileContent:

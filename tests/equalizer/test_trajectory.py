@@ -79,6 +79,10 @@ def test_an_empty_text_has_no_header():
     assert the_problem("").startswith("line 1 reads ''; allowed is time_s,ax,ay,az")
 
 
+def test_a_text_that_is_no_table_is_refused():
+    assert the_problem(GOOD.replace("4,5,6", "4\r5,6")).startswith("this is not CSV: new-line character seen")
+
+
 def test_of_many_faults_the_first_are_named_and_the_rest_counted():
     with pytest.raises(TableError) as refused:
         parse_trajectory("time_s,ax,ay,az\n" + "0,0,0\n" * 20)

@@ -79,6 +79,17 @@ def test_columns_after_the_known_ones_do_no_harm():
     assert rows_from_csv(f"{lines[0]},more\r\n{lines[1]},1\r\n", Trial) == (TRIAL,)
 
 
+@pytest.mark.parametrize("odd", ["\r", "a\rb", "a\nb", "\r\n", 'a"b', "a,b", " ", "", "\x00"])
+def test_a_name_may_hold_what_tables_are_made_of(odd):
+    row = replace(TRIAL, session=odd)
+    assert rows_from_csv(rows_to_csv([row], Trial), Trial) == (row,)
+
+
+def test_a_text_that_is_no_table_is_refused():
+    with pytest.raises(CsvError, match="this is not CSV: new-line character seen in unquoted field"):
+        rows_from_csv("subject\rsession,x\n", Trial)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
