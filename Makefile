@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove-study clean
+.PHONY: help study test check fix bench prove-study docs clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -35,6 +35,9 @@ bench: $(VENV)/.installed-test ## Time ours against named peers; prints ratios
 
 prove-study: $(VENV)/.installed-test ## The slow proofs of the study: 100 killed sessions, long fuzzing
 	$(BIN)/python -m pytest -m slow
+
+docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
+	$(BIN)/python -m study.workflows.format_docs docs
 
 clean: ## Remove the environment and all caches
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

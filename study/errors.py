@@ -1,6 +1,7 @@
 """One kind of error for screen and command line: what happened, what was saved, what to do now."""
 
 from enum import IntEnum
+from typing import Any
 
 
 class ExitCode(IntEnum):
@@ -28,6 +29,10 @@ class StudyError(Exception):
         self.saved = saved
         self.do_now = do_now
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Errors cross from worker processes; a subclass with a constructor of its own must survive that too."""
+        return _restored, (type(self), self.__dict__)
+
     def __str__(self) -> str:
         return " ".join(part for part in (f"{self.title}.", self.happened, self.saved, self.do_now) if part)
 
@@ -42,3 +47,16 @@ class DeviceError(StudyError):
     """The device cannot be used, or stopped working."""
 
     exit_code = ExitCode.DEVICE
+
+
+class LeftError(StudyError):
+    """Somebody pressed Ctrl-C or closed the terminal, and what was done so far is safe."""
+
+    exit_code = ExitCode.INTERRUPTED
+
+
+def _restored(kind: type[StudyError], fields: dict[str, Any]) -> StudyError:
+    error = kind.__new__(kind)
+    error.__dict__.update(fields)
+    error.args = (error.title,)
+    return error

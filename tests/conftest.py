@@ -50,7 +50,7 @@ keep_s = 0.2
 """
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def small_text() -> str:
     return SMALL
 

@@ -7,9 +7,8 @@ imports what it needs.
 import signal
 import sys
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
-import click
 import typer
 
 from study.cli import analyze, protocol, record, rehearse, resume, study, validate, withdraw
@@ -31,6 +30,10 @@ app.command("record")(record.record)
 app.add_typer(protocol.app, name="protocol")
 app.command("withdraw")(withdraw.withdraw)
 app.command("validate")(validate.validate)
+
+
+WrongCommandLine: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+"""What typer raises for an unknown command or a bad option; its module differs between versions of typer."""
 
 
 def _version(wanted: bool) -> None:
@@ -61,11 +64,10 @@ def main(arguments: list[str] | None = None) -> int:
     except StudyError as error:
         say(error)
         return error.exit_code
-    except click.ClickException as error:
+    except WrongCommandLine as error:
         error.show()
         return ExitCode.WRONG_USE
-    except (KeyboardInterrupt, click.Abort):
-        sys.stderr.write("\nInterrupted.\n")
+    except (KeyboardInterrupt, typer.Abort):
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
         return ExitCode.ERROR

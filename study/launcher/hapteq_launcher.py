@@ -1,7 +1,7 @@
 """Start hapteq, once it is sure that its four packages are its own.
 
 Their names are generic. A stranger's `analysis.py` or `study.py` on the import path would be taken for ours, and
-the program would die of a riddle. This module has a name of its own, so that it can say so instead.
+the program would die of a riddle. This module is installed under a name of its own, so that it can say so instead.
 """
 
 import importlib.util
@@ -11,19 +11,23 @@ from pathlib import Path
 PACKAGES = ("study", "analysis", "equalizer", "protocols")
 
 
-def home() -> Path:
-    """The folder in which the four packages lie: beside this file when installed, the checkout otherwise."""
-    here = Path(__file__).resolve().parent
-    return here.parent.parent if here.name == "launcher" else here
+def home() -> Path | None:
+    """The one folder on the import path that holds all four packages."""
+    for entry in sys.path:
+        folder = Path(entry or ".").resolve()
+        if all((folder / name / "__init__.py").is_file() for name in PACKAGES):
+            return folder
+    return None
 
 
 def strangers() -> list[Path]:
     """What would be imported under one of our names without being ours."""
+    ours = home()
     found = []
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
-        if origin is not None and origin != home() / name / "__init__.py":
+        if origin is not None and (ours is None or origin != ours / name / "__init__.py"):
             found.append(origin)
     return found
 

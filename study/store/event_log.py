@@ -7,6 +7,7 @@ from pathlib import Path
 
 from study.errors import StudyError
 from study.session.events import Event, event_line, parse_event
+from study.store.atomic_write import sync_folder
 
 LOG_NAME = "events.jsonl"
 
@@ -22,7 +23,7 @@ class EventLog:
     def create(cls, path: Path) -> "EventLog":
         """Raises FileExistsError rather than touch an existing log."""
         descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o644)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
         return cls(path, descriptor)
 
     @classmethod
@@ -94,17 +95,6 @@ def _event(path: Path, number: int, line: bytes) -> Event:
 def _write_all(descriptor: int, data: bytes) -> None:
     while data:
         data = data[os.write(descriptor, data) :]
-
-
-def _sync_folder(folder: Path) -> None:
-    """A new file's name is only safe once its folder is on the disk too."""
-    if os.name != "posix":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _not_saved(path: Path, event: Event, problem: OSError) -> StudyError:

@@ -62,7 +62,7 @@ def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: boo
             write_texts(file, name, getattr(model, name))
         for name in ("A", "B", "C", "D", "covariance", "samples"):
             if getattr(model, name) is not None:
-                file.create_dataset(name, data=getattr(model, name))
+                file.create_dataset(name, data=getattr(model, name), fletcher32=True)
         file.attrs["provenance"] = json.dumps(dict(model.provenance), allow_nan=False)
 
     write_hdf5(path, fill, overwrite=overwrite)

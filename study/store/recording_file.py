@@ -71,7 +71,7 @@ def write_recording(
         for name, signal in signals_of(recording).items():
             _write_signal(file, name, signal, "float64" if name == "position" else precision)
         if recording.time_s is not None:
-            file.create_dataset("time_s", data=np.asarray(recording.time_s, dtype=np.float64))
+            file.create_dataset("time_s", data=np.asarray(recording.time_s, dtype=np.float64), fletcher32=True)
         rows = np.array([astuple(segment) for segment in recording.segments], dtype=_SEGMENT_TYPE)
         file.create_dataset("segments", data=rows)
         meta = file.create_group("meta")
@@ -163,7 +163,8 @@ def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:
     samples = signal.samples.astype(precision)
     # A session keeps thousands of short recordings: they are written faster as they are.
     packed = {"compression": "gzip", "shuffle": True} if samples.nbytes > _PACK_ABOVE_BYTES else {}
-    dataset = file.create_dataset(name, data=samples, **packed)
+    # With a checksum: a sample that a disk changed is found when it is read.
+    dataset = file.create_dataset(name, data=samples, fletcher32=True, **packed)
     write_texts(dataset, "quantity", signal.quantity)
     write_texts(dataset, "unit", signal.unit)
     write_texts(dataset, "channels", signal.channels)

@@ -1,6 +1,5 @@
 """The recording of each trial, beside the log: written once, named by run, trial and attempt."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 from equalizer.signals.recording import Recording
 from study.store.archive import SessionFolder
+from study.store.provenance import sha256_of
 from study.store.recording_file import read_recording, write_recording
 
 
@@ -25,10 +25,14 @@ def recording_name(run: int, trial: int, attempt: int) -> str:
 def save_trial_recording(
     folder: SessionFolder, name: str, recording: Recording, conditions: Mapping[str, Any]
 ) -> SavedRecording:
-    """On return it is on the disk. conditions: JSON values that say what was played and how the device fared."""
+    """On return it is on the disk. conditions: JSON values that say what was played and how the device fared.
+
+    Nothing is overwritten: where a disk lost the end of a log but not its recordings, the name gets a number.
+    """
+    name = _free_name(folder.path, name)
     path = folder.path / name
     write_recording(path, replace(recording, meta={**recording.meta, **conditions}), precision="float32")
-    return SavedRecording(name, _sha256(path))
+    return SavedRecording(name, sha256_of(path))
 
 
 def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
@@ -36,8 +40,13 @@ def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecordi
     path = folder.path / name
     if not path.exists():
         return None
-    return SavedRecording(name, _sha256(path)), read_recording(path)
+    return SavedRecording(name, sha256_of(path)), read_recording(path)
 
 
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _free_name(folder: Path, name: str) -> str:
+    taken = 1
+    free = name
+    while (folder / free).exists():
+        taken += 1
+        free = name.replace(".h5", f"_{taken}.h5")
+    return free

@@ -17,6 +17,7 @@ from equalizer.signals.units import ALLOWED
 from equalizer.tracking.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.schema import protocol_schema
 from protocols.trial import Trial
+from study.session.events import EVENTS
 from study.store import identified_model_file, mechanical_model_file, recording_layout
 from study.store.csv_rows import columns, in_words
 from study.store.layout import Entry
@@ -44,6 +45,7 @@ def document_schema(payload: Mapping[str, Any], format_name: str, version: int) 
 
 SCHEMAS: tuple[Schema, ...] = (
     Schema("study_protocol.json", "study protocols, read from TOML", lambda: protocol_schema("study")),
+    Schema("session_event.json", "one line of `events.jsonl`", EVENTS.json_schema),
     Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: protocol_schema("recording")),
     Schema(
         "diagnosis.json",

@@ -1,5 +1,6 @@
 """A whole study of simulated participants, several at once; begun ones are resumed, finished ones left alone."""
 
+import signal
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from pathlib import Path
 
 from protocols.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
-from study.errors import StudyError
+from study.errors import LeftError, StudyError
 from study.participants.population import population
 from study.store.archive import SessionFolder, session_folders
 from study.workflows.conduct_session import conduct_new, conduct_resumed
@@ -36,15 +37,29 @@ def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[],
     """
     _check_same(rehearsal)
     # Forking a process with numba's and the device's threads in it is not safe; a spawned one starts clean.
-    with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn")) as pool:
+    context = get_context("spawn")
+    with ProcessPoolExecutor(max_workers=workers, mp_context=context, initializer=_leave_ctrl_c_to_the_parent) as pool:
         futures = [pool.submit(_sit, rehearsal, number) for number in range(rehearsal.subjects)]
         try:
             for future in as_completed(futures):
                 future.result()
                 on_finished()
+        except KeyboardInterrupt as interruption:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise LeftError(
+                "Interrupted",
+                "The rehearsal is not finished.",
+                "Run the same command again: it goes on where it stopped.",
+                saved=f"All sessions begun so far are in {rehearsal.data}.",
+            ) from interruption
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _leave_ctrl_c_to_the_parent() -> None:
+    """A terminal sends Ctrl-C to all. Sessions that are running finish, which takes seconds; no other is begun."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def subject_code(number: int) -> str:

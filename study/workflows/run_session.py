@@ -4,7 +4,7 @@ import contextlib
 from dataclasses import dataclass
 
 from protocols.trial import Phase
-from study.errors import StudyError
+from study.errors import LeftError, StudyError
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.machine import Finish, Present, Rest, next_action
 from study.session.state import SessionState, felt, labels_are_swapped
@@ -24,15 +24,14 @@ class SessionEnd:
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run until the session is finished or somebody leaves.
 
-    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and is passed on.
+    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and leaves as LeftError.
     """
     try:
         sitting.display.welcome(_welcome(state, sitting))
         end = _loop(state, sitting)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interruption:
         sitting.device.stop()
-        _say_how_to_go_on(sitting)
-        raise
+        raise _left(sitting) from interruption
     except BaseException:
         sitting.device.stop()
         raise
@@ -41,13 +40,17 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     return end
 
 
-def _say_how_to_go_on(sitting: Sitting) -> None:
-    """The device is free already. Neither a full disk nor a closed terminal may hide why the sitting ended."""
+def _left(sitting: Sitting) -> LeftError:
+    """The device is free already. A full disk must not hide why the sitting ended."""
     with contextlib.suppress(StudyError):
         sitting.log.append(SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted at the keyboard"))
     answers = fold_session(sitting.folder).state.answers
-    with contextlib.suppress(OSError):
-        sitting.display.goodbye(Goodbye(finished=False, answers=answers, folder=sitting.folder.name))
+    return LeftError(
+        "Interrupted",
+        "The force was released.",
+        f"Go on with: hapteq resume {sitting.folder.path}",
+        saved=f"{answers} answers are on disk.",
+    )
 
 
 def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:

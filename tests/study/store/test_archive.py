@@ -55,11 +55,11 @@ def test_a_data_folder_that_cannot_be_made_is_said_so(tmp_path):
 
 def test_a_session_has_one_writer(tmp_path):
     folder = new_session_folder(tmp_path, "P01")
-    with locked(folder.path):
-        with (
-            pytest.raises(StudyError, match="running elsewhere.*Another program is writing to P01_001"),
-            locked(folder.path),
-        ):
-            raise AssertionError("two writers")
+    with (
+        locked(folder.path),
+        pytest.raises(StudyError, match="running elsewhere.*Another program is writing to P01_001"),
+        locked(folder.path),
+    ):
+        raise AssertionError("two writers")
     with locked(folder.path):
         pass

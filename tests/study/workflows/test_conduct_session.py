@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase, TrialStatus
-from study.errors import DeviceError, StudyError
+from study.errors import DeviceError, LeftError, StudyError
 from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
 from study.session.views import Unanswered
 from study.store.event_log import read_log
@@ -192,8 +192,10 @@ def test_ctrl_c_leaves_a_log_that_can_be_resumed(sitter):
     def press() -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(LeftError) as left:
         sitter.interrupted(after=4, instead=press)
+    assert left.value.saved == "4 answers are on disk."
+    assert left.value.do_now.startswith("Go on with: hapteq resume ")
     (folder,) = [f for f in sitter.data.iterdir() if f.is_dir()]
     from study.store.archive import SessionFolder
 

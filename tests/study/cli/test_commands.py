@@ -1,0 +1,256 @@
+"""The command line as a script would use it: exit codes, stdout for results, stderr for talk."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from study.cli.main import main
+
+
+@pytest.fixture
+def run(capsys):
+    """Runs one command in this process; returns exit code, stdout, stderr."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        capsys.readouterr()
+        code = main([str(a) for a in arguments])
+        said = capsys.readouterr()
+        return int(code), said.out, said.err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, small_text):
+    """A data folder with one finished session of the small protocol; copied by whoever changes it."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "small.toml").write_text(small_text)
+    data = folder / "data"
+    assert main(["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", "3",
+                 "--subject", "P01", "--data", str(data)]) == 0  # fmt: skip
+    return data
+
+
+@pytest.fixture
+def data(finished, tmp_path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "data"))
+
+
+def test_a_simulated_participant_takes_the_study_and_results_go_to_stdout(run, small_file, tmp_path):
+    code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
+    assert code == 0
+    assert out.splitlines()[0].split() == ["frequency", "threshold", "at", "the", "cap", "participants"]
+    assert "25 Hz" in out
+    assert "Report:" in err
+    assert (tmp_path / "d" / "SIM_001" / "analysis" / "report.html").exists()
+
+
+def test_without_a_terminal_a_simulated_participant_sits_down_and_it_says_so(run, small_file, tmp_path, monkeypatch):
+    with (tmp_path / "nothing").open("w+") as nothing:
+        monkeypatch.setattr("sys.stdin", nothing)
+        code, _, err = run("study", "--protocol", small_file, "--data", tmp_path / "d")
+    assert code == 0
+    assert "No terminal here: a simulated participant ('ideal') takes the session." in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["study", "--observer", "oracle"], "Choose one of ideal, lapsing, biased"),
+        (["study", "--protocol", "direction_treshold"], "Did you mean direction_threshold?"),
+        (["study", "--protocol", "sweep", "--observer", "ideal"], "hapteq record"),
+        (["study", "--observer", "ideal", "--subject", "Ada Lovelace"], "1 to 16 letters and digits"),
+        (["resume", "P09_001"], "There is no such session"),
+        (["withdraw", "P09_001"], "There is no such session"),
+        (["analyze", "nowhere"], "There is nothing to analyse"),
+        (["record", "direction_threshold", "--out", "x.h5"], "hapteq study"),
+        (["protocol", "show", "swep"], "Did you mean sweep?"),
+        (["study", "--seed", "-1"], "--seed"),
+        (["studdy"], "studdy"),
+    ],
+)
+def test_wrong_use_is_exit_code_2_with_a_sentence_that_helps(run, tmp_path, monkeypatch, arguments, expected):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert expected in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_device_that_is_not_there_is_exit_code_3(run, small_file, tmp_path):
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--device", "omega3", "--data",
+                       tmp_path / "d")  # fmt: skip
+    assert code == 3
+    assert "Use --device simulated." in err
+    assert not (tmp_path / "d").exists()
+
+
+def test_an_interruption_is_exit_code_130(run, small_file, tmp_path, monkeypatch):
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("study.workflows.simulated_display.SimulatedDisplay.ask", interrupted)
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
+    assert code == 130
+    assert "0 answers are on disk." in err
+    assert "Go on with: hapteq resume" in err
+    monkeypatch.undo()
+    assert run("resume", "SIM_001", "--data", tmp_path / "d")[0] == 0
+
+
+def test_a_finished_session_is_said_to_be_finished(run, data):
+    code, _, err = run("resume", "P01_001", "--data", data)
+    assert code == 1
+    assert "This session is finished" in err
+
+
+def test_analyze_writes_everything_that_the_contract_names(run, data, tmp_path):
+    code, out, _ = run("analyze", data, "--out", tmp_path / "out")
+    assert code == 0
+    assert "25 Hz" in out
+    for name in ("thresholds.csv", "anova.json", "report.html", "figures/thresholds.png", "figures/thresholds.svg"):
+        assert (tmp_path / "out" / name).stat().st_size > 0, name
+    code, out, _ = run("validate", tmp_path / "out" / "thresholds.csv", tmp_path / "out" / "anova.json")
+    assert code == 0, out
+    document = json.loads((tmp_path / "out" / "anova.json").read_text())
+    assert document["provenance"]["seeds"] == {"P01_001": 3}
+    assert document["provenance"]["parents"][0]["file"] == "events.jsonl"
+
+
+def test_analyze_again_replaces_its_own_results(run, data):
+    assert run("analyze", data)[0] == 0
+    assert run("analyze", data)[0] == 0
+
+
+def test_a_damaged_session_is_left_out_and_named(run, data):
+    broken = Path(shutil.copytree(data / "P01_001", data / "P02_001"))
+    (broken / "events.jsonl").write_text("not a log\n")
+    code, out, err = run("analyze", data)
+    assert code == 0
+    assert "P02_001 cannot be used. Line 1 of events.jsonl" in err
+    assert "25 Hz" in out
+
+
+def test_validate_says_what_is_wrong_and_fails(run, data, tmp_path):
+    table = data / "P01_001" / "trials.csv"
+    table.write_text(table.read_text().replace("subject,", "person,", 1))
+    code, out, _ = run("validate", table, data / "P01_001" / "session.json")
+    assert code == 1
+    assert "trials.csv" in out
+    assert "not valid" in out
+    assert "session.json: session summary: valid" in out
+    code, out, _ = run("validate", "--json", table)
+    assert code == 1
+    assert json.loads(out)[0]["problems"]
+
+
+def test_withdrawal_erases_all_sessions_of_the_participant_and_nobody_elses(run, data, small_file):
+    for subject in ("P01", "P02"):
+        who = ("--observer", "ideal", "--subject", subject)
+        assert run("study", "--protocol", small_file, *who, "--data", data)[0] == 0
+    other = {p: p.read_bytes() for p in (data / "P02_001").rglob("*") if p.is_file()}
+    code, out, err = run("withdraw", "P01_002", "--data", data, "--yes")
+    assert code == 0
+    assert "Erased: P01_001, P01_002" in out
+    assert "run hapteq analyze again" in err
+    for name in ("P01_001", "P01_002"):
+        left = {p.name for p in (data / name).iterdir()}
+        assert left <= {"withdrawn.json", "session.lock"}
+        document = json.loads((data / name / "withdrawn.json").read_text())
+        assert set(document) == {"format", "version", "session", "withdrawn_utc"}
+        assert run("validate", data / name)[0] == 0
+    assert {p: p.read_bytes() for p in (data / "P02_001").rglob("*") if p.is_file()} == other
+    code, _, err = run("resume", "P01_001", "--data", data)
+    assert code == 1
+    assert "withdrew" in err
+    code, _, err = run("analyze", data)
+    assert "P01_001 was withdrawn by the participant." in err
+    # The number is not given to anybody else.
+    assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)[0] == 0
+    assert (data / "P01_003").exists()
+
+
+def test_a_withdrawal_that_is_not_confirmed_erases_nothing(run, data, monkeypatch):
+    monkeypatch.setattr("typer.confirm", lambda *_, **__: False)
+    code, _, err = run("withdraw", "P01_001", "--data", data)
+    assert code == 0
+    assert "Nothing was erased." in err
+    assert (data / "P01_001" / "events.jsonl").exists()
+
+
+def test_a_locked_protocol_that_changed_is_refused_before_a_session_begins(run, small_file, tmp_path):
+    data = tmp_path / "d"
+    code, out, _ = run("protocol", "lock", small_file, "--data", data)
+    assert code == 0
+    assert out.strip().endswith("small.lock.json")
+    assert run("validate", data / "small.lock.json")[0] == 0
+    assert run("study", "--protocol", small_file, "--observer", "ideal", "--data", data)[0] == 0
+    opened = json.loads((data / "SIM_001" / "events.jsonl").read_text().splitlines()[0])
+    assert opened["protocol_locked"] is True
+    small_file.write_text(small_file.read_text().replace("start_n = 1.0", "start_n = 0.9"))
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", data)
+    assert code == 1
+    assert "This protocol is locked" in err
+    assert not (data / "SIM_002").exists()
+
+
+def test_a_wrong_protocol_names_file_key_and_what_is_allowed(run, small_file, tmp_path):
+    small_file.write_text(small_file.read_text().replace("start_n = 1.0", "start_mN = 1000"))
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
+    assert code == 1
+    assert "small.toml" in err
+    assert "staircase.start_mN" in err
+    assert "start_n" in err
+
+
+def test_protocols_are_listed_and_explained(run):
+    code, out, _ = run("protocol", "list")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == [
+        "direction_threshold", "direction_training", "ellipsoid", "sweep",
+    ]  # fmt: skip
+    code, out, _ = run("protocol", "show", "direction_threshold")
+    assert "staircase.step_change = after_reversal" in out
+    code, out, _ = run("protocol", "show", "direction_threshold", "--json")
+    assert {field["key"] for field in json.loads(out)["fields"]} >= {"staircase.start_n", "trial.feedback"}
+    code, out, _ = run("protocol", "show", "sweep", "--text")
+    assert out.startswith("#")
+
+
+def test_a_recording_is_made_once_and_never_overwritten(run, tmp_path):
+    out = tmp_path / "ellipsoid.h5"
+    code, said, _ = run("record", "ellipsoid", "--out", out)
+    assert (code, said.strip()) == (0, str(out))
+    assert run("validate", out)[0] == 0
+    before = out.read_bytes()
+    code, _, err = run("record", "ellipsoid", "--out", out)
+    assert code == 1
+    assert "never overwritten" in err
+    assert out.read_bytes() == before
+
+
+def test_ellipsoids_enter_the_report(run, data, tmp_path):
+    assert run("record", "ellipsoid", "--out", tmp_path / "e.h5")[0] == 0
+    assert run("analyze", data, "--out", tmp_path / "out", "--ellipsoid", tmp_path / "e.h5")[0] == 0
+    assert (tmp_path / "out" / "figures" / "ellipsoids.png").exists()
+    other = data / "P01_001" / "recordings" / "run-00_trial-000_attempt-0.h5"
+    code, _, err = run("analyze", data, "--ellipsoid", other)
+    assert code == 1
+    assert "hapteq record ellipsoid" in err
+
+
+def test_a_recording_away_from_the_centre_says_where(run, tmp_path):
+    from study.store.recording_file import read_recording
+
+    assert run("record", "ellipsoid", "--out", tmp_path / "e.h5", "--place", "0.0", "0.03", "-0.02")[0] == 0
+    recording = read_recording(tmp_path / "e.h5")
+    assert recording.meta["place_m"] == [0.0, 0.03, -0.02]
+    assert recording.position.samples.mean(axis=0) == pytest.approx([0.0, 0.03, -0.02], abs=2e-3)
+
+
+def test_the_version_is_said(run):
+    code, out, _ = run("--version")
+    assert code == 0
+    assert out.startswith("hapteq ")

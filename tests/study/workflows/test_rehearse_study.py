@@ -1,0 +1,48 @@
+"""A small rehearsal: several at once, interrupted, gone on with."""
+
+import pytest
+
+from study.errors import StudyError
+from study.store.archive import session_folders
+from study.store.event_log import read_log
+from study.workflows.fold_session import fold_session
+from study.workflows.rehearse_study import Rehearsal, rehearse_study, subject_seed
+
+
+@pytest.fixture
+def rehearsal(sitter) -> Rehearsal:
+    return Rehearsal(sitter.protocol, sitter.text, subjects=3, seed=5, data=sitter.data)
+
+
+def decisions(folder):
+    return [(t.run, t.trial, t.level_n, t.correct) for t in fold_session(folder).state.trials if t.counts]
+
+
+@pytest.mark.timeout(200)
+def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitter):
+    done = []
+    rehearse_study(rehearsal, workers=2, on_finished=lambda: done.append(1))
+    assert len(done) == 3
+    folders = session_folders(sitter.data)
+    assert [f.name for f in folders] == ["S001_001", "S002_001", "S003_001"]
+    whole = [decisions(f) for f in folders]
+    assert len({str(d) for d in whole}) == 3
+    # As a kill leaves it: the second participant is half way, with a torn line.
+    log = folders[1].log.read_bytes()
+    folders[1].log.write_bytes(log[: len(log) // 2])
+    untouched = folders[0].log.read_bytes()
+    rehearse_study(rehearsal, workers=1, on_finished=lambda: done.append(1))
+    assert len(done) == 6
+    assert folders[0].log.read_bytes() == untouched
+    assert [len(d) for d in map(decisions, folders)] == [len(d) for d in whole]
+    assert decisions(folders[0]) == whole[0]
+    kinds = [event.event for event in read_log(folders[1].log).events]
+    assert "session_resumed" in kinds
+    other = Rehearsal(sitter.protocol, sitter.text, subjects=3, seed=6, data=sitter.data)
+    with pytest.raises(StudyError, match="holds another rehearsal"):
+        rehearse_study(other, workers=1, on_finished=lambda: None)
+
+
+def test_neighbouring_rehearsals_share_no_participant():
+    seeds = {subject_seed(seed, number) for seed in range(20) for number in range(20)}
+    assert len(seeds) == 400
