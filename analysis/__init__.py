@@ -1,0 +1,13 @@
+"""What the data say. Pure: trials and recordings in, results, figures and pages out; knows no files and no screens.
+
+Read in this order: `runs` (staircases recomputed from the answers, never trusted), `thresholds`, `threshold_table`,
+`anova` and `comparisons` (as published), `repeated_measures` and `friedman` (as the design asks for), `ellipsoid`,
+`study_analysis` (all of it in one call), then `figures` and `reports`.
+
+Decisions:
+
+2026-11-21. The published one-way analysis is computed as published, and the one within participants stands beside it
+with the difference in words: readers need both, the first to compare, the second to believe.
+2026-11-21. A threshold with a peak at the cap is called a lower bound; comparing the mean with the cap would miss
+every guesser (they end near 2.7 N of 3 N). `thresholds.is_censored` has the measured operating characteristics.
+"""

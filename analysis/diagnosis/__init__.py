@@ -1,0 +1,1 @@
+"""The format of a diagnosis: what is missing in a model, and how sure that is."""

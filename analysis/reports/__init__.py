@@ -1,0 +1,1 @@
+"""Values and figures to one page of HTML that stands alone."""

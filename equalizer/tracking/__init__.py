@@ -1,0 +1,1 @@
+"""From what is wanted at the handle to what is commanded."""

@@ -1,0 +1,1 @@
+"""The rules of a sitting. Pure: events in, state and next action out."""
