@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from study.cli.results import JsonOption, show
+
 
 def analyze(
     data: Annotated[Path, typer.Argument(help="Folder of sessions, or one session.")],
@@ -15,13 +17,10 @@ def analyze(
     protocol: Annotated[
         str | None, typer.Option(help="Which protocol's sessions, where the folder holds several.")
     ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Write thresholds.csv, anova.json, figures and report.html."""
     from study.workflows.analyze_data import analyze_data
 
-    written = analyze_data(data, out if out is not None else data / "analysis", ellipsoid, protocol)
-    for line in written.table:
-        typer.echo(line)
-    for warning in written.warnings:
-        typer.echo(f"Note: {warning}", err=True)
-    typer.echo(f"Report: {written.report}", err=True)
+    out = out if out is not None else data / "analysis"
+    show(analyze_data(data, out, ellipsoid, protocol), as_json)

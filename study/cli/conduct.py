@@ -8,7 +8,8 @@ from pathlib import Path
 
 import typer
 
-from study.cli.progress import AnswerCount
+from study.cli.progress import answer_count
+from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.store.archive import SessionFolder, check_subject, find_session
 from study.store.protocol_files import read_study_protocol
@@ -18,7 +19,7 @@ from study.workflows.conduct_session import Participant, conduct_new, conduct_re
 from study.workflows.display import PersonsHand
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan, fresh_seed
-from study.workflows.session_results import SessionResults, write_results
+from study.workflows.session_results import write_results
 from study.workflows.simulated_participant import simulated_participant
 
 SIMULATED_CODE = "SIM"
@@ -31,7 +32,7 @@ class Sitter:
     subject: str | None
 
 
-def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int | None) -> None:
+def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int | None, as_json: bool) -> None:
     source = read_study_protocol(protocol_name, data)
     drawn = fresh_seed() if seed is None else seed
     plan = SessionPlan(
@@ -45,15 +46,15 @@ def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int
     )
     with _participant(sitter.observer, drawn) as participant:
         end = conduct_new(plan, device, participant)
-    _finish(end.folder)
+    _finish(end.folder, as_json)
 
 
-def go_on(session: str, device: str, data: Path) -> None:
+def go_on(session: str, device: str, data: Path, as_json: bool) -> None:
     folder = find_session(session, data)
     opened = fold_session(folder).state.opened
     with _participant(opened.observer, opened.seed) as participant:
         end = conduct_resumed(folder, device, participant)
-    _finish(end.folder)
+    _finish(end.folder, as_json)
 
 
 @contextmanager
@@ -63,8 +64,8 @@ def _participant(observer: str | None, seed: int) -> Iterator[Participant]:
         display = PlainDisplay(LineInput(), sys.stdout, clock)
         yield Participant(display=display, hand=PersonsHand(), clock=clock)
         return
-    with AnswerCount(f"simulated participant '{observer}'") as count:
-        yield simulated_participant(observer, seed, clock, on_question=count.show)
+    with answer_count(f"simulated participant '{observer}'") as show_question:
+        yield simulated_participant(observer, seed, clock, on_question=show_question)
 
 
 def _ask_subject(sitter: Sitter) -> str:
@@ -75,16 +76,10 @@ def _ask_subject(sitter: Sitter) -> str:
     return str(typer.prompt("Participant code (letters and digits, such as P01)"))
 
 
-def _finish(folder: SessionFolder) -> None:
+def _finish(folder: SessionFolder, as_json: bool) -> None:
     state = fold_session(folder).state
-    if not state.closed:
-        typer.echo(f"Not finished: {state.answers} answers are on disk.", err=True)
-        typer.echo(f"Go on with: hapteq resume {folder.path}", err=True)
+    if state.closed:
+        show(write_results(folder), as_json)
         return
-    _show(write_results(folder))
-
-
-def _show(results: SessionResults) -> None:
-    for line in results.table:
-        typer.echo(line)
-    typer.echo(f"Report: {results.report}", err=True)
+    typer.echo(f"Not finished: {state.answers} answers are on disk.", err=True)
+    typer.echo(f"Go on with: hapteq resume {folder.path}", err=True)

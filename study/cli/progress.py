@@ -1,9 +1,8 @@
-"""Progress on stderr: bars on a terminal, nothing where there is none."""
+"""Progress on stderr: bars on a terminal, nothing that would spoil a log where there is none."""
 
 import sys
-from collections.abc import Callable
-from types import TracebackType
-from typing import Self
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -11,51 +10,24 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from study.session.views import Question
 
 
-class AnswerCount:
+@contextmanager
+def answer_count(title: str) -> Iterator[Callable[[Question], None]]:
     """Which run and trial a simulated participant is at. The length of a staircase is not known beforehand."""
+    columns = (TextColumn("{task.description}"), TextColumn("{task.fields[where]}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(file=sys.stderr), transient=True) as progress:
+        task = progress.add_task(title, where="")
 
-    def __init__(self, title: str) -> None:
-        columns = (TextColumn("{task.description}"), TextColumn("{task.fields[where]}"), TimeElapsedColumn())
-        self._progress = Progress(*columns, console=Console(file=sys.stderr), transient=True)
-        self._task = self._progress.add_task(title, where="")
+        def show(question: Question) -> None:
+            run = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
+            progress.update(task, where=f"{run}, trial {question.trial_number}")
 
-    def show(self, question: Question) -> None:
-        run = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
-        where = f"{run}, trial {question.trial_number}"
-        self._progress.update(self._task, where=where)
-
-    def __enter__(self) -> Self:
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._progress.stop()
+        yield show
 
 
-class Bar:
-    """Done of total, with elapsed time."""
-
-    def __init__(self, title: str, total: float) -> None:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        self._progress = Progress(*columns, console=Console(file=sys.stderr))
-        self._task = self._progress.add_task(title, total=total)
-
-    def advance(self, by: float = 1) -> None:
-        self._progress.advance(self._task, by)
-
-    def at(self, done: float) -> None:
-        self._progress.update(self._task, completed=done)
-
-    def __enter__(self) -> Self:
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._progress.stop()
-
-
-OnProgress = Callable[[float], None]
+@contextmanager
+def bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
+    """Done of total; what is yielded says how much is done."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(file=sys.stderr)) as progress:
+        task = progress.add_task(title, total=total)
+        yield lambda done: progress.update(task, completed=done)

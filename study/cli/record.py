@@ -19,15 +19,16 @@ def record(
     ),
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated device's noise.")] = 1,
 ) -> None:
-    """Record the device's answer to an excitation. Interrupting keeps what has been recorded so far out of the way."""
-    from study.cli.progress import Bar
+    """Record the device's answer to an excitation. Interrupted, what is whole so far is written."""
+    from study.cli.progress import bar
     from study.store.protocol_files import read_recording_protocol
-    from study.workflows.record_device import RecordingPlan, record_device
+    from study.workflows.record_device import RecordingPlan, check_free, record_device
 
     source = read_recording_protocol(protocol)
     plan = RecordingPlan(source.protocol, device=device, place_m=place, seed=seed, out=out)
-    with Bar(source.protocol.title, total=plan.total_s) as bar:
-        written = record_device(plan, on_progress=bar.at)
+    check_free(out)
+    with bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
+        written = record_device(plan, on_progress=show)
     typer.echo(str(written.path))
     for warning in written.warnings:
         typer.echo(f"Note: {warning}", err=True)

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from study.cli.results import JsonOption, show
+
 
 def rehearse(
     subjects: Annotated[int, typer.Option(min=1, max=1000, help="How many simulated participants.")] = 10,
@@ -12,18 +14,16 @@ def rehearse(
     protocol: Annotated[str, typer.Option(help="A shipped protocol's name, or a file.")] = "direction_threshold",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the population and of all draws.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    as_json: JsonOption = False,
 ) -> None:
     """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
-    from study.cli.progress import Bar
+    from study.cli.progress import bar
     from study.store.protocol_files import read_study_protocol
     from study.workflows.analyze_data import analyze_data
     from study.workflows.rehearse_study import Rehearsal, rehearse_study
 
     source = read_study_protocol(protocol, out)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=subjects, seed=seed, data=out)
-    with Bar(f"{subjects} simulated participants", total=subjects) as bar:
-        rehearse_study(rehearsal, workers=workers, on_finished=bar.advance)
-    written = analyze_data(out, out / "analysis", None)
-    for line in written.table:
-        typer.echo(line)
-    typer.echo(f"Report: {written.report}", err=True)
+    with bar(f"{subjects} simulated participants", total=subjects) as advance:
+        rehearse_study(rehearsal, workers=workers, on_finished=advance)
+    show(analyze_data(out, out / "analysis"), as_json)

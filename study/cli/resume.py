@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from study.cli.results import JsonOption
 from study.cli.study import DataOption, DeviceOption
 
 
@@ -12,8 +13,9 @@ def resume(
     session: Annotated[str, typer.Argument(help="Session folder, or its name in the data folder.")],
     device: DeviceOption = "simulated",
     data: DataOption = Path("data"),
+    as_json: JsonOption = False,
 ) -> None:
     """Go on with a session: its log is folded and checked, a torn last line mended, an open trial drawn again."""
     from study.cli.conduct import go_on
 
-    go_on(session, device=device, data=data)
+    go_on(session, device=device, data=data, as_json=as_json)

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from study.cli.results import JsonOption
+
 DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
 DeviceOption = Annotated[str, typer.Option("--device", help="The device: simulated.")]
 
@@ -20,6 +22,7 @@ def study(
     plain: Annotated[bool, typer.Option("--plain", help="Line mode, also when input is not a terminal.")] = False,
     data: DataOption = Path("data"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws; drawn and logged if not given.")] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
     from study.cli.conduct import Sitter, begin
@@ -27,4 +30,5 @@ def study(
     if observer is None and not plain and not sys.stdin.isatty():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
-    begin(Sitter(observer=observer, subject=subject), protocol_name=protocol, device=device, data=data, seed=seed)
+    sitter = Sitter(observer=observer, subject=subject)
+    begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json)

@@ -1,7 +1,6 @@
 """From a folder of sessions to thresholds.csv, anova.json, figures and one report."""
 
 import io
-from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.ellipsoid import EllipsoidResult, ellipsoids
@@ -19,16 +18,9 @@ from study.store.recording_file import read_recording
 from study.store.text_file import write_text
 from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
 from study.workflows.collect_sessions import Collected, collect_sessions
+from study.workflows.written_analysis import WrittenAnalysis
 
 FIGURE_DPI = 150
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenAnalysis:
-    table: tuple[str, ...]
-    """Group means by frequency, as lines of text."""
-    warnings: tuple[str, ...]
-    report: Path
 
 
 def analyze_data(
@@ -55,6 +47,7 @@ def analyze_data(
     pictures = study_pictures(analysis, shapes)
     _write(out, analysis, pictures, shapes, provenance, collected)
     return WrittenAnalysis(
+        thresholds=analysis.thresholds,
         table=tuple(text_table(analysis)),
         warnings=(*collected.left_out, *analysis.warnings),
         report=out / "report.html",

@@ -13,7 +13,7 @@ from protocols.recording_protocol import RecordingProtocol
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault, Health
 from study.devices.opening import DEVICES, open_device
-from study.errors import DeviceError, StudyError
+from study.errors import DeviceError, LeftError, StudyError
 from study.session.limits import limits_of_recording
 from study.session.recording_plan import Piece, pieces
 from study.store.provenance import gather_provenance
@@ -44,26 +44,38 @@ class WrittenRecording:
 def record_device(plan: RecordingPlan, on_progress: Callable[[float], None]) -> WrittenRecording:
     """Record everything the protocol asks for. `on_progress(seconds)` counts recorded time.
 
-    Interrupted (KeyboardInterrupt), the pieces that are whole are written, and the interruption is passed on.
+    Interrupted (KeyboardInterrupt), the pieces that are whole are written, and LeftError says so.
     Raises StudyError before anything moves where `out` exists already.
     """
-    if plan.out.exists():
-        raise StudyError(
-            "The recording was not started",
-            f"{plan.out} exists already, and recordings are never overwritten.",
-            "Choose another name with --out.",
-            saved="Nothing moved.",
-        )
+    check_free(plan.out)
     clock = VirtualClock() if plan.device in DEVICES else RealClock()
     with contextlib.closing(open_device(plan.device, _settings(plan), clock, plan.seed)) as device:
         done: list[tuple[Piece, Recording, Health]] = []
         try:
             _play_all(plan.protocol, device, done, on_progress)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interruption:
             if done:
                 _write(plan, device, done, interrupted=True)
-            raise
+            raise _left(plan, len(done)) from interruption
         return _write(plan, device, done, interrupted=False)
+
+
+def check_free(out: Path) -> None:
+    """Raises StudyError where the recording could not be written under this name."""
+    if out.exists():
+        raise StudyError(
+            "The recording was not started",
+            f"{out} exists already, and recordings are never overwritten.",
+            "Choose another name with --out.",
+            saved="Nothing moved.",
+        )
+    if not out.absolute().parent.is_dir():
+        raise StudyError(
+            "The recording was not started",
+            f"There is no folder {out.parent} to write {out.name} into.",
+            "Make the folder first, or choose another name with --out.",
+            saved="Nothing moved.",
+        )
 
 
 def _play_all(
@@ -86,6 +98,16 @@ def _play_all(
         done.append((piece, played.recording, played.health))
         before_s += length_s
         on_progress(before_s)
+
+
+def _left(plan: RecordingPlan, done: int) -> LeftError:
+    all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
+    return LeftError(
+        "Interrupted",
+        f"{done} of {all_pieces} pieces were recorded; the force was released.",
+        "Record again under another name for the whole protocol.",
+        saved=f"The whole pieces are in {plan.out}." if done else "Nothing was written.",
+    )
 
 
 def _settings(plan: RecordingPlan) -> DeviceSettings:

@@ -30,8 +30,10 @@ class Rehearsal:
     data: Path
 
 
-def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[], None]) -> None:
-    """Blocks until every participant has finished. After an interruption the same call goes on.
+def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[int], None]) -> None:
+    """Blocks until every participant has finished, calling `on_finished(how many are done)` on the way.
+
+    After an interruption the same call goes on.
 
     Raises StudyError where the folder holds a rehearsal of another protocol or seed.
     """
@@ -41,9 +43,9 @@ def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[],
     with ProcessPoolExecutor(max_workers=workers, mp_context=context, initializer=_leave_ctrl_c_to_the_parent) as pool:
         futures = [pool.submit(_sit, rehearsal, number) for number in range(rehearsal.subjects)]
         try:
-            for future in as_completed(futures):
+            for done, future in enumerate(as_completed(futures), start=1):
                 future.result()
-                on_finished()
+                on_finished(done)
         except KeyboardInterrupt as interruption:
             pool.shutdown(wait=True, cancel_futures=True)
             raise LeftError(

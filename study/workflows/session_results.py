@@ -1,7 +1,6 @@
 """What is written from a session's log, at will: its tables, and its own small report."""
 
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict
 
 from analysis.thresholds import thresholds
 from study.session.state import SessionState
@@ -12,16 +11,11 @@ from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
 from study.store.trials_file import TRIALS_NAME, write_trials
 from study.workflows.analyze_data import analyze_data
 from study.workflows.fold_session import fold_session
+from study.workflows.written_analysis import WrittenAnalysis
 
 SUMMARY_NAME = "session.json"
 SUMMARY_FORMAT = "hapteq-session-summary"
 SUMMARY_VERSION = 1
-
-
-@dataclass(frozen=True, slots=True)
-class SessionResults:
-    table: tuple[str, ...]
-    report: Path
 
 
 def write_tables(folder: SessionFolder) -> SessionState:
@@ -34,11 +28,10 @@ def write_tables(folder: SessionFolder) -> SessionState:
     return state
 
 
-def write_results(folder: SessionFolder) -> SessionResults:
+def write_results(folder: SessionFolder) -> WrittenAnalysis:
     """The tables, and the analysis of this session alone beside them."""
     write_tables(folder)
-    written = analyze_data(folder.path, folder.path / "analysis")
-    return SessionResults(written.table, written.report)
+    return analyze_data(folder.path, folder.path / "analysis")
 
 
 def _write_summary(folder: SessionFolder, state: SessionState) -> None:

@@ -97,3 +97,17 @@ def test_ctrl_c_lets_go_and_says_how_to_go_on(study, small_file):
     assert terminal.end() == 130
     assert "1 answers are on disk." in terminal.screen
     assert "hapteq resume" in terminal.screen
+
+
+@pytest.mark.timeout(120)
+def test_a_closed_terminal_loses_nothing(study, small_file, tmp_path):
+    terminal = begin(study, small_file)
+    terminal.wait_for(r"trial 1\b.*1 or 2\?")
+    terminal.type("1\n")
+    terminal.wait_for(r"trial 2\b.*1 or 2\?")
+    terminal.hang_up()
+    assert terminal.process.wait(timeout=30) != 0
+    again = study("P07_001", command="resume")
+    assert "1 answers are on disk" in again.wait_for("Press Enter to begin")
+    again.type("q\n")
+    assert again.end() == 130

@@ -119,6 +119,15 @@ def test_analyze_writes_everything_that_the_contract_names(run, data, tmp_path):
     assert document["provenance"]["parents"][0]["file"] == "events.jsonl"
 
 
+def test_a_program_can_read_the_results(run, data):
+    code, out, _ = run("analyze", data, "--json")
+    assert code == 0
+    document = json.loads(out)
+    assert {row["frequency_hz"] for row in document["thresholds"]} == {25.0, 35.0}
+    assert all(row["threshold_n"] > 0 for row in document["thresholds"])
+    assert Path(document["report"]).exists()
+
+
 def test_analyze_again_replaces_its_own_results(run, data):
     assert run("analyze", data)[0] == 0
     assert run("analyze", data)[0] == 0

@@ -21,8 +21,8 @@ def decisions(folder):
 @pytest.mark.timeout(200)
 def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitter):
     done = []
-    rehearse_study(rehearsal, workers=2, on_finished=lambda: done.append(1))
-    assert len(done) == 3
+    rehearse_study(rehearsal, workers=2, on_finished=done.append)
+    assert done == [1, 2, 3]
     folders = session_folders(sitter.data)
     assert [f.name for f in folders] == ["S001_001", "S002_001", "S003_001"]
     whole = [decisions(f) for f in folders]
@@ -31,8 +31,8 @@ def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitte
     log = folders[1].log.read_bytes()
     folders[1].log.write_bytes(log[: len(log) // 2])
     untouched = folders[0].log.read_bytes()
-    rehearse_study(rehearsal, workers=1, on_finished=lambda: done.append(1))
-    assert len(done) == 6
+    rehearse_study(rehearsal, workers=1, on_finished=done.append)
+    assert done == [1, 2, 3, 1, 2, 3]
     assert folders[0].log.read_bytes() == untouched
     assert [len(d) for d in map(decisions, folders)] == [len(d) for d in whole]
     assert decisions(folders[0]) == whole[0]
@@ -40,7 +40,7 @@ def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitte
     assert "session_resumed" in kinds
     other = Rehearsal(sitter.protocol, sitter.text, subjects=3, seed=6, data=sitter.data)
     with pytest.raises(StudyError, match="holds another rehearsal"):
-        rehearse_study(other, workers=1, on_finished=lambda: None)
+        rehearse_study(other, workers=1, on_finished=done.append)
 
 
 def test_neighbouring_rehearsals_share_no_participant():

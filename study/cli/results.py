@@ -1,0 +1,27 @@
+"""How results reach stdout: lines for a person, one JSON document for a program. Talk goes to stderr."""
+
+import json
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from study.workflows.written_analysis import WrittenAnalysis
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Results as one JSON document on stdout.")]
+
+
+def show(written: WrittenAnalysis, as_json: bool) -> None:
+    if as_json:
+        document = {
+            "thresholds": [asdict(threshold) for threshold in written.thresholds],
+            "warnings": list(written.warnings),
+            "report": str(written.report),
+        }
+        typer.echo(json.dumps(document, indent=2))
+        return
+    for line in written.table:
+        typer.echo(line)
+    for warning in written.warnings:
+        typer.echo(f"Note: {warning}", err=True)
+    typer.echo(f"Report: {written.report}", err=True)
