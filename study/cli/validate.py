@@ -13,9 +13,9 @@ def validate(
 ) -> None:
     """Check files: recordings, models, protocols, tables, logs. Exit code 1 if anything is wrong."""
     from study.errors import ExitCode
-    from study.workflows.validate import validate_file
+    from study.workflows.validate_apart import validate_files
 
-    found = [validate_file(path) for path in files]
+    found = list(validate_files(files))
     if as_json:
         rows = [{"file": str(v.path), "kind": v.kind, "problems": list(v.problems)} for v in found]
         typer.echo(json.dumps(rows, indent=2))

@@ -12,7 +12,10 @@ from study.workflows.display import SignOfLife
 
 GLANCE_S = 0.05
 LINE_WIDTH = 78
-KEYS = "Keys: 1 or 2 answers, r plays the trial again (drawn anew), q leaves, ? shows this. Each followed by Enter."
+KEYS = (
+    "Keys: 1 or 2 answers, r plays the trial again (drawn anew), q leaves, ? shows this. Each followed by Enter. "
+    "Ctrl-C stops the device at once."
+)
 
 
 class PlainDisplay:
