@@ -46,7 +46,7 @@ class Fault(Enum):
     """Why the device let go by itself. Each ends a trial."""
 
     NONE = "none"
-    NOT_A_NUMBER = "a command or a position was not a number"
+    NOT_A_NUMBER = "a command or a position was no plausible number"
     STALLED = "the program gave no sign of life, so the force was faded out"
     HELD_TOO_LONG = "the stimulus was held longer than the protocol allows"
     STOPPED = "the emergency stop was pressed"

@@ -45,8 +45,8 @@ NO_FAULT, NOT_A_NUMBER, STALLED, HELD_TOO_LONG, STOPPED, LOST = range(6)
 ROW_SIZE = 15
 """A row of the recording: command, excitation, position, acceleration, true acceleration."""
 
-IMPLAUSIBLE, OVERFLOWING = 1e6, 1e100
-"""Newtons or metres that no handle knows are treated like NaN, so that nothing further down can overflow."""
+IMPLAUSIBLE_N, IMPLAUSIBLE_M, OVERFLOWING = 1e6, 0.5, 1e100
+"""Treated like NaN: no handle is half a metre off, and against such a reading the spring would pull in earnest."""
 
 WITHIN, BEYOND = 1 - 1e-12, 1 + 1e-9
 """Forces are confined to the first share of a limit: rounding cannot then carry them over it. They count as limited
@@ -183,7 +183,7 @@ def _aim(state: FloatArray, settings: FloatArray, loop: FloatArray, reading: Flo
     if 0 <= tick < state[LENGTH]:
         for i in range(3):
             force[i] = loop[tick % loop.shape[0], i]
-    if not (_below(force, IMPLAUSIBLE) and _below(reading, IMPLAUSIBLE)):
+    if not (_below(force, IMPLAUSIBLE_N) and _below(reading, IMPLAUSIBLE_M)):
         _let_go(state, NOT_A_NUMBER)
         return
     state[STIMULUS_CLIPPED] += _confine(force, settings[STIMULUS_CAP])
@@ -208,7 +208,7 @@ def _fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
 @_compiled
 def record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
     """One row into a ring: the last rows stay."""
-    if state[PHASE] == PLAYING and state[TICK] >= state[RECORD_FROM]:
+    if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:
         row = int(state[RECORDED]) % buffer.shape[0]
         for i in range(3):
             buffer[row, i] = state[FORCE + i]
