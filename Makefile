@@ -30,7 +30,7 @@ fix: $(VENV)/.installed-test ## Let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(VENV)/.installed-test ## Time ours against named peers; prints ratios
+bench: $(VENV)/.installed-test ## Time ours against the same work done plainly; prints ratios
 	@for file in tests/benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
 
 prove-study: $(VENV)/.installed-test ## The slow proofs of the study: 100 killed sessions, long fuzzing

@@ -94,7 +94,7 @@ class SafetySettings:
     watchdog_s: Annotated[
         float,
         Field(
-            ge=0.05,
+            ge=0.3,
             le=5,
             description="The force fades to zero when the program gives no sign of life for so long. Default 0.5: "
             "longer than any pause of a busy computer, shorter than a fright.",

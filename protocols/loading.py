@@ -43,6 +43,9 @@ def load_protocol(text: str, source: str) -> Protocol:
         end = f"(at line {len(text.splitlines())}, the end of the text)"
         problem = f"is not TOML: {error}".replace("(at end of document)", end)
         raise ProtocolError(source, (Problem("The text", problem, "TOML 1.0"),)) from error
+    except (ValueError, RecursionError) as error:
+        problem = f"cannot be read: {type(error).__name__} ({error})"
+        raise ProtocolError(source, (Problem("The text", problem, "numbers and nesting of ordinary size"),)) from error
     return protocol_from_values(values, source)
 
 

@@ -49,6 +49,8 @@ class Trial:
     felt: bool | None
     """False: a person answered while no device moved. None: a simulated participant."""
     status: TrialStatus
+    angle_deg: float | None = None
+    """Of the direction played, in the plane of the protocol's directions; does not depend on how they are labelled."""
 
     @property
     def counts(self) -> bool:

@@ -53,6 +53,11 @@ def _task(protocol: StudyProtocol) -> str:
         f"{second:g}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
         f"{directions.symmetry_deg:g}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
         f"which of the two it was, {limit}, and {told} whether that was right."
+        + (
+            " For every second participant the numbers 1 and 2 changed places; the table of trials has the angle."
+            if protocol.schedule.labels == "swapped_for_half"
+            else ""
+        )
     )
 
 
@@ -101,5 +106,5 @@ def _threshold(rule: StaircaseRule) -> str:
         "checked against the rule. It is marked as a lower bound (≥) when at least one of these reversals is a peak "
         "at the cap, which a stronger device would have let rise further. Sensitivity d' and criterion are those of "
         "one-interval identification over all trials of a run, with the log-linear correction; the criterion is "
-        "positive for a liking of direction 2."
+        "positive for a liking of the answer 2."
     )

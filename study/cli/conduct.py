@@ -11,18 +11,18 @@ import typer
 from study.cli.progress import answer_count
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.store.archive import SessionFolder, check_subject, find_session
+from study.devices.device import Fault
+from study.errors import DeviceError, LeftError
+from study.store.archive import check_subject, find_session
 from study.store.protocol_files import read_study_protocol
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
-from study.workflows.conduct_session import Participant, conduct_new, conduct_resumed
+from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.display import PersonsHand
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan, fresh_seed
 from study.workflows.session_results import write_results
 from study.workflows.simulated_participant import simulated_participant
-
-SIMULATED_CODE = "SIM"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int
     )
     with _participant(sitter.observer, drawn) as participant:
         end = conduct_new(plan, device, participant)
-    _finish(end.folder, as_json)
+    _finish(end, as_json)
 
 
 def go_on(session: str, device: str, data: Path, as_json: bool) -> None:
@@ -54,7 +54,7 @@ def go_on(session: str, device: str, data: Path, as_json: bool) -> None:
     opened = fold_session(folder).state.opened
     with _participant(opened.observer, opened.seed) as participant:
         end = conduct_resumed(folder, device, participant)
-    _finish(end.folder, as_json)
+    _finish(end, as_json)
 
 
 @contextmanager
@@ -68,18 +68,28 @@ def _participant(observer: str | None, seed: int) -> Iterator[Participant]:
         yield simulated_participant(observer, seed, clock, on_question=show_question)
 
 
+def simulated_code(observer: str) -> str:
+    """Each kind of simulated participant by its own name, so that their sessions stay apart."""
+    return "".join(c for c in observer if c.isascii() and c.isalnum())[:15] + "1"
+
+
 def _ask_subject(sitter: Sitter) -> str:
     if sitter.observer is not None:
-        return SIMULATED_CODE
-    if not sys.stdin.isatty():
+        return simulated_code(sitter.observer)
+    if sys.stdin is None or not sys.stdin.isatty():
         return "P01"
     return str(typer.prompt("Participant code (letters and digits, such as P01)"))
 
 
-def _finish(folder: SessionFolder, as_json: bool) -> None:
-    state = fold_session(folder).state
-    if state.closed:
-        show(write_results(folder), as_json)
+def _finish(end: Conducted, as_json: bool) -> None:
+    """Results of a finished session; otherwise how to go on, with the exit code that says why it ended."""
+    if not end.left:
+        show(write_results(end.folder), as_json)
         return
-    typer.echo(f"Not finished: {state.answers} answers are on disk.", err=True)
-    typer.echo(f"Go on with: hapteq resume {folder.path}", err=True)
+    kind = LeftError if end.fault is Fault.NONE else DeviceError
+    raise kind(
+        "The session is not finished",
+        f"The sitting ended: {end.left}.",
+        f"Go on with: hapteq resume {end.folder.path}",
+        saved=f"{end.state.answers} answers are on disk.",
+    )

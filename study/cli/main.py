@@ -4,6 +4,8 @@ Results go to stdout, talk and progress to stderr. Imports are light, so that `-
 imports what it needs.
 """
 
+import contextlib
+import io
 import signal
 import sys
 from types import FrameType
@@ -55,6 +57,9 @@ def options(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
@@ -71,12 +76,27 @@ def main(arguments: list[str] | None = None) -> int:
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
         return ExitCode.ERROR
+    except OSError as problem:
+        say(_refused_by_the_system(problem))
+        return ExitCode.ERROR
 
 
 def say(error: StudyError) -> None:
     """Title on a line, then what happened, what is safe, what to do."""
     parts = (error.happened, error.saved, error.do_now)
-    sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
+    with contextlib.suppress(OSError):  # a closed terminal hears nothing
+        sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
+
+
+def _refused_by_the_system(problem: OSError) -> StudyError:
+    """Whatever nobody named better: a folder without rights, a full disk, a terminal that went away."""
+    where = f" ({problem.filename})" if problem.filename else ""
+    return StudyError(
+        "The system refused",
+        f"{problem.strerror or problem}{where}.",
+        "Check the permissions and the room on the disk, then run the command again.",
+        saved="What was reported as written before is on disk.",
+    )
 
 
 def _leave(number: int, frame: FrameType | None) -> None:

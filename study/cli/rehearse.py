@@ -19,11 +19,11 @@ def rehearse(
     """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
     from study.cli.progress import bar
     from study.store.protocol_files import read_study_protocol
-    from study.workflows.analyze_data import analyze_data
+    from study.workflows.analyze_data import ANALYSIS_NAME, analyze_data
     from study.workflows.rehearse_study import Rehearsal, rehearse_study
 
     source = read_study_protocol(protocol, out)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=subjects, seed=seed, data=out)
     with bar(f"{subjects} simulated participants", total=subjects) as advance:
         rehearse_study(rehearsal, workers=workers, on_finished=advance)
-    show(analyze_data(out, out / "analysis"), as_json)
+    show(analyze_data(out, out / ANALYSIS_NAME), as_json)

@@ -27,7 +27,7 @@ def study(
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
     from study.cli.conduct import Sitter, begin
 
-    if observer is None and not plain and not sys.stdin.isatty():
+    if observer is None and not plain and (sys.stdin is None or not sys.stdin.isatty()):
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
     sitter = Sitter(observer=observer, subject=subject)

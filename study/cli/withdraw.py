@@ -34,4 +34,6 @@ def withdraw(
         return
     erase(folder.path.parent, plan, RealClock().utc())
     typer.echo(f"Erased: {', '.join(plan.sessions)}")
-    typer.echo("Reports and tables made before still hold their numbers: run hapteq analyze again.", err=True)
+    if plan.analysis is not None:
+        typer.echo(f"Erased too, because it was made from them: {plan.analysis}. Run hapteq analyze again.", err=True)
+    typer.echo("Analyses written elsewhere with --out, and copies, still hold the numbers: erase them.", err=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import phasors
+from equalizer.signals.lockin import covers_a_period, phasors
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -15,12 +15,13 @@ class Delivered:
 
     along_mps2: float
     off_axis_mps2: float
-    displacement_mm: float | None
+    displacement_mm: float
 
 
 def delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> Delivered | None:
-    """None where the recording is shorter than one period. unit_vector: (3,), the direction played."""
-    if len(recording) < recording.sample_rate_hz / frequency_hz:
+    """None where less than one period was measured. unit_vector: (3,), the direction played."""
+    measured = int(np.isfinite(recording.response.samples).all(axis=1).sum())
+    if not covers_a_period(measured, recording.sample_rate_hz, frequency_hz):
         return None
     acceleration = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz)[0]
     along = acceleration @ unit_vector
@@ -28,12 +29,6 @@ def delivered(recording: Recording, unit_vector: FloatArray, frequency_hz: float
     return Delivered(
         along_mps2=float(np.abs(along)),
         off_axis_mps2=float(np.linalg.norm(off_axis)),
-        displacement_mm=_displacement_mm(recording, unit_vector, frequency_hz),
+        # Of the handle, as the accelerometer sees it: encoders sit behind cables that give way.
+        displacement_mm=1000.0 * float(np.abs(along)) / (2 * np.pi * frequency_hz) ** 2,
     )
-
-
-def _displacement_mm(recording: Recording, unit_vector: FloatArray, frequency_hz: float) -> float | None:
-    if recording.position is None:
-        return None
-    position = phasors(recording.position.samples, recording.sample_rate_hz, frequency_hz)[0]
-    return float(np.abs(position @ unit_vector)) * 1000.0

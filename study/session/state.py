@@ -1,12 +1,14 @@
 """A session as a fold of its events: `begin_session` the first, `apply` each of the others."""
 
+import math
 from dataclasses import dataclass, replace
 
-from protocols.schedule import Run, labels_swapped, runs
-from protocols.staircase import StaircaseState, begin, finished, level_n, step
+from protocols.schedule import Run, runs
+from protocols.staircase import StaircaseState, begin, finished, step
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase, Trial, TrialStatus
+from study.session.due_trial import Place, Present, due_trial
 from study.session.events import (
     AnswerGiven,
     Event,
@@ -74,7 +76,7 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
 
 def apply(state: SessionState, event: Event) -> SessionState:
     """The state after one more event. Raises LogContradiction where it cannot follow."""
-    if state.closed:
+    if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
     match event:
         case TrialPresented():
@@ -86,9 +88,9 @@ def apply(state: SessionState, event: Event) -> SessionState:
         case TrialSpoiled():
             return _spoil(state, event)
         case RestTaken():
-            return replace(state, rest_due_s=0.0)
+            return _rest(state, event)
         case SessionClosed():
-            return replace(state, closed=True)
+            return _close(state)
         case NoteTaken() | SessionInterrupted() | SessionResumed():
             return state
         case SessionOpened():
@@ -106,10 +108,10 @@ def current_rule(state: SessionState) -> StaircaseRule:
     return rule_of_run(state.protocol, state.runs[state.run])
 
 
-def labels_are_swapped(state: SessionState) -> bool:
-    """Whether the numbers 1 and 2 change places for this participant."""
-    frequencies = len(state.protocol.stimulus.frequencies_hz)
-    return labels_swapped(state.protocol.schedule, frequencies, state.opened.participant_number)
+def due(state: SessionState) -> Present:
+    """The trial that comes next."""
+    place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
+    return due_trial(state.protocol, state.opened, current_rule(state), place)
 
 
 def felt(opened: SessionOpened) -> bool | None:
@@ -122,19 +124,38 @@ def _present(state: SessionState, event: TrialPresented) -> SessionState:
         raise LogContradiction(f"{_where(event)} presented while another trial is open")
     if state.finished:
         raise LogContradiction(f"{_where(event)} presented after the last run")
-    expected = (state.run, state.trial, state.attempt)
-    if (event.run, event.trial, event.attempt) != expected:
-        raise LogContradiction(
-            f"{_where(event)} presented where run {expected[0]}, trial {expected[1]}, attempt {expected[2]} was due"
-        )
-    due_n = level_n(current_rule(state), state.staircase)
-    if event.level_n != due_n or event.frequency_hz != state.runs[state.run].frequency_hz:
-        raise LogContradiction(
-            f"{_where(event)} was presented at {event.frequency_hz} Hz and {event.level_n} N, but the rules now give "
-            f"{state.runs[state.run].frequency_hz} Hz and {due_n} N: this session was begun with different rules"
-        )
+    _check_against_the_rules(event, due(state))
     row = _row(state, event)
     return replace(state, presented=event, trials=(*state.trials, row))
+
+
+def _check_against_the_rules(event: TrialPresented, expected: Present) -> None:
+    place = (expected.run, expected.trial, expected.attempt)
+    if (event.run, event.trial, event.attempt) != place:
+        raise LogContradiction(
+            f"{_where(event)} presented where run {place[0]}, trial {place[1]}, attempt {place[2]} was due"
+        )
+    given = {
+        "phase": (event.phase.value, expected.phase.value),
+        "frequency_hz": (event.frequency_hz, expected.frequency_hz),
+        "level_n": (event.level_n, expected.level_n),
+        "level_db": (event.level_db, expected.level_db),
+        "direction": (event.direction, expected.label),
+        "angle_deg": (event.angle_deg, expected.angle_deg),
+        "polarity": (event.polarity, expected.polarity),
+    }
+    wrong = [f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _same(logged, due)]
+    if wrong:
+        raise LogContradiction(
+            f"{_where(event)} was presented with {', '.join(wrong)}: this session was begun with different rules"
+        )
+
+
+def _same(logged: str | float, due: str | float) -> bool:
+    """Powers may differ in the last bit between machines; rules differ by far more."""
+    if isinstance(logged, float) and isinstance(due, float):
+        return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)
+    return logged == due
 
 
 def _answer(state: SessionState, event: AnswerGiven) -> SessionState:
@@ -149,6 +170,18 @@ def _answer(state: SessionState, event: AnswerGiven) -> SessionState:
         status=TrialStatus.UNMEASURED,
     )
     return replace(state, answered=event, trials=(*state.trials[:-1], row))
+
+
+def _rest(state: SessionState, event: RestTaken) -> SessionState:
+    if state.rest_due_s <= 0:
+        raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
+    return replace(state, rest_due_s=0.0)
+
+
+def _close(state: SessionState) -> SessionState:
+    if not state.finished or state.presented is not None:
+        raise LogContradiction("the session was closed before its last run was finished")
+    return replace(state, closed=True)
 
 
 def _measure(state: SessionState, event: TrialMeasured) -> SessionState:
@@ -234,6 +267,7 @@ def _row(state: SessionState, event: TrialPresented) -> Trial:
         missed_ticks=None,
         felt=felt(state.opened),
         status=TrialStatus.OPEN,
+        angle_deg=event.angle_deg,
     )
 
 

@@ -55,7 +55,6 @@ class RestNotice:
 class Goodbye:
     finished: bool
     answers: int
-    folder: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +62,10 @@ class Answered:
     answer: int
     at_s: float
     """Clock time at which the key arrived."""
+
+    def __post_init__(self) -> None:
+        if self.answer not in (1, 2):
+            raise ValueError(f"an answer is 1 or 2, not {self.answer}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +75,8 @@ class Unanswered:
     reason: str
     leave: bool
     """The participant or experimenter ends the sitting; it can be resumed."""
+    asked: bool = False
+    """The participant asked for the trial again, and so is there."""
 
 
 Reply = Answered | Unanswered

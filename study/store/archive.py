@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
+from study.store.atomic_write import sync_folder
 from study.store.event_log import LOG_NAME
 
-CODE = re.compile(r"[A-Za-z0-9]{1,16}")
+CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
 FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
 TOMBSTONE_NAME = "withdrawn.json"
 
@@ -46,7 +47,7 @@ def check_subject(code: str) -> str:
     if not CODE.fullmatch(code):
         raise WrongUseError(
             "This is no participant code",
-            f"'{code}' was given; a code has 1 to 16 letters and digits, such as P01.",
+            f"'{code}' was given; a code has 1 to 16 letters and digits, at least one digit, such as P01.",
             "Use the code from your list; names, initials with dots and e-mail addresses stay off this computer.",
         )
     return code
@@ -65,6 +66,8 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
             except FileExistsError:
                 continue
             (path / "recordings").mkdir()
+            for folder in (path, data, data.absolute().parent):
+                sync_folder(folder)
             return SessionFolder(path)
     except OSError as problem:
         raise StudyError(

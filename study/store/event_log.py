@@ -1,12 +1,13 @@
 """The log of a session: append one line, fsync, and only then act. Never rewritten, never opened over another."""
 
 import contextlib
+import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError
-from study.session.events import Event, event_line, parse_event
+from study.session.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
 from study.store.atomic_write import sync_folder
 
 LOG_NAME = "events.jsonl"
@@ -24,11 +25,23 @@ class EventLog:
         """Raises FileExistsError rather than touch an existing log."""
         descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o644)
         sync_folder(path.parent)
+        _own(descriptor, path)
         return cls(path, descriptor)
 
     @classmethod
     def reopen(cls, path: Path) -> "EventLog":
-        return cls(path, os.open(path, os.O_WRONLY | os.O_APPEND))
+        """Raises StudyError where it cannot be written to."""
+        try:
+            descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
+        except OSError as problem:
+            raise StudyError(
+                "The session log cannot be written to",
+                f"{path.name} in {path.parent.name}: {problem.strerror}.",
+                "Check the permissions of the session's folder.",
+                saved="Nothing was changed.",
+            ) from problem
+        _own(descriptor, path)
+        return cls(path, descriptor)
 
     def append(self, event: Event) -> None:
         """On return the line is on the disk. Raises StudyError, leaving the log as it was, where it is not."""
@@ -36,10 +49,13 @@ class EventLog:
         try:
             _write_all(self._descriptor, event_line(event))
             os.fsync(self._descriptor)
-        except OSError as problem:
+        except BaseException as problem:
+            # Also on Ctrl-C: half a line would spoil the one that comes after it.
             with contextlib.suppress(OSError):
                 os.ftruncate(self._descriptor, before)
-            raise _not_saved(self._path, event, problem) from problem
+            if isinstance(problem, OSError):
+                raise _not_saved(self._path, event, problem) from problem
+            raise
 
     def close(self) -> None:
         os.close(self._descriptor)
@@ -68,6 +84,15 @@ def read_log(path: Path) -> LogContents:
     return LogContents(events, torn=tail.decode("utf-8", errors="replace"), torn_bytes=len(tail))
 
 
+def read_opening(path: Path) -> Event | None:
+    """The first line alone, whatever comes after it; None where it is not whole. Raises StudyError, OSError."""
+    if not path.exists():
+        return None
+    with path.open("rb") as file:
+        line = file.readline()
+    return _event(path, 1, line) if line.endswith(b"\n") else None
+
+
 def mend(path: Path, contents: LogContents) -> None:
     """Cut off a torn last line, so that the next fact starts on a line of its own."""
     if not contents.torn_bytes:
@@ -80,16 +105,50 @@ def mend(path: Path, contents: LogContents) -> None:
         os.close(descriptor)
 
 
+def _own(descriptor: int, path: Path) -> None:
+    """A second lock, on the log itself: the lock file might be deleted while its holder still writes."""
+    try:
+        import fcntl
+    except ImportError:  # Windows; the lock file is all there is
+        return
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as problem:
+        os.close(descriptor)
+        raise StudyError(
+            "This session is running elsewhere",
+            f"Another program is writing to {path.parent.name}.",
+            "Close it there first, or follow it without writing.",
+            saved="Nothing was changed.",
+        ) from problem
+
+
 def _event(path: Path, number: int, line: bytes) -> Event:
     try:
         return parse_event(line)
     except ValueError as problem:
+        if number == 1 and _is_newer(line):
+            raise StudyError(
+                "This session was written by a newer hapteq",
+                f"The log of {path.parent.name} is of a version that this program does not know.",
+                "Use the hapteq that began it, or a newer one.",
+                saved="Nothing was changed.",
+            ) from problem
         raise StudyError(
             "The session log is damaged",
             f"Line {number} of {path.name} in {path.parent.name} is not an event that this version knows.",
             "Keep the folder as it is and restore the file from a copy; nothing was changed.",
             saved=f"The {number - 1} lines before it are whole.",
         ) from problem
+
+
+def _is_newer(line: bytes) -> bool:
+    try:
+        opening = json.loads(line)
+    except ValueError:
+        return False
+    known = isinstance(opening, dict) and opening.get("format") == SESSION_FORMAT
+    return known and opening.get("version") != SESSION_VERSION
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
@@ -100,7 +159,7 @@ def _write_all(descriptor: int, data: bytes) -> None:
 def _not_saved(path: Path, event: Event, problem: OSError) -> StudyError:
     return StudyError(
         "The session cannot be written to disk",
-        f"Writing '{event.event.replace('_', ' ')}' to {path.name} failed: {problem.strerror}. The force was released.",
-        f"Make room or mend the disk, then run: hapteq resume {path.parent.name}",
-        saved="Every answer before this one is on disk; the open trial will be drawn again.",
+        f"Writing '{event.event.replace('_', ' ')}' to {path.name} of {path.parent.name} failed: {problem.strerror}.",
+        "Make room or mend the disk.",
+        saved="Everything logged before is on disk.",
     )

@@ -36,11 +36,16 @@ def save_trial_recording(
 
 
 def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
-    """A recording that reached the disk although the log does not know of it."""
-    path = folder.path / name
+    """A recording that reached the disk although the log does not know of it; the latest of its name.
+
+    Raises StudyError where it cannot be read.
+    """
+    stem = Path(name).stem
+    numbered = sorted(folder.recordings.glob(f"{stem}_*.h5"), key=lambda path: int(path.stem.rpartition("_")[2]))
+    path = [folder.path / name, *numbered][-1]
     if not path.exists():
         return None
-    return SavedRecording(name, sha256_of(path)), read_recording(path)
+    return SavedRecording(path.relative_to(folder.path).as_posix(), sha256_of(path)), read_recording(path)
 
 
 def _free_name(folder: Path, name: str) -> str:

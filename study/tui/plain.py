@@ -87,11 +87,14 @@ class PlainDisplay:
         self._wait_for_enter()
         return self._clock.now_s() - started_s
 
+    def await_return(self, reason: str) -> None:
+        self._lines.forget()
+        self._say("", f"The last trial is void: {reason}. Press Enter when you are ready for it again.")
+        self._wait_for_enter()
+
     def goodbye(self, notice: Goodbye) -> None:
         if notice.finished:
             self._say("", f"Finished: {notice.answers} answers. Thank you.")
-        else:
-            self._say("", f"{notice.answers} answers are on disk. Go on with: hapteq resume {notice.folder}")
 
     def trouble(self, sentence: str) -> None:
         self._say(sentence)
@@ -103,7 +106,7 @@ class PlainDisplay:
             case "q":
                 return Unanswered("the participant left", leave=True)
             case "r":
-                return Unanswered("asked to repeat", leave=False)
+                return Unanswered("asked to repeat", leave=False, asked=True)
             case "?":
                 self._say(*self._picture, KEYS)
             case _:

@@ -3,11 +3,15 @@
 import io
 from pathlib import Path
 
+import numpy as np
+
 from analysis.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.figures.picture import Picture, picture_svg
 from analysis.figures.study_pictures import study_pictures
 from analysis.reports.study_report import render_study_report
 from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
 from study.devices.clock import RealClock
 from study.errors import StudyError
 from study.store.atomic_write import write_atomically
@@ -20,7 +24,13 @@ from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
 from study.workflows.collect_sessions import Collected, collect_sessions
 from study.workflows.written_analysis import WrittenAnalysis
 
+ANALYSIS_NAME = "analysis"
+"""Where an analysis goes, in the folder that was analysed, if nobody says otherwise."""
+
 FIGURE_DPI = 150
+
+OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
+"""Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""
 
 
 def analyze_data(
@@ -73,7 +83,7 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
         return ()
     recording = read_recording(path)
     try:
-        return ellipsoids(recording)
+        return ellipsoids(recording, sensor_frame(recording))
     except ValueError as problem:
         raise StudyError(
             "No ellipsoids can be computed",
@@ -81,6 +91,12 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
             "Give a recording made with: hapteq record ellipsoid",
             saved="Nothing was written.",
         ) from problem
+
+
+def sensor_frame(recording: Recording) -> FloatArray | None:
+    """Rotation from the sensor's axes to the device's, as the recording states it; None where it states none."""
+    frame = recording.meta.get("sensor", {}).get("frame_to_device")
+    return None if frame is None else np.asarray(frame, dtype=np.float64)
 
 
 def _write(
@@ -94,6 +110,8 @@ def _write(
     figures = out / "figures"
     try:
         figures.mkdir(parents=True, exist_ok=True)
+        for stale in (path for name in OURS for kind in ("svg", "png") for path in figures.glob(f"{name}.{kind}")):
+            stale.unlink()
     except OSError as problem:
         raise CannotWriteError(figures, problem) from problem
     write_thresholds(out / THRESHOLDS_NAME, analysis.thresholds)

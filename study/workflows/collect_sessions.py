@@ -85,7 +85,7 @@ def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolde
         except StudyError as problem:
             left_out.append(f"{folder.name} cannot be used. {problem.happened}")
     if not folded:
-        raise StudyError("There is nothing to analyse", " ".join(left_out), "Mend these sessions, or record new ones.")
+        raise StudyError("There is nothing to analyse", " ".join(left_out), "Record new sessions.")
     return folded, left_out
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from equalizer.tracking.equalizer import Identity
 from study.devices.clock import Clock
-from study.devices.device import Device
+from study.devices.device import Device, Fault
 from study.devices.opening import open_device
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
@@ -38,6 +38,8 @@ class Conducted:
     state: SessionState
     left: str
     """Why the sitting ended before the session was finished; empty where it is finished."""
+    fault: Fault
+    """What was wrong with the device, if that was why."""
 
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> Conducted:
@@ -73,4 +75,4 @@ def _run(opened: OpenedSession, device: Device, participant: Participant) -> Con
         hand=participant.hand,
     )
     end = run_session(opened.state, sitting)
-    return Conducted(opened.folder, end.state, end.left)
+    return Conducted(opened.folder, end.state, end.left, end.fault)

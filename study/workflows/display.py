@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from study.session.machine import Present
+from study.session.due_trial import Present
 from study.session.views import Goodbye, Question, Reply, RestNotice, Welcome
 
 SignOfLife = Callable[[], bool]
@@ -23,6 +23,10 @@ class Display(Protocol):
 
     def rest(self, notice: RestNotice) -> float:
         """An enforced rest; returns the seconds rested, never fewer than `notice.seconds`."""
+        ...
+
+    def await_return(self, reason: str) -> None:
+        """Nothing is played until somebody is there. Raises KeyboardInterrupt to leave."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None: ...

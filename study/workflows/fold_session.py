@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from protocols.hashing import protocol_hash
-from protocols.loading import load_protocol
+from protocols.loading import ProtocolError, load_protocol
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
 from study.session.events import SessionOpened
@@ -28,6 +28,13 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             "Start a new session; the folder holds no answers and may be deleted.",
         )
     opened = contents.events[0]
+    if (opened.session, opened.subject) != (folder.name, folder.subject):
+        raise StudyError(
+            "This log belongs to another session",
+            f"{folder.name} holds the log of {opened.session}: the folder was copied or renamed.",
+            "Give the folder its own name back, or take the copy away.",
+            saved="Nothing was changed.",
+        )
     state = begin_session(opened, _protocol_of(opened, folder))
     for number, event in enumerate(contents.events[1:], start=2):
         try:
@@ -36,14 +43,23 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             raise StudyError(
                 "The session log contradicts the rules",
                 f"Line {number} of {folder.name}: {problem}.",
-                "Resume with the program version that began it (first line of the log), or start a new session.",
+                "If the log was edited, restore it from a copy; if not, use the hapteq that began it (first line).",
                 saved="Nothing was changed; every answer is still in the log.",
             ) from problem
     return FoldedSession(state, contents)
 
 
 def _protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
-    protocol = load_protocol(opened.protocol_text, f"the log of {folder.name}")
+    try:
+        protocol = load_protocol(opened.protocol_text, f"the log of {folder.name}")
+    except ProtocolError as problem:
+        begun_by = opened.versions.get("hapteq", "another version")
+        raise StudyError(
+            "The protocol in the log cannot be read",
+            f"{problem} The session was begun by hapteq {begun_by}.",
+            "Use that version, or restore events.jsonl from a copy.",
+            saved="Nothing was changed.",
+        ) from problem
     if not isinstance(protocol, StudyProtocol):
         raise StudyError(
             "This is no study session", f"The protocol in the log of {folder.name} is a recording.", "Check the folder."

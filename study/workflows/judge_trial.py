@@ -14,17 +14,19 @@ class Judgement:
     """What is worth a look in a trial that counts."""
 
 
-def judge(health: Health, measured: bool, settings: MeasurementSettings) -> Judgement:
-    if health.fault is not Fault.NONE:
+def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_whole: bool) -> Judgement:
+    """felt_whole: whether the stimulus was whole when the answer came; what stops it afterwards is only flagged."""
+    if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, ())
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
         share = 100 * health.missed_ticks / max(health.ticks, 1)
         return Judgement(f"{share:.1f} % of the 1 kHz ticks were missed", ())
     observed = (
+        (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
         (health.total_clipped > 0, "leaned on the spring: stimulus reduced at the total cap"),
         (health.slew_limited > 0, "slew limited"),
         (health.sensor_clipped > 0, "accelerometer clipped"),
-        (not measured, "answered before the stimulus was steady"),
+        (not measured, "no steady part to measure, or too little of it"),
     )
     return Judgement("", tuple(text for seen, text in observed if seen))

@@ -14,10 +14,11 @@ from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
 from study.session.limits import limits_of_study
 from study.session.state import SessionState, begin_session
-from study.store.archive import SessionFolder, new_session_folder, session_folders
-from study.store.event_log import LOG_NAME, EventLog, read_log
+from study.store.archive import SessionFolder, new_session_folder
+from study.store.event_log import EventLog
 from study.store.provenance import versions
 from study.store.session_lock import locked
+from study.workflows.participant_number import participant_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ def check_playable(protocol: StudyProtocol) -> None:
         raise StudyError(
             "This protocol needs an equalizer",
             f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and there is no equalizer model.",
-            'Set stimulus.quantity = "commanded_force", or give a model of this device.',
+            'Set stimulus.quantity = "commanded_force": this version has no equalizer for it yet.',
         )
 
 
@@ -72,7 +73,7 @@ def opened_session(plan: SessionPlan, device: DeviceInfo, equalizer: str, clock:
     """A new session, locked as long as the context lasts."""
     number = plan.participant_number
     if number is None:
-        number = participant_number(plan.data, plan.subject, plan.protocol.name)
+        number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
     folder = new_session_folder(plan.data, plan.subject)
     opened = SessionOpened(
         utc=clock.utc(),
@@ -99,31 +100,7 @@ def opened_session(plan: SessionPlan, device: DeviceInfo, equalizer: str, clock:
             log.close()
 
 
-def participant_number(data: Path, subject: str, protocol_name: str) -> int:
-    """How many other participants came before this one: 0 for the first. A returning one keeps the number.
-
-    Withdrawn participants keep theirs too, so that a balanced order never gives a row twice by mistake.
-    """
-    seen: list[str] = []
-    for folder in session_folders(data):
-        if folder.subject == subject:
-            returning = _number_in(folder, protocol_name)
-            if returning is not None:
-                return returning
-        elif folder.subject not in seen:
-            seen.append(folder.subject)
-    return len(seen)
-
-
 def device_facts(info: DeviceInfo) -> DeviceFacts:
     return DeviceFacts(
         name=info.name, simulated=info.simulated, sample_rate_hz=info.sample_rate_hz, details=info.details
     )
-
-
-def _number_in(folder: SessionFolder, protocol_name: str) -> int | None:
-    if not (folder.path / LOG_NAME).exists():
-        return None
-    first = next(iter(read_log(folder.log).events), None)
-    same = isinstance(first, SessionOpened) and f'"{protocol_name}"' in first.protocol_text
-    return first.participant_number if isinstance(first, SessionOpened) and same else None

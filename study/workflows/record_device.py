@@ -54,9 +54,12 @@ def record_device(plan: RecordingPlan, on_progress: Callable[[float], None]) -> 
         try:
             _play_all(plan.protocol, device, done, on_progress)
         except KeyboardInterrupt as interruption:
-            if done:
-                _write(plan, device, done, interrupted=True)
+            _write_whole_pieces(plan, device, done)
             raise _left(plan, len(done)) from interruption
+        except DeviceError as error:
+            _write_whole_pieces(plan, device, done)
+            error.saved = _saved(plan, len(done))
+            raise
         return _write(plan, device, done, interrupted=False)
 
 
@@ -93,7 +96,6 @@ def _play_all(
                 "The device let go",
                 f"While recording along {piece.along}: {played.health.fault.value}.",
                 "Check the device and record again.",
-                saved="Nothing was written.",
             )
         done.append((piece, played.recording, played.health))
         before_s += length_s
@@ -106,8 +108,17 @@ def _left(plan: RecordingPlan, done: int) -> LeftError:
         "Interrupted",
         f"{done} of {all_pieces} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",
-        saved=f"The whole pieces are in {plan.out}." if done else "Nothing was written.",
+        saved=_saved(plan, done),
     )
+
+
+def _saved(plan: RecordingPlan, done: int) -> str:
+    return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
+
+
+def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[tuple[Piece, Recording, Health]]) -> None:
+    if done:
+        _write(plan, device, done, interrupted=True)
 
 
 def _settings(plan: RecordingPlan) -> DeviceSettings:
@@ -143,6 +154,8 @@ def _meta(
             "damping_n_s_per_m": protocol.spring.damping_n_s_per_m,
             "effective_mass_kg": device.info.effective_mass_kg,
         },
+        # As mounted: what is off by the mounting's tolerance is not known to whoever records.
+        "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
         "interrupted": interrupted,
         "segments": [
             {"frequency_hz": p.frequency_hz, "along": p.along, "unit_vector": list(p.unit_vector)} for p, _, _ in done
@@ -161,4 +174,8 @@ def _warnings(done: list[tuple[Piece, Recording, Health]]) -> tuple[str, ...]:
             found.append(f"The accelerometer clipped in {health.sensor_clipped} samples ({what} along {piece.along}).")
         if health.total_clipped or health.stimulus_clipped:
             found.append(f"The force was limited at its cap ({what} along {piece.along}).")
+        if health.missed_ticks:
+            found.append(f"{health.missed_ticks} ticks were missed ({what} along {piece.along}); they are NaN.")
+        if health.slew_limited:
+            found.append(f"The force was slowed by the slew limit ({what} along {piece.along}).")
     return tuple(found)

@@ -68,6 +68,10 @@ def subject_code(number: int) -> str:
     return f"S{number + 1:03d}"
 
 
+def codes(subjects: int) -> set[str]:
+    return {subject_code(number) for number in range(subjects)}
+
+
 def subject_seed(seed: int, number: int) -> int:
     """Neighbouring rehearsals share no participant: the number is mixed in, not added."""
     from numpy.random import SeedSequence
@@ -79,6 +83,8 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
     observer = population(rehearsal.subjects, rehearsal.seed)[number]
     clock, seed = VirtualClock(), subject_seed(rehearsal.seed, number)
     participant = seated(observer, seed, clock)
+    if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
+        return
     begun = _begun(rehearsal.data, subject_code(number))
     if begun is None:
         plan = SessionPlan(
@@ -106,6 +112,14 @@ def _begun(data: Path, subject: str) -> SessionFolder | None:
 
 
 def _check_same(rehearsal: Rehearsal) -> None:
+    more = [f.name for f in session_folders(rehearsal.data) if f.subject not in codes(rehearsal.subjects)]
+    if more:
+        raise StudyError(
+            "This folder holds other sessions",
+            f"Beside this rehearsal's participants there is {', '.join(more[:5])} in {rehearsal.data}.",
+            "Choose another folder with --out, or at least as many --subjects as were begun.",
+            saved="Nothing was changed.",
+        )
     for number in range(rehearsal.subjects):
         folder = _begun(rehearsal.data, subject_code(number))
         if folder is None:

@@ -8,8 +8,9 @@ from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
 from study.session.delivered import delivered
+from study.session.due_trial import labels_are_swapped
 from study.session.events import SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
-from study.session.state import SessionState, apply, labels_are_swapped
+from study.session.state import SessionState, apply
 from study.session.stimulus import direction_vector
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend
@@ -44,7 +45,7 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
         raise StudyError(
             "This session is finished",
             f"{folder.name} has all its runs.",
-            f"Look at its results: hapteq analyze {folder.name}",
+            f"Look at its results: hapteq analyze {folder.path}",
             saved=f"{state.answers} answers are on disk.",
         )
     if device.simulated != state.opened.device.simulated:
@@ -80,7 +81,11 @@ def _measured_late(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured:
     """The program died between answer and measurement: the recording may still have reached the disk."""
-    found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
+    name = recording_name(presented.run, presented.trial, presented.attempt)
+    try:
+        found = find_trial_recording(folder, name)
+    except StudyError:  # the answer is safe in the log; a damaged recording stays for whoever wants to look
+        found = None
     if found is None:
         return TrialMeasured(
             utc=clock.utc(),
@@ -91,7 +96,7 @@ def _measured_late(
             flags=("its recording was lost when the program ended",),
         )
     saved, recording = found
-    direction = label_of(presented.direction, labels_are_swapped(state))
+    direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
     vector = direction_vector(state.protocol.directions, direction)
     values = delivered(recording, vector, presented.frequency_hz)
     return TrialMeasured(
@@ -100,7 +105,7 @@ def _measured_late(
         trial=presented.trial,
         attempt=presented.attempt,
         status="flagged",
-        flags=("measured after a restart",),
+        flags=("measured after a restart", *recording.meta.get("flags", ())),
         recording=saved.name,
         sha256=saved.sha256,
         delivered_mps2=values.along_mps2 if values else None,

@@ -4,14 +4,20 @@ import contextlib
 from dataclasses import dataclass
 
 from protocols.trial import Phase
+from study.devices.device import Fault
 from study.errors import LeftError, StudyError
+from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
-from study.session.machine import Finish, Present, Rest, next_action
-from study.session.state import SessionState, felt, labels_are_swapped
+from study.session.machine import Finish, Rest, next_action
+from study.session.state import SessionState, felt
 from study.session.views import Goodbye, RestNotice, Welcome, picture_of
 from study.workflows.fold_session import fold_session
-from study.workflows.present_trial import present_trial
+from study.workflows.present_trial import AfterTrial, present_trial
 from study.workflows.sitting import Sitting, record
+
+VOID_TRIALS_IN_A_ROW = 3
+"""After so many presentations that nobody asked to repeat were void, the sitting ends: nobody is there, or the device
+is not well. A stimulus must not shake an empty chair all night."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,41 +25,58 @@ class SessionEnd:
     state: SessionState
     left: str
     """Why the sitting ended before the session was finished; empty where it is finished."""
+    fault: Fault = Fault.NONE
+    """What was wrong with the device, if that was why."""
 
 
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run until the session is finished or somebody leaves.
 
-    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and leaves as LeftError.
+    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and leaves as LeftError. Any StudyError
+    on the way leaves with the number of answers that are on disk, and how to go on.
     """
     try:
         sitting.display.welcome(_welcome(state, sitting))
         end = _loop(state, sitting)
     except KeyboardInterrupt as interruption:
         sitting.device.stop()
-        raise _left(sitting) from interruption
+        return _interrupted(sitting, interruption)
+    except StudyError as error:
+        sitting.device.stop()
+        raise _with_the_way_back(error, sitting) from error
     except BaseException:
         sitting.device.stop()
         raise
-    notice = Goodbye(finished=not end.left, answers=end.state.answers, folder=sitting.folder.name)
-    sitting.display.goodbye(notice)
+    sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers))
     return end
 
 
-def _left(sitting: Sitting) -> LeftError:
-    """The device is free already. A full disk must not hide why the sitting ended."""
+def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
+    """What is on the disk decides: a session whose last line was written is finished, however it ended."""
+    state = fold_session(sitting.folder).state
+    if state.closed:
+        return SessionEnd(state, left="")
+    # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
         sitting.log.append(SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted at the keyboard"))
-    answers = fold_session(sitting.folder).state.answers
-    return LeftError(
+    raise LeftError(
         "Interrupted",
         "The force was released.",
         f"Go on with: hapteq resume {sitting.folder.path}",
-        saved=f"{answers} answers are on disk.",
-    )
+        saved=f"{state.answers} answers are on disk.",
+    ) from interruption
+
+
+def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
+    """The same error; only the session knows how much is safe and how to go on."""
+    with contextlib.suppress(StudyError):
+        error.saved = f"{fold_session(sitting.folder).state.answers} answers are on disk."
+        error.do_now = f"{error.do_now} Then go on with: hapteq resume {sitting.folder.path}"
+    return error
 
 
 def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
+    voids = 0
     while True:
         match next_action(state):
             case Finish():
@@ -64,12 +87,24 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
             case Present() as present:
                 after = present_trial(state, present, sitting)
                 state = after.state
-                if after.leave:
-                    left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
-                    return SessionEnd(record(state, left, sitting), left=after.leave)
-                if after.correct is not None and _feedback_wanted(state, present.phase):
-                    sitting.display.feedback(after.correct)
-                sitting.clock.sleep(state.protocol.trial.pause_between_s)
+                voids = voids + 1 if after.void else 0
+                leave = after.leave or _too_many(voids, after.void)
+                if leave:
+                    left = SessionInterrupted(utc=sitting.clock.utc(), reason=leave)
+                    return SessionEnd(record(state, left, sitting), leave, after.fault)
+                _between_trials(after, present, sitting, state)
+
+
+def _between_trials(after: AfterTrial, present: Present, sitting: Sitting, state: SessionState) -> None:
+    if after.void:
+        sitting.display.await_return(after.void)
+    if after.correct is not None and _feedback_wanted(state, present.phase):
+        sitting.display.feedback(after.correct)
+    sitting.clock.sleep(state.protocol.trial.pause_between_s)
+
+
+def _too_many(voids: int, reason: str) -> str:
+    return f"{voids} trials in a row were void, the last because {reason}" if voids >= VOID_TRIALS_IN_A_ROW else ""
 
 
 def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
@@ -88,7 +123,7 @@ def _welcome(state: SessionState, sitting: Sitting) -> Welcome:
     training = sum(run.phase is Phase.TRAINING for run in state.runs)
     return Welcome(
         title=state.protocol.title,
-        picture=picture_of(state.protocol.directions, labels_are_swapped(state)),
+        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
         runs=len(state.runs) - training,
         training_runs=training,
         device=sitting.device.info.name,

@@ -14,8 +14,8 @@ from study.store.provenance import sha256_of
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.workflows.file_content import FileContent
 from study.workflows.fold_session import FoldedSession, fold_session
+from study.workflows.participant_number import TOMBSTONE_FORMAT
 from study.workflows.session_results import SUMMARY_FORMAT, SUMMARY_VERSION
-from study.workflows.withdraw_participant import FORMAT as TOMBSTONE_FORMAT
 
 KIND = "session"
 

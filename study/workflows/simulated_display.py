@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from study.devices.clock import Clock
 from study.participants.observer import Felt, Observer
-from study.session.machine import Present
+from study.session.due_trial import Present
 from study.session.views import Answered, Goodbye, Question, Reply, RestNotice, Unanswered, Welcome
 from study.workflows.display import SignOfLife
 
@@ -43,11 +43,14 @@ class SimulatedDisplay:
         if self._felt is None:
             raise RuntimeError("a simulated participant was asked before anything was felt")
         reply = self._observer.reply(self._felt, self._seed)
-        until_s = self._clock.now_s() + reply.response_time_s
+        too_slow = 0 < question.time_limit_s < reply.response_time_s
+        until_s = self._clock.now_s() + (question.time_limit_s if too_slow else reply.response_time_s)
         while (left_s := until_s - self._clock.now_s()) > 1e-9:
             self._clock.sleep(min(GLANCE_S, left_s))
             if not sign_of_life():
                 return Unanswered("the stimulus ended early", leave=False)
+        if too_slow:
+            return Unanswered("no answer within the time limit", leave=False)
         return Answered(reply.answer, self._clock.now_s())
 
     def feedback(self, correct: bool) -> None:
@@ -58,6 +61,9 @@ class SimulatedDisplay:
         return notice.seconds
 
     def goodbye(self, notice: Goodbye) -> None:
+        return None
+
+    def await_return(self, reason: str) -> None:
         return None
 
     def trouble(self, sentence: str) -> None:

@@ -18,7 +18,7 @@ def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Ite
     try:
         for path in paths:
             try:
-                yield worker.submit(validate_file, path).result(timeout=patience_s)
+                yield worker.submit(_validated, path).result(timeout=patience_s)
             except BrokenProcessPool:
                 yield _damaged(path, "reading it crashes the HDF5 library")
                 worker = _worker()
@@ -28,6 +28,14 @@ def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Ite
                 worker = _worker()
     finally:
         worker.shutdown(wait=False, cancel_futures=True)
+
+
+def _validated(path: Path) -> Validation:
+    """Runs in the worker. Only a death of the process may look like one."""
+    try:
+        return validate_file(path)
+    except Exception as error:  # noqa: BLE001 - a file must not be called damaged for a mistake of ours
+        return Validation(path, "unknown", (f"hapteq failed on this file ({type(error).__name__}: {error}).",))
 
 
 def _worker() -> ProcessPoolExecutor:

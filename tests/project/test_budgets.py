@@ -11,7 +11,6 @@ SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob
 
 FILE_LINES = 250
 FUNCTION_LINES = 40
-PARAMETERS = 6
 
 
 def functions(path: Path):

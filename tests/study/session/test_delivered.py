@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,21 @@ def test_along_and_off_the_direction_come_apart_at_any_phase(phase):
     assert values.along_mps2 == pytest.approx(4.0)
     assert values.off_axis_mps2 == pytest.approx(1.5)
     assert values.displacement_mm == pytest.approx(1000 * 4.0 / (2 * np.pi * 25.0) ** 2)
+
+
+def test_missed_ticks_are_left_out():
+    whole = recording(1000, 4.0, 1.5)
+    gaps = whole.response.samples.copy()
+    gaps[[3, 40, 41, 500]] = np.nan
+    values = delivered(replace(whole, response=replace(whole.response, samples=gaps)), DIRECTION, 25.0)
+    assert values.along_mps2 == pytest.approx(4.0)
+    assert values.off_axis_mps2 == pytest.approx(1.5)
+
+
+def test_a_recording_of_nothing_but_gaps_is_no_measurement():
+    whole = recording(1000, 4.0, 1.5)
+    nothing = replace(whole.response, samples=np.full((1000, 3), np.nan))
+    assert delivered(replace(whole, response=nothing), DIRECTION, 25.0) is None
 
 
 def test_less_than_a_period_is_no_measurement():

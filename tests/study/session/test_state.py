@@ -14,6 +14,7 @@ from study.session.events import (
     DeviceFacts,
     RestTaken,
     SessionClosed,
+    SessionInterrupted,
     SessionOpened,
     TrialMeasured,
     TrialPresented,
@@ -136,8 +137,38 @@ def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fres
 
 def test_a_level_that_the_rules_do_not_give_is_a_contradiction(fresh):
     wrong = replace(presented(next_action(fresh)), level_n=1.1)
-    with pytest.raises(LogContradiction, match=r"1\.1 N, but the rules now give 5\.0 Hz and 1\.0 N.*different rules"):
+    with pytest.raises(LogContradiction, match=r"level_n 1\.1 where 1\.0 is due: .*different rules"):
         apply(fresh, wrong)
+
+
+@pytest.mark.parametrize("field", ["direction", "angle_deg", "polarity", "level_db", "frequency_hz", "phase"])
+def test_no_part_of_a_draw_can_be_changed_in_the_log(fresh, field):
+    right = presented(next_action(fresh))
+    other = {
+        "direction": 3 - right.direction,
+        "angle_deg": right.angle_deg + 90.0,
+        "polarity": -right.polarity,
+        "level_db": right.level_db + 1.0,
+        "frequency_hz": 25.0,
+        "phase": Phase.TEST,
+    }
+    with pytest.raises(LogContradiction, match=f"presented with {field} "):
+        apply(fresh, replace(right, **{field: other[field]}))
+
+
+def test_the_last_bit_of_a_level_may_differ_between_machines(fresh):
+    right = presented(next_action(fresh))
+    assert apply(fresh, replace(right, level_n=right.level_n * (1 + 1e-15))).presented is not None
+
+
+def test_a_session_cannot_be_closed_before_its_last_run(fresh):
+    with pytest.raises(LogContradiction, match="before its last run was finished"):
+        apply(fresh, SessionClosed(UTC, "completed"))
+
+
+def test_a_rest_that_was_not_due_is_a_contradiction(fresh):
+    with pytest.raises(LogContradiction, match="none was due"):
+        apply(fresh, RestTaken(UTC, 0, 0, rested_s=5.0))
 
 
 @pytest.mark.parametrize("change", [{"run": 1}, {"trial": 1}, {"attempt": 1}])
@@ -164,8 +195,22 @@ def test_a_measurement_before_the_answer_is_a_contradiction(fresh):
         apply(apply(fresh, presented(action)), measured(action))
 
 
-def test_nothing_follows_the_closing(fresh):
-    closed = apply(fresh, SessionClosed(UTC, "completed"))
+def finished_session(fresh):
+    state = fresh
+    answers = iter([True, True, True, False] * 100)
+    while not isinstance(next_action(state), Finish):
+        state = one_trial(state, next(answers))
+    return apply(state, SessionClosed(UTC, "completed"))
+
+
+def test_an_interruption_at_the_very_end_does_not_spoil_a_finished_session(fresh):
+    """As a Ctrl-C right after the last line left it."""
+    closed = finished_session(fresh)
+    assert apply(closed, SessionInterrupted(UTC, "interrupted at the keyboard")).closed
+
+
+def test_nothing_else_follows_the_closing(fresh):
+    closed = finished_session(fresh)
     with pytest.raises(LogContradiction, match="after the session was closed"):
         apply(closed, SessionClosed(UTC, "completed"))
 

@@ -20,7 +20,7 @@ def test_a_number_is_not_used_again_after_a_folder_was_moved_away(tmp_path):
     assert second.name == "P01_002"
 
 
-@pytest.mark.parametrize("code", ["", "Ada Lovelace", "ada@lab.org", "P01_2", "../P01", "P" * 17, "P01\n"])
+@pytest.mark.parametrize("code", ["", "JohnSmith", "Ada Lovelace", "ada@lab.org", "P01_2", "../P01", "P" * 17, "P01\n"])
 def test_a_participant_is_a_code_and_never_a_name(code):
     with pytest.raises(WrongUseError) as error:
         check_subject(code)

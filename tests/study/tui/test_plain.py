@@ -5,7 +5,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.devices.clock import RealClock, VirtualClock
-from study.session.views import Answered, DirectionPicture, Goodbye, Question, RestNotice, Unanswered, Welcome
+from study.session.views import Answered, DirectionPicture, Question, RestNotice, Unanswered, Welcome
 from study.tui.direction_picture import drawing, sentence
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
@@ -60,7 +60,7 @@ def test_help_shows_the_picture_again(typed):
 def test_leaving_and_repeating_are_no_answers(typed):
     typed.type("q\nr\n")
     assert typed.ask() == Unanswered("the participant left", leave=True)
-    assert typed.ask() == Unanswered("asked to repeat", leave=False)
+    assert typed.ask() == Unanswered("asked to repeat", leave=False, asked=True)
 
 
 def test_the_end_of_the_input_leaves(typed):
@@ -122,9 +122,11 @@ def test_a_rest_is_enforced_and_says_what_is_left():
     assert "for at least 25 s. 3 runs are left." in out.getvalue()
 
 
-def test_leaving_tells_how_to_go_on(typed):
-    typed.display.goodbye(Goodbye(finished=False, answers=17, folder="P01_001"))
-    assert "17 answers are on disk. Go on with: hapteq resume P01_001" in typed.out.getvalue()
+def test_after_a_void_trial_nothing_is_played_until_somebody_is_there(typed):
+    typed.type("\n")
+    typed.display.await_return("the stimulus was held too long")
+    assert "The last trial is void: the stimulus was held too long." in typed.out.getvalue()
+    assert "Press Enter when you are ready" in " ".join(typed.out.getvalue().split())
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,63 @@
+"""The trial that is due: everything about a presentation that follows from rules, seed and place in the session."""
+
+from dataclasses import dataclass
+
+from protocols.schedule import Run, draw_trial, label_of, labels_swapped
+from protocols.staircase import StaircaseState, level_n
+from protocols.staircase_rule import StaircaseRule
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase
+from study.session.events import SessionOpened
+from study.session.stimulus import direction_angle_deg
+
+
+@dataclass(frozen=True, slots=True)
+class Present:
+    """Play this stimulus and ask for the answer."""
+
+    run: int
+    trial: int
+    attempt: int
+    phase: Phase
+    frequency_hz: float
+    level_db: float
+    level_n: float
+    label: int
+    """The number that is the right answer."""
+    direction: int
+    """The protocol's direction to play; another number than the label where labels are swapped."""
+    angle_deg: float
+    polarity: int
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a session a trial stands."""
+
+    run: Run
+    trial: int
+    attempt: int
+    staircase: StaircaseState
+
+
+def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> Present:
+    run, polarity = place.run, protocol.stimulus.onset_polarity
+    draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, place.attempt)
+    return Present(
+        run=run.index,
+        trial=place.trial,
+        attempt=place.attempt,
+        phase=run.phase,
+        frequency_hz=run.frequency_hz,
+        level_db=place.staircase.level_db,
+        level_n=level_n(rule, place.staircase),
+        label=label_of(draw.direction, labels_are_swapped(protocol, opened)),
+        direction=draw.direction,
+        angle_deg=direction_angle_deg(protocol.directions, draw.direction),
+        polarity=draw.polarity,
+    )
+
+
+def labels_are_swapped(protocol: StudyProtocol, opened: SessionOpened) -> bool:
+    """Whether the numbers 1 and 2 change places for this participant."""
+    return labels_swapped(protocol.schedule, len(protocol.stimulus.frequencies_hz), opened.participant_number)

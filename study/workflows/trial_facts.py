@@ -1,0 +1,96 @@
+"""The facts of one trial as events, and what its recording says of itself."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from equalizer.signals.signal import FloatArray
+from study.devices.device import Health, Played
+from study.session.delivered import Delivered
+from study.session.due_trial import Present
+from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.state import SessionState
+from study.store.provenance import versions
+from study.store.trial_recordings import recording_name, save_trial_recording
+from study.workflows.sitting import Sitting
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What the device did in an answered trial."""
+
+    played: Played
+    values: Delivered | None
+    flags: tuple[str, ...]
+    vector: FloatArray
+    """(3,): the direction played."""
+
+
+def presented(present: Present, sitting: Sitting) -> TrialPresented:
+    return TrialPresented(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        phase=present.phase,
+        frequency_hz=present.frequency_hz,
+        level_db=present.level_db,
+        level_n=present.level_n,
+        direction=1 if present.label == 1 else 2,
+        angle_deg=present.angle_deg,
+        polarity=1 if present.polarity > 0 else -1,
+    )
+
+
+def spoiled(present: Present, reason: str, health: Health, sitting: Sitting) -> TrialSpoiled:
+    return TrialSpoiled(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        reason=reason,
+        missed_ticks=health.missed_ticks,
+    )
+
+
+def measured(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> TrialMeasured:
+    """Saves the recording first: the event names it."""
+    saved = None
+    if outcome.played.recording is not None:
+        conditions = _conditions(present, outcome, state, sitting)
+        name = recording_name(present.run, present.trial, present.attempt)
+        saved = save_trial_recording(sitting.folder, name, outcome.played.recording, conditions)
+    values = outcome.values
+    return TrialMeasured(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        status="flagged" if outcome.flags else "ok",
+        flags=outcome.flags,
+        recording=saved.name if saved else None,
+        sha256=saved.sha256 if saved else None,
+        delivered_mps2=values.along_mps2 if values else None,
+        off_axis_mps2=values.off_axis_mps2 if values else None,
+        displacement_mm=values.displacement_mm if values else None,
+        missed_ticks=outcome.played.health.missed_ticks,
+    )
+
+
+def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> dict[str, Any]:
+    """What a recording carries inside, so that the file alone tells what was played, and where it comes from."""
+    return {
+        "session": sitting.folder.name,
+        "trial": {"run": present.run, "trial": present.trial, "attempt": present.attempt},
+        "frequency_hz": present.frequency_hz,
+        "level_n": present.level_n,
+        "unit_vector": [float(v) for v in outcome.vector],
+        "hand": "held",
+        "missed_ticks": outcome.played.health.missed_ticks,
+        "flags": list(outcome.flags),
+        "equalizer": sitting.equalizer.name,
+        "provenance": {
+            "protocol_hash": state.opened.protocol_hash,
+            "seed": state.opened.seed,
+            "versions": versions(),
+        },
+    }
