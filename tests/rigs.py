@@ -94,6 +94,40 @@ class ScriptedRig:
         self.closed = True
 
 
+class HeldForceRig:
+    """Like hardware it keeps the last force it was given. Its driver can be made to hang and to fail."""
+
+    def __init__(self) -> None:
+        self.last_n = np.zeros(3)
+        self.written_n: list[FloatArray] = []
+        self.closed = 0
+        self.before_sensing: Callable[[], None] | None = None
+        self.before_writing: Callable[[FloatArray], None] | None = None
+
+    @property
+    def info(self) -> DeviceInfo:
+        return replace(INFO, simulated=False)
+
+    def sense(self) -> FloatArray:
+        if self.before_sensing is not None:
+            self.before_sensing()
+        return np.zeros(READING_SIZE)
+
+    def write(self, force_n: FloatArray) -> None:
+        if self.before_writing is not None:
+            self.before_writing(force_n)
+        self.last_n = force_n.copy()
+        self.written_n.append(self.last_n)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def push(force_n: float = 2.9) -> HeldStimulus:
+    """A constant force along x."""
+    return HeldStimulus(force(np.tile([[force_n, 0.0, 0.0]], (50, 1))), 0.05, 0.05, "linear")
+
+
 def sine(amplitude_n: float = 1.0, periods_per_s: int = 5, fade_s: float = 0.1) -> HeldStimulus:
     samples = round(RATE_HZ) // periods_per_s
     phase = 2 * np.pi * np.arange(samples) / samples

@@ -51,6 +51,7 @@ class Fault(Enum):
     HELD_TOO_LONG = "the stimulus was held longer than the protocol allows"
     STOPPED = "the emergency stop was pressed"
     LOST = "the device stopped answering"
+    FORCE_LEFT = "the device took no zero force: let go of the handle and switch the device off"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,10 @@ class Device(Protocol):
         ...
 
     def keep_alive(self) -> None:
-        """A sign of life. Without one for `watchdog_s` the force fades to zero and the fault is STALLED."""
+        """A sign of life. Without one for `watchdog_s` the force fades to zero and the fault is STALLED.
+
+        Looks for the device's own sign of life too: if it hangs, the force goes off and the fault is LOST.
+        """
         ...
 
     def fault(self) -> Fault:
@@ -107,6 +111,7 @@ class Device(Protocol):
         """Fade out, wait until the device is still, and say what happened. To be called after a fault as well.
 
         Does not raise for a lost device, so that the trial can be logged as void; the next `hold` or `play` does.
+        After FORCE_LEFT the force may still be on: whoever hears of it says so to the person at the handle.
         """
         ...
 
@@ -120,7 +125,10 @@ class Device(Protocol):
         ...
 
     def stop(self) -> None:
-        """Emergency stop: no force from the next tick on, until the device is opened again."""
+        """Emergency stop: no force from the next tick on, until the device is opened again.
+
+        From any thread. Waits some milliseconds for the loop, and where that hangs, writes zero past it.
+        """
         ...
 
     def close(self) -> None:

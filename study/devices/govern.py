@@ -39,7 +39,7 @@ STILL, PLAYING, RELEASING, LETTING_GO = range(4)
 """Phases. RELEASING is asked for and fades as the stimulus says; LETTING_GO is the safety layer's own fade of the
 last force: straight to zero, needing neither sensor nor program, and exempt from the slew limit."""
 
-NO_FAULT, NOT_A_NUMBER, STALLED, HELD_TOO_LONG, STOPPED, LOST = range(6)
+NO_FAULT, NOT_A_NUMBER, STALLED, HELD_TOO_LONG, STOPPED, LOST, FORCE_LEFT = range(7)
 """In the order of `study.devices.device.Fault`."""
 
 ROW_SIZE = 15

@@ -96,8 +96,8 @@ class Governor:
         return bool(self.state[govern.STOP_ASKED] != 0.0)
 
     def abandon(self, fault: Fault) -> None:
-        """No force from now on: the loop itself is in trouble."""
-        if self.moving and self.fault is Fault.NONE:
+        """No force from now on: the loop itself is in trouble. The first fault stays, unless a worse one comes."""
+        if fault is Fault.FORCE_LEFT or self.fault is Fault.NONE:
             self.state[govern.FAULT] = FAULTS.index(fault)
         self.state[govern.PHASE] = govern.STILL
         self.state[govern.FORCE : govern.FORCE + 3] = 0.0

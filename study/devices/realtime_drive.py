@@ -2,8 +2,11 @@
 
 A stimulus is a function of time. Ticks that come late are caught up where the world waits (a simulated rig); where
 it does not, they are counted as missed and the waveform goes on where the time is, never stretched.
+
+The thread watches its callers (the governor's watchdog), and every caller watches the thread (`check`).
 """
 
+import math
 import threading
 from collections.abc import Callable
 
@@ -16,7 +19,16 @@ from study.devices.virtual_drive import ticks_by
 LEISURELY_S = 0.003
 """Between two pumps of a simulated rig: nobody feels it, so it need not wake for each tick."""
 
-JOIN_S = 2.0
+LATE_S = 0.1
+"""A real rig's loop that did not turn for so long counts as hanging. A busy computer is late by some 10 ms."""
+
+GRACE_S = 0.02
+"""When the whole process stood still, its loop looks late too: it gets so long to prove itself alive."""
+
+STOP_S = 0.005
+"""How long an emergency stop waits for the loop to write the zero."""
+
+JOIN_S = 0.5
 """A driver that hangs must not hang the program as well."""
 
 SPIN_S = 0.00015
@@ -29,7 +41,7 @@ class RealtimeDrive:
         self._governor = governor
         self._clock = clock
         self._rate_hz = rate_hz
-        self._longest_gap_s = longest_gap_s
+        self._longest_gap_s = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
         self._started_s = self._last_s = 0.0
         self._run = 0
         self._lock = threading.Lock()
@@ -38,13 +50,40 @@ class RealtimeDrive:
         self._thread = threading.Thread(target=self._attend, name="haptic loop", daemon=True)
         self._thread.start()
 
-    def start(self, begin: Callable[[], None]) -> None:
-        """`begin` readies the governor, undisturbed by the thread; from now on its ticks fall due."""
-        with self._lock:
+    def start(self, begin: Callable[[], None]) -> bool:
+        """`begin` readies the governor, undisturbed by the thread; from now on its ticks fall due.
+
+        False, and nothing begins, where something moves already or nothing may move any more.
+        """
+        if not (self._thread.is_alive() and self._lock.acquire(timeout=JOIN_S)):
+            self._runner.give_up(TimeoutError("its loop hangs"))
+            return False
+        try:
+            if self._runner.moving or self._closing or self._runner.failure is not None:
+                return False
+            self._last_s = math.inf  # a long preparation is no late tick
             begin()
             self._started_s = self._last_s = self._clock.now_s()
             self._run = 0
             self._awake.set()
+            return True
+        finally:
+            self._lock.release()
+
+    def check(self) -> None:
+        """Give up a loop that gives no sign of life while something is played. Cheap."""
+        if self._runner.moving and self._late():
+            self._clock.sleep(GRACE_S)
+            if self._late():
+                self._runner.give_up(TimeoutError("its loop gave no sign of life"))
+
+    def stop(self) -> None:
+        """After a stop was asked for: see to it that the loop hears it, or do without the loop."""
+        until_s = self._clock.now_s() + STOP_S
+        while self._runner.moving and self._clock.now_s() < until_s:
+            self._clock.sleep(STOP_S / 10)
+        if self._runner.moving:
+            self._runner.cut()
 
     def close(self) -> None:
         self._closing = True
@@ -61,8 +100,7 @@ class RealtimeDrive:
                 return
             gap_s, self._last_s = now_s - self._last_s, now_s
             if gap_s > self._longest_gap_s:
-                self._governor.abandon(Fault.STALLED)
-                self._runner.run(1)
+                self._runner.drop(Fault.STALLED)
                 return
             due = ticks_by(now_s - self._started_s, self._rate_hz)
             late = due - self._run - 1
@@ -72,16 +110,23 @@ class RealtimeDrive:
             self._runner.run(due - self._run)
             self._run = due
 
+    def _late(self) -> bool:
+        if not self._thread.is_alive():
+            return True
+        return not self._runner.catches_up and self._clock.now_s() - self._last_s > LATE_S
+
     def _attend(self) -> None:
-        while True:
-            self._awake.wait()
-            if self._closing:
-                return
+        while not self._closing:
             try:
+                self._awake.wait()
                 self._wait_for_tick()
                 self.pump(self._clock.now_s())
-            except Exception as error:  # noqa: BLE001 - a dead loop must not leave a force behind
+            except BaseException as error:  # noqa: BLE001 - a dead loop must not leave a force behind
                 self._runner.give_up(error)
+                return
+        if self._runner.moving:
+            self._governor.ask_stop()
+            self._runner.run(1)
 
     def _wait_for_tick(self) -> None:
         if self._runner.catches_up:

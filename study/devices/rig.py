@@ -28,7 +28,11 @@ READING_SIZE = 10
 
 
 class Rig(Protocol):
-    """Driven tick by tick from Python: a real or a scripted device."""
+    """Driven tick by tick from Python: a real or a scripted device.
+
+    One thread calls `sense` and `write` in turn. While one of these hangs, another thread calls `write` with a zero
+    force, and `close`: a driver that is not made for that must serve them all the same, and release no force after.
+    """
 
     @property
     def info(self) -> DeviceInfo: ...
@@ -42,7 +46,7 @@ class Rig(Protocol):
         ...
 
     def close(self) -> None:
-        """Force off, disconnect. Never raises."""
+        """Force off, disconnect. Never raises; may be called again."""
         ...
 
 

@@ -15,7 +15,8 @@ from study.devices.governor import SETTLE_S, Governor
 from study.devices.played import played_loop, played_once
 from study.devices.realtime_drive import RealtimeDrive
 from study.devices.rig import CompiledRig, Rig
-from study.devices.runner import CompiledRunner, Runner, SteppedRunner
+from study.devices.runner import CompiledRunner, Runner
+from study.devices.stepped_runner import SteppedRunner
 from study.devices.virtual_drive import VirtualDrive
 from study.errors import DeviceError
 from study.session.held_stimulus import HeldStimulus
@@ -41,7 +42,7 @@ class SafeDevice:
         self._runner = self._runner_of(rig)
         self._drive = self._drive_of(clock)
         self._held: HeldStimulus | None = None
-        self._closed = False
+        self._closing = self._closed = False
         atexit.register(self.close)
 
     @property
@@ -51,14 +52,17 @@ class SafeDevice:
     def hold(self, stimulus: HeldStimulus) -> None:
         self._must_be_idle()
         check_stimulus(stimulus, self._limits, self._info.sample_rate_hz)
+        self._start(lambda: self._governor.begin_hold(stimulus))
         self._held = stimulus
-        self._drive.start(lambda: self._governor.begin_hold(stimulus))
 
     def keep_alive(self) -> None:
         self._governor.sign_of_life()
+        self._drive.check()
 
     def fault(self) -> Fault:
-        return Fault.STOPPED if self._governor.stop_asked else self._governor.fault
+        self._drive.check()
+        fault = self._governor.fault
+        return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
 
     def release(self) -> Played:
         stimulus = self._held
@@ -72,7 +76,7 @@ class SafeDevice:
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()
         check_commands(commands, self._limits, self._info.sample_rate_hz)
-        self._drive.start(lambda: self._governor.begin_play(commands))
+        self._start(lambda: self._governor.begin_play(commands))
         try:
             self._attend_play(SETTLE_S + commands.duration_s, on_progress)
         except BaseException:
@@ -84,17 +88,22 @@ class SafeDevice:
 
     def stop(self) -> None:
         self._governor.ask_stop()
+        self._drive.stop()
 
     def close(self) -> None:
         if self._closed:
             return
-        self._closed = True
-        atexit.unregister(self.close)
+        self._closing = True
         try:
             self._let_go()
         finally:
-            self._drive.close()
-            self._runner.disconnect()
+            try:
+                self._drive.close()
+            finally:
+                self._runner.disconnect()
+        # Last, so that a close that was interrupted is made good for when the program ends.
+        self._closed = True
+        atexit.unregister(self.close)
 
     def _attend_play(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
         nap_s = min(BLOCK_S, self._limits.watchdog_s / 4)
@@ -102,42 +111,58 @@ class SafeDevice:
         while self._governor.playing and (elapsed_s := self._clock.now_s() - started_s) < duration_s + PATIENCE_S:
             if on_progress is not None:
                 on_progress(min(1.0, elapsed_s / duration_s))
-            self._governor.sign_of_life()
+            self.keep_alive()
             self._clock.sleep(nap_s)
         if on_progress is not None and not self._governor.playing:
             on_progress(1.0)
 
     def _let_go(self) -> None:
         self._governor.ask_let_go()
-        self._wait_until_still(0.0)
+        try:
+            self._wait_until_still(0.0)
+        except BaseException:  # impatient: then without a fade
+            self._governor.ask_stop()
+            raise
 
     def _wait_until_still(self, fade_out_s: float) -> None:
         patience_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + PATIENCE_S
         until_s = self._clock.now_s() + patience_s
         nap_s = 5 / self._info.sample_rate_hz
-        while self._governor.moving:
+        while self._runner.moving:
+            self._drive.check()
             if self._clock.now_s() > until_s:
                 self._runner.give_up(TimeoutError(f"no answer within {patience_s:g} s"))
                 return
             self._clock.sleep(nap_s)
 
     def _must_be_idle(self) -> None:
-        if self._closed:
+        if self._closing:
             raise _refused("The device is closed.", "Open it again.")
+        self._must_be_there()
         if self._governor.stop_asked:
             raise _refused("The emergency stop was pressed.", "Make sure that all is well, then open the device again.")
+        if self._held is not None:
+            raise _still_playing()
+
+    def _start(self, begin: Callable[[], None]) -> None:
+        started = self._drive.start(begin)
         self._must_be_there()
-        if self._held is not None or self._governor.moving:
-            raise _refused("It is still playing.", "Call release first.")
+        if not started:
+            raise _still_playing()
 
     def _must_be_there(self) -> None:
         failure = self._runner.failure
-        if failure is not None:
-            raise DeviceError(
-                "The device was lost",
-                f"It stopped answering ({type(failure).__name__}: {failure}). Its force is off.",
-                "Check its power and its cable, then open it again; a session goes on with `hapteq resume`.",
-            ) from failure
+        if failure is None:
+            return
+        happened = f"It stopped answering ({type(failure).__name__}: {failure})."
+        mend = "heck its power and its cable, then open it again; a session goes on with `hapteq resume`."
+        if self._runner.force_off:
+            raise DeviceError("The device was lost", f"{happened} Its force is off.", f"C{mend}") from failure
+        raise DeviceError(
+            "The device was lost",
+            f"{happened} It took no zero force: its force may still be on.",
+            f"Let go of the handle and switch the device off. Then c{mend}",
+        ) from failure
 
     def _runner_of(self, rig: Rig | CompiledRig) -> Runner:
         virtual = self._clock.virtual
@@ -151,6 +176,10 @@ class SafeDevice:
         if isinstance(clock, VirtualClock):
             return VirtualDrive(self._runner, self._governor, clock, rate_hz)
         return RealtimeDrive(self._runner, self._governor, clock, rate_hz, self._limits.watchdog_s)
+
+
+def _still_playing() -> DeviceError:
+    return _refused("It is still playing.", "Call release first.")
 
 
 def _refused(happened: str, do_now: str) -> DeviceError:

@@ -15,16 +15,28 @@ class VirtualDrive:
         self._rate_hz = rate_hz
         self._started_s = 0.0
         self._run = 0
+        self._closed = False
         clock.listen(self._pump)
 
-    def start(self, begin: Callable[[], None]) -> None:
-        """`begin` readies the governor; from now on its ticks fall due."""
+    def start(self, begin: Callable[[], None]) -> bool:
+        """`begin` readies the governor; from now on its ticks fall due. False where something moves already."""
+        if self._runner.moving or self._closed:
+            return False
         begin()
         self._started_s = self._clock.now_s()
         self._run = 0
+        return True
+
+    def check(self) -> None:
+        """Nothing can hang: ticks run in the caller's own thread."""
+
+    def stop(self) -> None:
+        """The next tick hears it; none is under way."""
 
     def close(self) -> None:
-        self._clock.forget(self._pump)
+        if not self._closed:
+            self._closed = True
+            self._clock.forget(self._pump)
 
     def _pump(self, now_s: float) -> None:
         if self._governor.moving:

@@ -94,7 +94,7 @@ BUILDERS = {
     "SteppedRunner": {"study/devices/safe.py"},
     "run_block": {"study/devices/runner.py"},
     "advance": {"study/devices/block.py"},
-    "write": {"study/devices/runner.py"},
+    "write": {"study/devices/stepped_runner.py"},
 }
 """Who may call what leads to a force. `write` counts inside study/devices only: files are written elsewhere."""
 

@@ -12,8 +12,9 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
 from study.devices.governor import Governor
 from study.devices.realtime_drive import RealtimeDrive
-from study.devices.runner import CompiledRunner, SteppedRunner
+from study.devices.runner import CompiledRunner
 from study.devices.safe import SafeDevice
+from study.devices.stepped_runner import SteppedRunner
 from study.errors import DeviceError
 
 
@@ -255,8 +256,14 @@ def test_closing_lets_go_first(device, clock, rigs, rig):
     assert rigs.violations(rigs.written(rig), rigs.LIMITS) == []
 
 
-@pytest.mark.parametrize("where", ["instead_of_sensing", "instead_of_writing"])
-def test_a_rig_that_fails_is_lost_and_the_next_call_says_what_to_do(rigs, clock, where):
+@pytest.mark.parametrize(
+    ("where", "fault", "advice"),
+    [
+        ("instead_of_sensing", Fault.LOST, r"Its force is off\. Check its power and its cable"),
+        ("instead_of_writing", Fault.FORCE_LEFT, r"may still be on\. Let go of the handle and switch the device off"),
+    ],
+)
+def test_a_rig_that_fails_is_lost_and_the_next_call_says_what_to_do(rigs, clock, where, fault, advice):
     def fail() -> None:
         raise OSError("cable pulled")
 
@@ -266,9 +273,9 @@ def test_a_rig_that_fails_is_lost_and_the_next_call_says_what_to_do(rigs, clock,
     feel(device, clock, 0.4)
     setattr(rig, where, fail)
     feel(device, clock, 0.4)
-    assert device.fault() is Fault.LOST
-    assert device.release().health.fault is Fault.LOST
-    with pytest.raises(DeviceError, match=r"lost.*cable pulled.*power and its cable"):
+    assert device.fault() is fault
+    assert device.release().health.fault is fault
+    with pytest.raises(DeviceError, match=rf"lost.*cable pulled.*{advice}"):
         device.hold(rigs.sine())
     device.close()
     assert rig.closed

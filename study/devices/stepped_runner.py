@@ -1,0 +1,123 @@
+"""Ticks of a rig that is driven from Python, and what is done when its driver hangs or fails.
+
+A call into a driver cannot be broken off. So whoever gives up first says that the rig is `gone` and has a thread of
+its own write zero; and the loop, whenever its call returns, writes zero once more: a late write leaves no force.
+"""
+
+import contextlib
+import threading
+
+import numpy as np
+
+from study.devices import govern
+from study.devices.device import Fault
+from study.devices.governor import Governor
+from study.devices.rig import READING_SIZE, Rig
+from study.devices.standby import Standby
+
+ZERO_PATIENCE_S = 0.1
+"""For a zero force to be written: a hundred times what a driver takes."""
+
+CLOSE_PATIENCE_S = 1.0
+
+
+class SteppedRunner:
+    def __init__(self, rig: Rig, governor: Governor, catches_up: bool) -> None:
+        self._rig = rig
+        self._governor = governor
+        self.catches_up = catches_up
+        self.failure: BaseException | None = None
+        self.force_off = True
+        self._gone = threading.Event()
+        self._closed = self._ended = False
+        self._deciding = self._writing = False
+        self._zero = Standby(lambda: rig.write(np.zeros(3)), "force off")
+        self._disconnect = Standby(rig.close, "disconnect")
+
+    @property
+    def moving(self) -> bool:
+        return self._governor.moving or self._deciding
+
+    def run(self, ticks: int) -> None:
+        if self._gone.is_set():
+            self._governor.abandon(Fault.LOST)
+            return
+        try:
+            for _ in range(ticks):
+                if self._tick() or self._gone.is_set():
+                    break
+        except Exception as error:  # noqa: BLE001 - whatever a driver throws: the force goes off, the next call says why
+            self.give_up(error)
+        except BaseException:  # Ctrl-C in the middle of a tick
+            self._silence(Fault.STALLED)
+            raise
+        finally:
+            if self._gone.is_set():
+                self._once_more()
+
+    def give_up(self, failure: BaseException) -> None:
+        self.failure = self.failure or failure
+        self._gone.set()
+        self._silence(Fault.LOST)
+
+    def drop(self, fault: Fault) -> None:
+        self._silence(fault)
+
+    def cut(self) -> None:
+        self._gone.set()
+        self._silence(Fault.STOPPED)
+
+    def disconnect(self) -> None:
+        if self._ended:
+            return
+        self._gone.set()
+        try:
+            self._silence(Fault.LOST if self.moving else Fault.NONE)
+        finally:
+            self._closed = True
+            self._disconnect.run(CLOSE_PATIENCE_S)
+        self._ended = True
+        self._zero.end()
+        self._disconnect.end()
+
+    def _tick(self) -> bool:
+        governor = self._governor
+        reading = np.array(self._rig.sense(), dtype=np.float64)
+        if reading.shape != (READING_SIZE,):
+            raise ValueError(f"a reading has the shape {reading.shape}; it must be ({READING_SIZE},)")
+        if self._gone.is_set():
+            return True
+        self._deciding = True
+        over = govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
+        self._writing = True
+        try:
+            self._rig.write(governor.force.copy())
+        finally:
+            self._writing = False
+        self._deciding = False
+        return bool(over)
+
+    def _silence(self, fault: Fault) -> None:
+        """Zero force first, then the governor is still: nobody shall hear that all is over before it is."""
+        written = False
+        try:
+            written = self._zero.run(ZERO_PATIENCE_S) and not self._writing  # what still hangs may come after the zero
+        finally:
+            self.force_off = written
+            if not written:
+                self._gone.set()
+                self.failure = self.failure or TimeoutError("it took no zero force")
+            self._governor.abandon(fault if written else Fault.FORCE_LEFT)
+            self._deciding = False
+
+    def _once_more(self) -> None:
+        """Somebody gave up while this thread was in the driver: whatever it wrote is taken back."""
+        self.force_off = False
+        try:
+            self._rig.write(np.zeros(3))
+            self.force_off = True
+        except Exception:  # noqa: BLE001 - it is known to be gone; what matters is whether its force is
+            self._governor.abandon(Fault.FORCE_LEFT)
+        if self._closed:
+            with contextlib.suppress(Exception):
+                self._rig.close()
