@@ -69,6 +69,7 @@ class ScriptedRig:
     """The same mass, stepped from Python. It can be told to answer nonsense, to fail and to be slow."""
 
     def __init__(self) -> None:
+        self.drops_force_after_s = 0.1
         self.mass = compiled_rig()
         self.closed = False
         self.instead_of_sensing: Callable[[], FloatArray] | None = None
@@ -98,6 +99,7 @@ class HeldForceRig:
     """Like hardware it keeps the last force it was given. Its driver can be made to hang and to fail."""
 
     def __init__(self) -> None:
+        self.drops_force_after_s = 0.1
         self.last_n = np.zeros(3)
         self.written_n: list[FloatArray] = []
         self.closed = 0

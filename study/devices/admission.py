@@ -25,6 +25,9 @@ HIGHEST = {
     "keep_s": 600.0,
 }
 
+LONGEST_DROP_S = 1.0
+"""For the hardware to let go when nothing writes any more."""
+
 FADE_SHAPES = ("raised_cosine", "linear")
 
 
@@ -42,6 +45,18 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
     _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
     if not all(math.isfinite(component) for component in settings.place_m):
         raise _refused_settings(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
+
+
+def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: DeviceSettings) -> None:
+    """Raises `DeviceError` for a real device in a hand that would hold its force when this program is gone."""
+    if info.simulated or not settings.hand_on_handle or 0 < drops_force_after_s <= LONGEST_DROP_S:
+        return
+    raise DeviceError(
+        "The device was not opened: it has no watchdog of its own",
+        f"If this program were killed, '{info.name}' would hold its last force (drops_force_after_s is "
+        f"{drops_force_after_s:g}; it must be above 0 and at most {LONGEST_DROP_S:g}).",
+        "Switch the watchdog in the device's firmware on, or use it without a hand on the handle.",
+    )
 
 
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:

@@ -37,6 +37,15 @@ class Rig(Protocol):
     @property
     def info(self) -> DeviceInfo: ...
 
+    @property
+    def drops_force_after_s(self) -> float:
+        """How long without a `write` until the hardware lets go by itself; 0 or infinite: it never does.
+
+        The only thing that turns the force off when this program is killed or the computer hangs. As set in the
+        device, not as asked for.
+        """
+        ...
+
     def sense(self) -> FloatArray:
         """A reading, shape (READING_SIZE,). Raises `study.errors.DeviceError` when the device is gone."""
         ...

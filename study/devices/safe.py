@@ -8,7 +8,7 @@ import atexit
 from collections.abc import Callable
 
 from equalizer.signals.signal import Signal
-from study.devices.admission import check_commands, check_settings, check_stimulus
+from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Played
 from study.devices.governor import SETTLE_S, Governor
@@ -35,6 +35,8 @@ class SafeDevice:
 
     def __init__(self, rig: Rig | CompiledRig, settings: DeviceSettings, clock: Clock) -> None:
         check_settings(settings, rig.info)
+        if not isinstance(rig, CompiledRig):
+            check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
         self._limits = settings.limits
         self._clock = clock

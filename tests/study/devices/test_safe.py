@@ -15,7 +15,7 @@ from study.devices.realtime_drive import RealtimeDrive
 from study.devices.runner import CompiledRunner
 from study.devices.safe import SafeDevice
 from study.devices.stepped_runner import SteppedRunner
-from study.errors import DeviceError
+from study.errors import DeviceError, ExitCode
 
 
 @pytest.fixture
@@ -279,6 +279,27 @@ def test_a_rig_that_fails_is_lost_and_the_next_call_says_what_to_do(rigs, clock,
         device.hold(rigs.sine())
     device.close()
     assert rig.closed
+
+
+@pytest.mark.parametrize("declared_s", [0.0, -1.0, 1.5, float("inf"), float("nan")])
+def test_a_real_device_that_holds_its_force_for_ever_is_not_given_into_a_hand(rigs, clock, declared_s):
+    rig = rigs.ScriptedRig()
+    rig.drops_force_after_s = declared_s
+    with pytest.raises(
+        DeviceError, match=r"no watchdog of its own.*drops_force_after_s is .*without a hand"
+    ) as refusal:
+        SafeDevice(rig, rigs.SETTINGS, clock)
+    assert refusal.value.exit_code is ExitCode.DEVICE
+    SafeDevice(rig, replace(rigs.SETTINGS, hand_on_handle=False), clock).close()
+
+
+def test_a_simulated_world_needs_no_watchdog_in_its_hardware(rigs, clock):
+    class Simulated(rigs.HeldForceRig):
+        info = rigs.INFO
+
+    rig = Simulated()
+    rig.drops_force_after_s = 0.0
+    SafeDevice(rig, rigs.SETTINGS, clock).close()
 
 
 def test_a_reading_of_the_wrong_shape_counts_as_a_lost_device(rigs, clock):
