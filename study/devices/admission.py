@@ -12,7 +12,7 @@ from study.session.limits import Limits
 
 HAND_STIMULUS_CAP_N = 3.0
 HAND_TOTAL_CAP_N = 6.0
-"""With a hand on the handle no protocol and no setting goes beyond these."""
+"""With a hand on the handle nothing goes beyond these; without one, only settings that say so."""
 
 TOLERANCE = 1 + 1e-9
 """Rounding, when a stimulus is exactly at its cap."""
@@ -37,10 +37,7 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
     times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
     for name, value in times.items():
         _within(name, value, HIGHEST[name])
-    ceiling_n = min(info.max_force_n, HAND_TOTAL_CAP_N) if settings.hand_on_handle else info.max_force_n
-    stimulus_ceiling_n = min(ceiling_n, HAND_STIMULUS_CAP_N) if settings.hand_on_handle else ceiling_n
-    _within("total_cap_n", limits.total_cap_n, ceiling_n)
-    _within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
+    _check_caps(settings, info)
     _within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
     _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
     if not all(math.isfinite(component) for component in settings.place_m):
@@ -95,6 +92,16 @@ def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
     steepest = float(np.linalg.norm(steps, axis=1).max()) * rate_hz
     if steepest > limits.slew_n_per_s * TOLERANCE:
         raise _refused(f"it changes by {steepest:.4g} N/s; the slew limit is {limits.slew_n_per_s:g} N/s")
+
+
+def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
+    limits, beyond = settings.limits, settings.beyond_hand_ceiling
+    if beyond and settings.hand_on_handle:
+        raise _refused_settings("beyond_hand_ceiling is set while a hand is on the handle.")
+    ceiling_n = info.max_force_n if beyond else min(info.max_force_n, HAND_TOTAL_CAP_N)
+    stimulus_ceiling_n = ceiling_n if beyond else min(ceiling_n, HAND_STIMULUS_CAP_N)
+    _within("total_cap_n", limits.total_cap_n, ceiling_n)
+    _within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
 
 
 def _within(name: str, value: float, highest: float, *, zero: bool = False) -> None:

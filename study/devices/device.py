@@ -40,6 +40,9 @@ class DeviceSettings:
     """Whether a hand holds the handle. A simulated device then carries a simulated hand."""
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the spring is centred, x, y, z."""
+    beyond_hand_ceiling: bool = False
+    """Without a hand on the handle: caps up to the device's own maximum, not only up to what a hand may feel. Never
+    set by a protocol; refused with a hand."""
 
 
 class Fault(Enum):

@@ -1,6 +1,5 @@
 """The one door: what it opens, what it refuses, and that there is no other."""
 
-import ast
 import math
 import subprocess
 import sys
@@ -11,7 +10,8 @@ import pytest
 
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceSettings
-from study.devices.opening import open_device
+from study.devices.opening import DEVICES, open_device
+from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.errors import DeviceError, ExitCode
 from study.session.limits import Limits
 
@@ -71,52 +71,34 @@ def test_a_place_that_is_no_place_is_named():
         open_device("simulated", replace(SETTINGS, place_m=(0.0, math.nan, 0.0)), VirtualClock(), seed=1)
 
 
-def test_without_a_hand_the_ceiling_is_what_the_device_can_do():
-    device = open_device(
-        "simulated", replace(limited(stimulus_cap_n=8.0, total_cap_n=12.0), hand_on_handle=False), VirtualClock(), 1
-    )
-    device.close()
-    with pytest.raises(DeviceError, match=r"total_cap_n is 12\.5"):
-        open_device("simulated", replace(limited(total_cap_n=12.5), hand_on_handle=False), VirtualClock(), 1)
+STRONG = replace(limited(stimulus_cap_n=8.0, total_cap_n=12.0), hand_on_handle=False)
+
+
+def test_without_a_hand_the_ceiling_is_what_the_device_can_do_for_those_who_say_so():
+    open_device("simulated", replace(STRONG, beyond_hand_ceiling=True), VirtualClock(), 1).close()
+    stronger = replace(limited(total_cap_n=12.5), hand_on_handle=False, beyond_hand_ceiling=True)
+    with pytest.raises(DeviceError, match=r"total_cap_n is 12\.5; it must be above 0 and at most 12"):
+        open_device("simulated", stronger, VirtualClock(), 1)
+
+
+def test_that_no_hand_is_on_the_handle_does_not_raise_the_ceiling_by_itself():
+    with pytest.raises(DeviceError, match=r"total_cap_n is 12; it must be above 0 and at most 6"):
+        open_device("simulated", STRONG, VirtualClock(), 1)
+    with pytest.raises(DeviceError, match=r"stimulus_cap_n is 8; it must be above 0 and at most 3"):
+        open_device("simulated", replace(STRONG, limits=replace(STRONG.limits, total_cap_n=6.0)), VirtualClock(), 1)
+
+
+def test_with_a_hand_nobody_can_say_so():
+    settings = replace(SETTINGS, beyond_hand_ceiling=True)
+    with pytest.raises(DeviceError, match="beyond_hand_ceiling is set while a hand is on the handle"):
+        open_device("simulated", settings, VirtualClock(), 1)
+
+
+def test_every_device_that_is_offered_can_be_built():
+    assert set(DEVICES) == set(RIGS_BY_NAME)
 
 
 def test_the_door_is_light_until_something_is_opened():
     code = "import sys, study.devices.opening; print(sorted({'numba', 'scipy'} & set(sys.modules)))"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
-
-
-BUILDERS = {
-    "SafeDevice": {"study/devices/opening.py"},
-    "build_omega3": {"study/devices/opening.py"},
-    "CompiledRig": {"study/devices/simulated/omega3.py"},
-    "CompiledRunner": {"study/devices/safe.py"},
-    "SteppedRunner": {"study/devices/safe.py"},
-    "run_block": {"study/devices/runner.py"},
-    "advance": {"study/devices/block.py"},
-    "write": {"study/devices/stepped_runner.py"},
-}
-"""Who may call what leads to a force. `write` counts inside study/devices only: files are written elsewhere."""
-
-
-def callers(name: str, folder: Path) -> set[str]:
-    found = set()
-    for path in folder.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call):
-                called = node.func
-                if getattr(called, "id", getattr(called, "attr", None)) == name:
-                    found.add(path.relative_to(ROOT).as_posix())
-    return found
-
-
-@pytest.mark.parametrize("name", BUILDERS)
-def test_nothing_but_the_door_and_its_safety_layer_reaches_a_rig(name):
-    folder = ROOT / "study" / "devices" if name in ("write", "advance") else ROOT / "study"
-    assert callers(name, folder) == BUILDERS[name]
-
-
-def test_the_search_for_callers_would_find_one(tmp_path, monkeypatch):
-    monkeypatch.setitem(globals(), "ROOT", tmp_path)
-    (tmp_path / "around.py").write_text("import x\nx.SafeDevice(1)\n")
-    assert callers("SafeDevice", tmp_path) == {"around.py"}

@@ -1,0 +1,22 @@
+"""The bare devices behind `study.devices.opening`, which alone may ask for one. Heavy: imported when one is opened."""
+
+from collections.abc import Callable
+
+from study.devices.device import DeviceSettings
+from study.devices.rig import CompiledRig, Rig
+from study.devices.simulated.omega3 import build_omega3
+from study.errors import DeviceError
+
+
+def simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
+    """Raises `DeviceError` for a place where there is no workspace."""
+    try:
+        return build_omega3(seed=seed, hand=settings.hand_on_handle, place_m=settings.place_m)
+    except ValueError as error:
+        raise DeviceError(
+            "The simulated device cannot be opened", f"It refused its settings: {error}.", "Choose another place."
+        ) from error
+
+
+RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {"simulated": simulated_rig}
+"""Rig of a name, its settings and a seed; the same names as `study.devices.opening.DEVICES`."""

@@ -1,0 +1,146 @@
+"""Nothing but `study.devices.opening` leads to a force: names in the source, and the import contract itself."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+
+NAMED_IN = {
+    "SafeDevice": {"study/devices/opening.py"},
+    "RIGS_BY_NAME": {"study/devices/opening.py"},
+    "simulated_rig": set(),
+    "build_omega3": {"study/devices/rigs_by_name.py"},
+    "CompiledRunner": {"study/devices/safe.py"},
+    "SteppedRunner": {"study/devices/safe.py"},
+    "Standby": {"study/devices/stepped_runner.py"},
+    "run_block": {"study/devices/runner.py"},
+}
+"""Where else than at home a name may stand at all: imported, called, under another name or as a string."""
+
+CALLED_IN = {
+    "CompiledRig": {"study/devices/simulated/omega3.py"},
+    "advance": {"study/devices/block.py"},
+    "write": {"study/devices/stepped_runner.py"},
+}
+"""`write` and `advance` count inside study/devices only: files are written elsewhere."""
+
+ELSEWHERE = ("cli", "tui", "workflows", "store", "session", "participants")
+
+
+def names_in(node: ast.AST) -> set[str]:
+    match node:
+        case ast.Name(id=name) | ast.Attribute(attr=name) | ast.Constant(value=str(name)):
+            return {name}
+        case ast.alias(name=name):
+            return {name.split(".")[-1]}
+    return set()
+
+
+def defines(tree: ast.Module, name: str) -> bool:
+    targets = {t.id for n in tree.body if isinstance(n, ast.AnnAssign) and isinstance(t := n.target, ast.Name)}
+    return name in targets | {n.name for n in tree.body if isinstance(n, ast.ClassDef | ast.FunctionDef)}
+
+
+def namers(name: str, folder: Path) -> set[str]:
+    trees = {
+        path.relative_to(folder).as_posix(): ast.parse(path.read_text()) for path in (folder / "study").rglob("*.py")
+    }
+    return {
+        path
+        for path, tree in trees.items()
+        if not defines(tree, name) and any(name in names_in(node) for node in ast.walk(tree))
+    }
+
+
+def callers(name: str) -> set[str]:
+    folder = ROOT / "study" / ("" if name == "CompiledRig" else "devices")
+    found = set()
+    for path in folder.rglob("*.py"):
+        calls = [node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
+        if any(getattr(called, "id", getattr(called, "attr", None)) == name for called in calls):
+            found.add(path.relative_to(ROOT).as_posix())
+    return found
+
+
+@pytest.mark.parametrize("name", NAMED_IN)
+def test_nothing_but_the_door_and_its_safety_layer_names_what_leads_to_a_force(name):
+    assert namers(name, ROOT) == NAMED_IN[name]
+
+
+@pytest.mark.parametrize("name", CALLED_IN)
+def test_nothing_but_the_safety_layer_reaches_a_rig(name):
+    assert callers(name) == CALLED_IN[name]
+
+
+@pytest.mark.parametrize(
+    "around",
+    [
+        "import x\nx.SafeDevice(1)",
+        "from x import SafeDevice as harmless",
+        "getattr(x, 'SafeDevice')",
+        "def build():\n    from x import SafeDevice\n    return SafeDevice",
+    ],
+)
+def test_the_search_for_names_would_find_one(tmp_path, around):
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "around.py").write_text(around)
+    assert namers("SafeDevice", tmp_path) == {"study/around.py"}
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    """A copy of the packages with a module in each that goes around the door, to every module behind it."""
+    root = tmp_path_factory.mktemp("tree")
+    for package in ("study", "equalizer", "analysis", "protocols"):
+        shutil.copytree(
+            ROOT / package, root / package, ignore=lambda _, names: [n for n in names if "__pycache__" in n]
+        )
+    (root / "study" / "devices" / "brand_new.py").write_text("")
+    shutil.copy(ROOT / "pyproject.toml", root)
+    return root
+
+
+def contract(tree: Path) -> subprocess.CompletedProcess:
+    lint = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as run; run()"]
+    return subprocess.run(
+        [*lint, "--contract", "one-door", "--no-cache"],
+        cwd=tree,
+        env=os.environ | {"COLUMNS": "300", "PYTHONPATH": str(tree)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+def modules_behind_the_door(tree: Path) -> set[str]:
+    folder = tree / "study" / "devices"
+    names = {".".join(p.relative_to(tree).with_suffix("").parts) for p in folder.rglob("*.py") if p.stem != "__init__"}
+    return names - {f"study.devices.{public}" for public in ("opening", "device", "clock")}
+
+
+def test_what_is_public_passes_the_contract(tree):
+    answer = contract(tree)
+    assert "1 kept, 0 broken" in answer.stdout, answer.stdout + answer.stderr
+
+
+def test_every_other_module_of_the_devices_is_behind_the_door_and_a_new_one_too(tree):
+    behind = sorted(modules_behind_the_door(tree))
+    assert "study.devices.brand_new" in behind
+    around = [tree / "study" / package / "around.py" for package in ELSEWHERE]
+    for path in around:
+        path.write_text("def f():\n" + "".join(f"    import {module}\n" for module in (*behind, "study.devices")))
+    try:
+        answer = contract(tree)
+    finally:
+        for path in around:
+            path.unlink()
+    assert answer.returncode == 1
+    for package in ELSEWHERE:
+        for module in (*behind, "study.devices"):
+            assert f"study.{package}.around -> {module} " in answer.stdout
