@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
+from scipy.stats import binom
+
 from analysis.anova import OneWayAnova
 from analysis.repeated_measures import RepeatedMeasures
 from analysis.threshold_table import ThresholdTable
@@ -29,6 +31,7 @@ def study_warnings(
         _censored(table, protocol.staircase.cap_n),
         _few(table),
         _unequal(table),
+        _at_chance(rows),
         _biased(rows),
         _spoiled(trials),
         _flagged(trials),
@@ -104,6 +107,20 @@ def _unequal(table: ThresholdTable) -> str:
     if len(sizes) < 2:
         return ""
     return "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
+
+
+def _at_chance(rows: Sequence[Threshold]) -> str:
+    guessed = [
+        f"{_run(row)} ({row.percent_correct:.0f} % right of {row.trials})"
+        for row in rows
+        if row.percent_correct is not None and not _better_than_chance(row.percent_correct, row.trials)
+    ]
+    return f"Answers no better than chance (one-sided binomial test, 5 %): {listed(guessed)}." if guessed else ""
+
+
+def _better_than_chance(percent_correct: float, trials: int) -> bool:
+    right = round(percent_correct / 100.0 * trials)
+    return bool(binom.sf(right - 1, trials, 0.5) < 0.05)
 
 
 def _biased(rows: Sequence[Threshold]) -> str:

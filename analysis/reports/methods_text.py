@@ -68,6 +68,11 @@ def _stimulus(protocol: StudyProtocol) -> str:
         f"The amplitude rose over {stimulus.fade_in_s:g} s ({stimulus.fade_shape.replace('_', ' ')}), was held until "
         f"the answer, and fell over {stimulus.fade_out_s:g} s; the first half-wave went {polarity}. The level of a "
         f"trial is the amplitude of the {_LEVELS[stimulus.quantity]}."
+        + (
+            f" A virtual spring of {protocol.spring.natural_frequency_hz:g} Hz kept the handle near the centre."
+            if protocol.spring.natural_frequency_hz
+            else ""
+        )
     )
 
 

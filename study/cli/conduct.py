@@ -12,7 +12,7 @@ from study.cli.progress import answer_count
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.device import Fault
-from study.errors import DeviceError, LeftError
+from study.errors import DeviceError, LeftError, WrongUseError
 from study.store.archive import check_subject, find_session
 from study.store.protocol_files import read_study_protocol
 from study.tui.line_input import LineInput
@@ -21,6 +21,7 @@ from study.workflows.conduct_session import Conducted, Participant, conduct_new,
 from study.workflows.display import PersonsHand
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan, fresh_seed
+from study.workflows.participant_code import check_code, unfinished_sessions
 from study.workflows.session_results import write_results
 from study.workflows.simulated_participant import simulated_participant
 
@@ -44,6 +45,12 @@ def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int
         seed=drawn,
         data=data,
     )
+    check_code(data, plan.subject, simulated=sitter.observer is not None)
+    for unfinished in unfinished_sessions(data, plan.subject, source.protocol.name):
+        typer.echo(
+            f"Note: {unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it.", err=True
+        )
+    _say_wait(sitter.observer)
     with _participant(sitter.observer, drawn) as participant:
         end = conduct_new(plan, device, participant)
     _finish(end, as_json)
@@ -52,6 +59,7 @@ def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int
 def go_on(session: str, device: str, data: Path, as_json: bool) -> None:
     folder = find_session(session, data)
     opened = fold_session(folder).state.opened
+    _say_wait(opened.observer)
     with _participant(opened.observer, opened.seed) as participant:
         end = conduct_resumed(folder, device, participant)
     _finish(end, as_json)
@@ -68,6 +76,11 @@ def _participant(observer: str | None, seed: int) -> Iterator[Participant]:
         yield simulated_participant(observer, seed, clock, on_question=show_question)
 
 
+def _say_wait(observer: str | None) -> None:
+    if observer is None:
+        typer.echo("Preparing the device (some ten seconds the first time) …", err=True)
+
+
 def simulated_code(observer: str) -> str:
     """Each kind of simulated participant by its own name, so that their sessions stay apart."""
     return "".join(c for c in observer if c.isascii() and c.isalnum())[:15] + "1"
@@ -77,8 +90,17 @@ def _ask_subject(sitter: Sitter) -> str:
     if sitter.observer is not None:
         return simulated_code(sitter.observer)
     if sys.stdin is None or not sys.stdin.isatty():
-        return "P01"
-    return str(typer.prompt("Participant code (letters and digits, such as P01)"))
+        raise WrongUseError(
+            "Whose answers are these?",
+            "There is no terminal to ask for the participant's code.",
+            "Give it with --subject, such as --subject P01.",
+        )
+    while True:
+        code = str(typer.prompt("Participant code (letters and digits, such as P01)"))
+        try:
+            return check_subject(code)
+        except WrongUseError as error:
+            typer.echo(f"{error.happened} {error.do_now}", err=True)
 
 
 def _finish(end: Conducted, as_json: bool) -> None:

@@ -47,6 +47,7 @@ def show(
     for field in fields:
         typer.echo(f"\n{field.key} = {field.value}")
         typer.echo(f"    {field.description}")
+        typer.echo(f"    Allowed: {field.allowed}.")
 
 
 @app.command("lock")

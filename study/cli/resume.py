@@ -15,7 +15,7 @@ def resume(
     data: DataOption = Path("data"),
     as_json: JsonOption = False,
 ) -> None:
-    """Go on with a session: its log is folded and checked, a torn last line mended, an open trial drawn again."""
+    """Go on with a session where it stopped. No answer is lost; a trial without an answer is drawn again."""
     from study.cli.conduct import go_on
 
     go_on(session, device=device, data=data, as_json=as_json)

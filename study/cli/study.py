@@ -17,9 +17,13 @@ def study(
     device: DeviceOption = "simulated",
     subject: Annotated[str | None, typer.Option(help="Participant code, letters and digits.")] = None,
     observer: Annotated[
-        str | None, typer.Option(help="Let a simulated participant take it: ideal, lapsing, biased, guesser, …")
+        str | None,
+        typer.Option(
+            help="Let a simulated participant take it: ideal, lapsing, biased, guesser, alternator, always_1, "
+            "always_2, vibration_only, intensity_cue, drifting, scripted, or person (one of a simulated population)."
+        ),
     ] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Line mode, also when input is not a terminal.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")] = False,
     data: DataOption = Path("data"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws; drawn and logged if not given.")] = None,
     as_json: JsonOption = False,

@@ -118,7 +118,7 @@ def _own(descriptor: int, path: Path) -> None:
         raise StudyError(
             "This session is running elsewhere",
             f"Another program is writing to {path.parent.name}.",
-            "Close it there first, or follow it without writing.",
+            "Close it there first.",
             saved="Nothing was changed.",
         ) from problem
 

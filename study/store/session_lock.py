@@ -21,7 +21,7 @@ def locked(folder: Path) -> Iterator[None]:
         raise StudyError(
             "This session is running elsewhere",
             f"Another program is writing to {folder.name}.",
-            "Close it there first, or follow it without writing.",
+            "Close it there first.",
             saved="Nothing was changed.",
         ) from held
     try:

@@ -33,7 +33,7 @@ class Canvas:
     def line(self, start: tuple[float, float], end: tuple[float, float], dashed: bool = False) -> None:
         steps = max(1, round(max(abs(end[0] - start[0]), abs(end[1] - start[1]))))
         for i in range(steps + 1):
-            if dashed and i % 6 >= 3:
+            if dashed and i % 8 >= 5:
                 continue
             share = i / steps
             x, y = start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])

@@ -13,7 +13,7 @@ from study.workflows.display import SignOfLife
 GLANCE_S = 0.05
 LINE_WIDTH = 78
 KEYS = (
-    "Keys: 1 or 2 answers, r plays the trial again (drawn anew), q leaves, ? shows this. Each followed by Enter. "
+    "Keys: 1 or 2 answers, r skips this one and plays a new one, q leaves, ? shows this. Each followed by Enter. "
     "Ctrl-C stops the device at once."
 )
 
@@ -110,7 +110,7 @@ class PlainDisplay:
             case "?":
                 self._say(*self._picture, KEYS)
             case _:
-                self._say(f"'{line[:20]}' is no answer. Type 1 or 2 and Enter; ? for help.")
+                self._say(f"{_shown(line)} is no answer. Type 1 or 2 and Enter; ? for help.")
         self._prompt("1 or 2? ")
         return None
 
@@ -156,3 +156,9 @@ def _trial_heading(question: Question) -> str:
     phase = "Training" if question.phase is Phase.TRAINING else "Run"
     again = ", once more" if question.repeated else ""
     return f"{phase} {question.run_number} of {question.runs_in_phase}, trial {question.trial_number}{again}"
+
+
+def _shown(line: str) -> str:
+    """What was typed, without the control characters of arrow keys."""
+    plain = "".join(c for c in line if c.isprintable())[:20]
+    return f"'{plain}'" if plain else "Enter alone"

@@ -68,13 +68,13 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
     """Thresholds as lines: one per frequency, with mean and number of participants."""
     if not any(row.complete for row in analysis.thresholds):
         return ["No complete test run: there is no threshold yet."]
-    lines = [f"{'frequency':>10}  {'threshold':>10}  {'at the cap':>10}  participants"]
+    lines = [f"{'frequency':>10}  {'threshold':>10}  {'lower bounds':>12}  participants"]
     for column, frequency_hz in enumerate(analysis.table.frequencies_hz):
         values = [row[column] for row in analysis.table.values if row[column] is not None]
         censored = sum(row[column] for row in analysis.table.censored)
         mean = sum(v for v in values if v is not None) / len(values) if values else None
-        shown = f"{mean:8.3f} N" if mean is not None else "         -"
-        lines.append(f"{frequency_hz:7g} Hz  {shown}  {censored:>10}  {len(values):>12}")
+        shown = f"{'≥ ' if censored else ''}{mean:.3f} N" if mean is not None else "-"
+        lines.append(f"{frequency_hz:7g} Hz  {shown:>10}  {censored:>12}  {len(values):>12}")
     return lines
 
 
@@ -136,6 +136,8 @@ def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:
     """What the report's last section shows."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
+        "device": ", ".join(collected.devices) or "none",
+        "participants": ", ".join(collected.observers) or "people",
         "sessions": ", ".join(folder.name for folder in collected.sessions) or "none",
         "left out": " ".join(collected.left_out) or "nothing",
         "seeds": ", ".join(str(seed) for seed in collected.seeds) or "none",

@@ -21,6 +21,10 @@ class Collected:
     trials: tuple[Trial, ...]
     sessions: tuple[SessionFolder, ...]
     seeds: tuple[int, ...]
+    devices: tuple[str, ...]
+    """Names of all devices that were used."""
+    observers: tuple[str, ...]
+    """Names of the simulated participants; empty for people."""
     left_out: tuple[str, ...]
     """What did not enter, and why, in sentences."""
 
@@ -56,6 +60,8 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         trials=trials,
         sessions=tuple(folder for folder, _ in entering),
         seeds=tuple(state.opened.seed for _, state in entering),
+        devices=tuple(dict.fromkeys(state.opened.device.name for _, state in entering)),
+        observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
         left_out=tuple(left_out),
     )
 

@@ -58,7 +58,9 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
         return SessionEnd(state, left="")
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
-        sitting.log.append(SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted at the keyboard"))
+        sitting.log.append(
+            SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted: Ctrl-C, or the terminal was closed")
+        )
     raise LeftError(
         "Interrupted",
         "The force was released.",

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from analysis.thresholds import thresholds
 from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
 from study.errors import StudyError
@@ -11,6 +12,7 @@ from study.store.event_log import LOG_NAME
 from study.store.file_errors import UnusableFileError
 from study.store.json_document import read_json
 from study.store.provenance import sha256_of
+from study.store.thresholds_file import THRESHOLDS_NAME, read_thresholds
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.workflows.file_content import FileContent
 from study.workflows.fold_session import FoldedSession, fold_session
@@ -63,7 +65,11 @@ def recognise_lock(content: FileContent) -> str | None:
 def _checked(folder: SessionFolder, path: Path) -> str:
     """Beyond the log: every recording is the one that the log speaks of, and the table agrees with it."""
     folded = _folded(folder, path)
-    problems = [*_recording_problems(folder, folded), *_table_problems(folder, folded)]
+    problems = [
+        *_recording_problems(folder, folded),
+        *_table_problems(folder, folded),
+        *_threshold_problems(folder, folded),
+    ]
     if problems:
         raise UnusableFileError(path, KIND, tuple(problems))
     return _described(folded)
@@ -105,6 +111,18 @@ def _table_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
     except UnusableFileError as error:
         return [f"{TRIALS_NAME}: {problem}" for problem in error.problems]
     return [f"{TRIALS_NAME} does not agree with the log; hapteq analyze and hapteq resume read the log alone"]
+
+
+def _threshold_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    table = folder.path / THRESHOLDS_NAME
+    if not table.exists():
+        return []
+    try:
+        if read_thresholds(table) == thresholds(folded.state.trials, folded.state.protocol.staircase):
+            return []
+    except UnusableFileError as error:
+        return [f"{THRESHOLDS_NAME}: {problem}" for problem in error.problems]
+    return [f"{THRESHOLDS_NAME} does not agree with the log; hapteq analyze computes it anew"]
 
 
 def _described(folded: FoldedSession) -> str:

@@ -39,7 +39,8 @@ def test_a_run_that_was_broken_off_is_named(able, protocol):
 
 def test_lower_bounds_are_named(simulate_study, protocol):
     trials = simulate_study(subjects=5, true_n=(0.3, 0.3, 0.3, 0.3, float("inf")), seed=2)
-    (bounds,) = warnings(trials, protocol)
+    bounds, guessed = warnings(trials, protocol)
+    assert guessed.startswith("Answers no better than chance (one-sided binomial test, 5 %): s01 at 45 Hz (")
     assert bounds.startswith("5 thresholds are only a lower bound, because the cap of 3 N cut off peaks")
     assert "s05 at 45 Hz" in bounds
 

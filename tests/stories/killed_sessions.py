@@ -106,11 +106,11 @@ def try_one(data: Path, number: int, text: str, seed: int, typical_s: float, exp
 def main() -> None:
     data, sessions, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
     text = Path(sys.argv[4]).read_text()
-    sit(data, "WARM", text, seed)  # compiles, so that the children need not
+    sit(data, "WARM0", text, seed)  # compiles, so that the children need not
     started = time.monotonic()
-    sit(data, "WHOLE", text, seed)
+    sit(data, "WHOLE0", text, seed)
     typical_s = time.monotonic() - started
-    expected = decisions(begun(data, "WHOLE"))
+    expected = decisions(begun(data, "WHOLE0"))
     for number in range(sessions):
         sys.stdout.write(json.dumps(try_one(data, number, text, seed, typical_s, expected)) + "\n")
         sys.stdout.flush()

@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def _own_the_terminal() -> None:
-    """So that Ctrl-C typed into it reaches the program as a signal."""
+    """So that Ctrl-C typed into it reaches the program as a signal, also when the tests run in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
 

@@ -41,7 +41,7 @@ def data(finished, tmp_path) -> Path:
 def test_a_simulated_participant_takes_the_study_and_results_go_to_stdout(run, small_file, tmp_path):
     code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert code == 0
-    assert out.splitlines()[0].split() == ["frequency", "threshold", "at", "the", "cap", "participants"]
+    assert out.splitlines()[0].split() == ["frequency", "threshold", "lower", "bounds", "participants"]
     assert "25 Hz" in out
     assert "Report:" in err
     assert (tmp_path / "d" / "ideal1_001" / "analysis" / "report.html").exists()
@@ -177,9 +177,10 @@ def test_withdrawal_erases_all_sessions_of_the_participant_and_nobody_elses(run,
     assert "withdrew" in err
     code, _, err = run("analyze", data)
     assert "P01_001 was withdrawn by the participant." in err
-    # The number is not given to anybody else.
-    assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)[0] == 0
-    assert (data / "P01_003").exists()
+    # Nobody else gets the code.
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)
+    assert code == 2
+    assert "P01 withdrew" in err
 
 
 def test_a_withdrawal_that_is_not_confirmed_erases_nothing(run, data, monkeypatch):
@@ -264,3 +265,64 @@ def test_the_version_is_said(run):
     code, out, _ = run("--version")
     assert code == 0
     assert out.startswith("hapteq ")
+
+
+def test_figures_of_a_participant_who_withdrew_do_not_stay(run, data, small_file, tmp_path):
+    assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P02", "--data", data)[0] == 0
+    out = tmp_path / "elsewhere"
+    assert run("analyze", data, "--out", out)[0] == 0
+    assert run("analyze", data)[0] == 0
+    assert run("withdraw", "P02_001", "--data", data, "--yes")[0] == 0
+    assert not (data / "analysis").exists()
+    assert run("analyze", data, "--out", out)[0] == 0
+    traces = [p for p in out.rglob("*") if p.is_file() and (b"P02_001" in p.read_bytes()) and p.suffix != ".html"]
+    assert traces == []
+    assert not list((out / "figures").glob("*P02*"))
+
+
+def test_leaving_is_not_finishing(run, small_file, tmp_path, monkeypatch):
+    from study.session.views import Unanswered
+
+    leave = Unanswered("the participant left", leave=True)
+    monkeypatch.setattr("study.workflows.simulated_display.SimulatedDisplay.ask", lambda *_: leave)
+    code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
+    assert (code, out) == (130, "")
+    assert "The sitting ended: the participant left." in err
+    assert f"hapteq resume {tmp_path / 'd' / 'ideal1_001'}" in err
+
+
+def test_a_copied_session_is_left_out_and_the_rest_is_analysed(run, data):
+    shutil.copytree(data / "P01_001", data / "P02_001")
+    code, out, err = run("analyze", data)
+    assert code == 0
+    assert "P02_001 holds the log of P01_001: the folder was copied or renamed." in err
+    assert "25 Hz" in out
+
+
+def test_a_simulated_participant_does_not_take_a_persons_code(run, small_file, tmp_path):
+    data = tmp_path / "d"
+    assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)[0] == 0
+    log = data / "P01_001" / "events.jsonl"
+    log.write_text(log.read_text().replace('"observer":"ideal"', '"observer":null', 1))
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)
+    assert code == 2
+    assert "P01 is the code of a person" in err
+
+
+def test_the_help_names_every_observer(run):
+    from study.participants.observers import OBSERVERS
+
+    _, out, _ = run("study", "--help")
+    said = "".join(out.split())
+    assert all(name in said for name in OBSERVERS)
+
+
+def test_a_changed_threshold_is_found(run, data):
+    table = data / "P01_001" / "thresholds.csv"
+    rows = table.read_text().splitlines()
+    first = rows[1].split(",")
+    first[2] = "0.1111"
+    table.write_text("\n".join([rows[0], ",".join(first), *rows[2:]]) + "\n")
+    code, out, _ = run("validate", data / "P01_001")
+    assert code == 1
+    assert "thresholds.csv does not agree with the log" in out

@@ -1,0 +1,141 @@
+"""Whatever is wrong: a named error, an exit code, what to do; never a traceback. Each in a process of its own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+PATHS = os.pathsep.join((str(ROOT), str(ROOT / "study" / "launcher")))
+
+
+def hapteq(*arguments: object, cwd: Path, stdin: str | None = "", env: dict | None = None):
+    return subprocess.run(
+        [sys.executable, "-m", "study", *map(str, arguments)],
+        cwd=cwd,
+        input=stdin,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": PATHS, **(env or {})},
+        timeout=120,
+    )
+
+
+def broken(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+CASES = {
+    "a huge number": ("a.toml", "x = " + "9" * 5000, "protocol", "cannot be read"),
+    "deep nesting": ("b.toml", "a=" + "[" * 2000, "protocol", "cannot be read"),
+    "no TOML": ("c.toml", "name = = 3", "protocol", "line 1"),
+    "nothing": ("d.toml", "", "protocol", "d.toml"),
+    "a log that is none": ("P01_001/events.jsonl", "hello\n", "resume", "Line 1 of events.jsonl"),
+    "an empty log": ("P01_001/events.jsonl", "", "resume", "never began"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_broken_file_is_named(tmp_path, name):
+    file, text, command, expected = CASES[name]
+    path = broken(tmp_path, file, text)
+    if command == "protocol":
+        done = hapteq("protocol", "show", path, cwd=tmp_path)
+    else:
+        done = hapteq("resume", path.parent, cwd=tmp_path)
+    assert done.returncode == 1
+    assert expected in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("study", "--observer", "ideal", "--data", "a_file"),
+        ("rehearse", "--subjects", "1", "--out", "a_file"),
+        ("analyze", "a_file"),
+        ("analyze", "/dev/null"),
+        ("protocol", "lock", "sweep", "--data", "a_file"),
+        ("record", "ellipsoid", "--out", "a_file/e.h5"),
+        ("record", "ellipsoid", "--out", "a_file"),
+        ("record", "ellipsoid", "--out", "e.h5", "--place", "1", "0", "0"),
+        ("record", "ellipsoid", "--out", "e.h5", "--place", "nan", "0", "0"),
+        ("validate", "a_file", "nowhere", "/dev/null"),
+        ("withdraw", "a_file", "--yes"),
+        ("resume", "a_file"),
+    ],
+    ids=" ".join,
+)
+def test_a_wrong_place_is_an_error_and_nothing_more(tmp_path, arguments):
+    (tmp_path / "a_file").write_text("mine\n")
+    done = hapteq(*arguments, cwd=tmp_path)
+    assert done.returncode in (1, 2, 3)
+    assert "Traceback" not in done.stderr + done.stdout
+    assert done.stderr or done.stdout
+    assert (tmp_path / "a_file").read_text() == "mine\n"
+    assert [p.name for p in tmp_path.iterdir()] == ["a_file"]
+
+
+def test_a_full_standard_output_is_no_traceback(tmp_path):
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "study", "protocol", "list"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False, env={**os.environ, "PYTHONPATH": PATHS},
+        )  # fmt: skip
+    assert done.returncode != 0
+    assert "Traceback" not in done.stderr
+
+
+def test_a_terminal_that_knows_only_ascii_gets_question_marks(tmp_path, small_file):
+    env = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "PYTHONUTF8": "0"}
+    person = ("study", "--plain", "--subject", "P01")
+    done = hapteq(*person, "--protocol", small_file, "--data", tmp_path / "d", cwd=tmp_path, stdin="\nq\n", env=env)
+    assert done.returncode == 130
+    assert "up-left to down-right" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_a_person_without_a_terminal_must_say_the_code(tmp_path, small_file):
+    done = hapteq("study", "--plain", "--protocol", small_file, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--subject" in done.stderr
+    assert not (tmp_path / "data").exists()
+
+
+def test_no_input_at_all_leaves_at_once(tmp_path, small_file):
+    done = hapteq(
+        "study", "--plain", "--subject", "P01", "--protocol", small_file, "--data", tmp_path / "d", cwd=tmp_path
+    )
+    assert done.returncode == 130
+    assert "0 answers are on disk." in done.stderr
+
+
+@pytest.mark.parametrize("size_kib", [8, 30])
+def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_goes_on(tmp_path, small_file, size_kib):
+    """A limit on the size of one file stands for a full disk: with 8 KiB recordings fail first, with 30 KiB the log."""
+    script = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size_kib * 1024},) * 2); "
+        "from study.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    )
+    arguments = ["study", "--observer", "scripted", "--protocol", str(small_file), "--data", str(tmp_path / "d")]
+    # Compiled code is on disk before the limit holds: it is no part of the session.
+    assert hapteq("record", "ellipsoid", "--out", tmp_path / "warm.h5", cwd=tmp_path).returncode == 0
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": PATHS},
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 1, done.stderr
+    assert "answers are on disk." in done.stderr
+    again = hapteq("resume", "scripted1_001", "--data", tmp_path / "d", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
