@@ -14,7 +14,7 @@ STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 class StepChange(Enum):
     """When the next step size of the schedule comes into force.
 
-    Published "4 dB, then 1 dB" staircases differ here, and the threshold with them (0.5 to 1.5 dB).
+    Published "4 dB, then 1 dB" staircases differ here, and the threshold with them (0.7 to 1.1 dB).
     """
 
     AFTER_REVERSAL = "after_reversal"
@@ -57,7 +57,7 @@ class StaircaseRule:
         bool,
         Field(
             description="Move after every answer until the first reversal. Default: no, because the rule is stated "
-            "for the whole run, and the shortcut raises the spread of the threshold by 20 to 50 %."
+            "for the whole run, and the shortcut raises the spread of the threshold by 30 to 55 %."
         ),
     ] = False
     reversal: Annotated[
