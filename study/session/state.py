@@ -1,6 +1,5 @@
 """A session as a fold of its events: `begin_session` the first, `apply` each of the others."""
 
-import math
 from dataclasses import dataclass, replace
 
 from protocols.schedule import Run, runs
@@ -8,6 +7,7 @@ from protocols.staircase import StaircaseState, begin, finished, step
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase, Trial, TrialStatus
+from study.session.draw_check import LogContradiction, check_draw, place_of
 from study.session.due_trial import Place, Present, due_trial
 from study.session.events import (
     AnswerGiven,
@@ -22,10 +22,6 @@ from study.session.events import (
     TrialPresented,
     TrialSpoiled,
 )
-
-
-class LogContradiction(ValueError):  # noqa: N818 - a contradiction is what it is
-    """An event cannot follow what came before it, or a logged level is not what the rules give."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,47 +117,18 @@ def felt(opened: SessionOpened) -> bool | None:
 
 def _present(state: SessionState, event: TrialPresented) -> SessionState:
     if state.presented is not None:
-        raise LogContradiction(f"{_where(event)} presented while another trial is open")
+        raise LogContradiction(f"{place_of(event)} presented while another trial is open")
     if state.finished:
-        raise LogContradiction(f"{_where(event)} presented after the last run")
-    _check_against_the_rules(event, due(state))
+        raise LogContradiction(f"{place_of(event)} presented after the last run")
+    check_draw(event, due(state))
     row = _row(state, event)
     return replace(state, presented=event, trials=(*state.trials, row))
-
-
-def _check_against_the_rules(event: TrialPresented, expected: Present) -> None:
-    place = (expected.run, expected.trial, expected.attempt)
-    if (event.run, event.trial, event.attempt) != place:
-        raise LogContradiction(
-            f"{_where(event)} presented where run {place[0]}, trial {place[1]}, attempt {place[2]} was due"
-        )
-    given = {
-        "phase": (event.phase.value, expected.phase.value),
-        "frequency_hz": (event.frequency_hz, expected.frequency_hz),
-        "level_n": (event.level_n, expected.level_n),
-        "level_db": (event.level_db, expected.level_db),
-        "direction": (event.direction, expected.label),
-        "angle_deg": (event.angle_deg, expected.angle_deg),
-        "polarity": (event.polarity, expected.polarity),
-    }
-    wrong = [f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _same(logged, due)]
-    if wrong:
-        raise LogContradiction(
-            f"{_where(event)} was presented with {', '.join(wrong)}: this session was begun with different rules"
-        )
-
-
-def _same(logged: str | float, due: str | float) -> bool:
-    """Powers may differ in the last bit between machines; rules differ by far more."""
-    if isinstance(logged, float) and isinstance(due, float):
-        return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)
-    return logged == due
 
 
 def _answer(state: SessionState, event: AnswerGiven) -> SessionState:
     presented = _open_trial(state, event)
     if state.answered is not None:
-        raise LogContradiction(f"{_where(event)} answered twice")
+        raise LogContradiction(f"{place_of(event)} answered twice")
     row = replace(
         state.trials[-1],
         answer=event.answer,
@@ -187,7 +154,7 @@ def _close(state: SessionState) -> SessionState:
 def _measure(state: SessionState, event: TrialMeasured) -> SessionState:
     presented = _open_trial(state, event)
     if state.answered is None:
-        raise LogContradiction(f"{_where(event)} measured before it was answered")
+        raise LogContradiction(f"{place_of(event)} measured before it was answered")
     rule = current_rule(state)
     staircase = step(rule, state.staircase, state.answered.answer == presented.direction)
     row = replace(
@@ -237,7 +204,7 @@ def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialS
         event.trial,
         event.attempt,
     ):
-        raise LogContradiction(f"{event.event} for {_where(event)}, which is not open")
+        raise LogContradiction(f"{event.event} for {place_of(event)}, which is not open")
     return presented
 
 
@@ -269,7 +236,3 @@ def _row(state: SessionState, event: TrialPresented) -> Trial:
         status=TrialStatus.OPEN,
         angle_deg=event.angle_deg,
     )
-
-
-def _where(event: TrialPresented | AnswerGiven | TrialMeasured | TrialSpoiled) -> str:
-    return f"run {event.run}, trial {event.trial}, attempt {event.attempt}"

@@ -6,8 +6,9 @@ from protocols.hashing import protocol_hash
 from protocols.loading import ProtocolError, load_protocol
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
+from study.session.draw_check import LogContradiction
 from study.session.events import SessionOpened
-from study.session.state import LogContradiction, SessionState, apply, begin_session
+from study.session.state import SessionState, apply, begin_session
 from study.store.archive import SessionFolder
 from study.store.event_log import LogContents, read_log
 

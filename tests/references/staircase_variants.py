@@ -48,9 +48,8 @@ def main() -> None:
     for slope, lapse in ((1.5, 0.0), (2.0, 0.0), (2.0, 0.05), (3.5, 0.0)):
         for name, variant in VARIANTS.items():
             found = thresholds_db(variant, slope, lapse, runs=600, seed=1) - TRUE_DB
-            sys.stdout.write(
-                f"slope {slope:.1f}, lapse {lapse:.2f}, {name:36} bias {found.mean():+.2f} dB, sd {found.std():.2f} dB\n"
-            )
+            line = f"slope {slope:.1f}, lapse {lapse:.2f}, {name:36}"
+            sys.stdout.write(f"{line} bias {found.mean():+.2f} dB, sd {found.std():.2f} dB\n")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from protocols.hashing import protocol_hash
 from protocols.staircase import begin, level_n, step
 from protocols.trial import Phase, TrialStatus
+from study.session.draw_check import LogContradiction
 from study.session.events import (
     AnswerGiven,
     DeviceFacts,
@@ -23,7 +24,7 @@ from study.session.events import (
     parse_event,
 )
 from study.session.machine import Finish, Present, Rest, next_action
-from study.session.state import LogContradiction, apply, begin_session
+from study.session.state import apply, begin_session
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 
