@@ -11,9 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.devices import govern
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
+from study.devices.governor import Governor
 from study.devices.safe import SafeDevice
+from study.devices.stepped_runner import SteppedRunner
 from study.errors import DeviceError
 
 TESTS = Path(__file__).parents[2]
@@ -97,9 +100,7 @@ def test_an_emergency_stop_needs_no_loop(device, rigs, rig, hang):
     hold(device, rigs, rig)
     rig.before_sensing = hang.wait
     time.sleep(0.02)
-    started_s = time.monotonic()
     device.stop()
-    assert time.monotonic() - started_s < 0.08  # long before the loop counts as hanging
     assert not rig.last_n.any()
     assert device.fault() is Fault.STOPPED
     hang.set()
@@ -111,7 +112,7 @@ def test_an_emergency_stop_that_the_loop_hears_is_left_to_it(device, rigs, rig):
     hold(device, rigs, rig)
     device.stop()
     assert not rig.last_n.any()
-    assert device._runner._gone.is_set() is False
+    assert device.release().health.fault is Fault.STOPPED
 
 
 def test_commands_end_when_the_sensor_hangs(device, rigs, rig, hang):
@@ -146,6 +147,40 @@ def test_a_late_write_of_a_device_that_is_still_open_is_taken_back_too(device, r
     wait_until(lambda: len(rig.written_n) > late + 1)
     assert not rig.last_n.any()
     assert rig.closed == 0
+
+
+def test_a_driver_that_comes_back_and_takes_no_zero_is_worse_than_lost(device, rigs, rig, hang):
+    def fail(force_n) -> None:
+        raise OSError("usb")
+
+    hold(device, rigs, rig)
+    rig.before_sensing = hang.wait
+    alive(device, 0.2)
+    assert device.fault() is Fault.LOST
+    rig.before_writing = fail
+    hang.set()
+    wait_until(lambda: device.fault() is Fault.FORCE_LEFT)
+
+
+def test_a_rig_that_was_given_up_gets_no_force_even_from_a_tick_that_was_under_way(rigs, rig):
+    governor = Governor(rig.info, rigs.SETTINGS)
+    runner = SteppedRunner(rig, governor, catches_up=False)
+    governor.begin_hold(rigs.push())
+    runner.run(20)
+    runner.give_up(OSError("usb"))
+    governor.state[govern.PHASE] = govern.PLAYING  # as a tick leaves it that heard of nothing
+    given = len(rig.written_n)
+    runner.run(20)
+    assert not runner.moving
+    assert not np.any(rig.written_n[given:])
+    runner.disconnect()
+
+
+def test_nothing_begins_while_the_loop_is_being_closed(device, rigs, rig):
+    device._drive._closing = True
+    with pytest.raises(DeviceError, match="cannot do this now"):
+        device.hold(rigs.push())
+    assert rig.written_n == []
 
 
 def test_a_driver_that_hangs_with_its_lock_hangs_nobody_else(device, rigs, rig, hang):
@@ -190,9 +225,22 @@ def test_writes_that_fail_for_good_are_not_called_a_force_that_is_off(device, ri
 
 @pytest.mark.parametrize("clock", [VirtualClock(), RealClock()], ids=["virtual", "real"])
 def test_a_final_zero_that_fails_does_not_close_a_trial_without_fault(rigs, rig, clock):
+    def fail_at_the_end(force_n) -> None:
+        if not device._governor.moving:
+            time.sleep(0.02)  # as long as that, all seems over
+            raise OSError("usb")
+
+    with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock)) as device:
+        device.hold(rigs.push())
+        clock.sleep(0.2)
+        rig.before_writing = fail_at_the_end
+        assert device.release().health.fault is Fault.FORCE_LEFT
+
+
+@pytest.mark.parametrize("clock", [VirtualClock(), RealClock()], ids=["virtual", "real"])
+def test_a_zero_that_fails_while_the_force_fades_leaves_it_on_and_says_so(rigs, rig, clock):
     def fail_at_zero(force_n) -> None:
         if not force_n.any():
-            time.sleep(0.02)  # as long as that, all seems over
             raise OSError("usb")
 
     with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock)) as device:
@@ -274,7 +322,7 @@ def test_a_second_start_is_refused_where_the_ticks_run(rigs, rig, device):
 
 
 def test_two_threads_that_hold_at_once_do_not_break_the_slew_limit(rigs, rig, device):
-    slow = rigs.HeldStimulus(rigs.force(np.tile([[-2.9, 0.0, 0.0]], (3_000_000, 1))), 0.05, 0.05, "linear")
+    slow = rigs.HeldStimulus(rigs.force(np.tile([[-2.9, 0.0, 0.0]], (1_000_000, 1))), 0.05, 0.05, "linear")
     refused = []
 
     def hold(stimulus) -> None:
@@ -323,6 +371,21 @@ def test_a_close_that_is_interrupted_turns_the_force_off_and_can_be_made_good_fo
     assert device._closed
 
 
+def test_a_close_that_is_interrupted_once_more_while_the_loop_ends_disconnects_all_the_same(rigs, rig):
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    device = SafeDevice(rig, rigs.SETTINGS, RealClock())
+    hold(device, rigs, rig)
+    device._drive.close = interrupt
+    with pytest.raises(KeyboardInterrupt):
+        device.close()
+    assert rig.closed == 1
+    assert not rig.last_n.any()
+    del device._drive.close
+    device.close()
+
+
 def test_an_interruption_while_a_recording_lets_go_stops_at_once(rigs, rig):
     clock = ImpatientClock()
 
@@ -336,7 +399,7 @@ def test_an_interruption_while_a_recording_lets_go_stops_at_once(rigs, rig):
             device.play(rigs.force(np.minimum(np.arange(2000) * 0.01, 2.9)[:, None] * [1.0, 0.0, 0.0]), interrupt)
         clock.impatient = False
         assert device.fault() is Fault.STOPPED
-        wait_until(lambda: not rig.last_n.any(), 0.1)
+        wait_until(lambda: not rig.last_n.any(), 1.0)
 
 
 PROGRAM = """
