@@ -76,7 +76,7 @@ def _void(state: SessionState, present: Present, reply: Unanswered, sitting: Sit
 
 def _after_void(state: SessionState, reason: str, fault: Fault) -> AfterTrial:
     """After some faults this device cannot go on until it is opened again."""
-    leave = fault.value if fault in (Fault.STOPPED, Fault.LOST) else ""
+    leave = fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""
     return AfterTrial(state, correct=None, leave=leave, void=reason, fault=fault)
 
 
