@@ -59,7 +59,8 @@ def _close(state: SessionState, present: Present, correct: bool, felt_whole: boo
         state = record(state, spoiled(present, verdict.spoiled, played.health, sitting), sitting)
         return _after_void(state, verdict.spoiled, played.health.fault)
     state = record(state, measured(present, Outcome(played, values, verdict.flags, vector), state, sitting), sitting)
-    return AfterTrial(state, correct)
+    fault = played.health.fault
+    return AfterTrial(state, correct, leave=_reason_to_leave(fault), fault=fault)
 
 
 def _void(state: SessionState, present: Present, reply: Unanswered, sitting: Sitting) -> AfterTrial:
@@ -75,9 +76,12 @@ def _void(state: SessionState, present: Present, reply: Unanswered, sitting: Sit
 
 
 def _after_void(state: SessionState, reason: str, fault: Fault) -> AfterTrial:
-    """After some faults this device cannot go on until it is opened again."""
-    leave = fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""
-    return AfterTrial(state, correct=None, leave=leave, void=reason, fault=fault)
+    return AfterTrial(state, correct=None, leave=_reason_to_leave(fault), void=reason, fault=fault)
+
+
+def _reason_to_leave(fault: Fault) -> str:
+    """After these faults a device cannot go on until it is opened again, and somebody must hear of it at once."""
+    return fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""
 
 
 def _sign_of_life(sitting: Sitting) -> bool:

@@ -126,6 +126,15 @@ def test_a_stall_after_the_answer_is_flagged_and_the_answer_counts(sitter, watch
     assert any(flag.startswith("after the answer: the program gave no sign of life") for flag in flags)
 
 
+@pytest.mark.parametrize("fault", [Fault.LOST, Fault.FORCE_LEFT])
+def test_a_device_lost_while_letting_go_ends_the_sitting_and_the_answer_counts(sitter, watched, fault):
+    watched.fault = fault
+    done = sitter.whole()
+    assert (done.left, done.fault) == (fault.value, fault)
+    assert done.state.answers == 1
+    assert watched.calls.count("hold") == 1
+
+
 def test_ctrl_c_right_after_the_last_line_leaves_a_finished_session(sitter, watched, monkeypatch):
     real = EventLog.append
 
