@@ -9,9 +9,11 @@ from matplotlib.figure import Figure
 
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6B6B6B"
-COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK)
-MARKERS = ("o", "s", "D", "P", "X", "p", "h", "v", "<", ">")
-"""Without the upward triangle, which always means: a lower bound."""
+WINE, OLIVE, TEAL = "#882255", "#999933", "#117766"
+COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK, WINE, OLIVE, TEAL)
+"""Ten, for the ten participants of the published study; the last three after P. Tol's muted scheme."""
+MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
+"""Without triangles: the upward one always means a lower bound."""
 CENSORED_MARKER = "^"
 
 
