@@ -68,6 +68,12 @@ def go_on(session: str, device: str, data: Path, as_json: bool) -> None:
 @contextmanager
 def _participant(observer: str | None, seed: int) -> Iterator[Participant]:
     clock: Clock = RealClock() if observer is None else VirtualClock()
+    if observer is None and sys.stdin is None:
+        raise WrongUseError(
+            "There is nothing to read answers from",
+            "Standard input is closed.",
+            "Start hapteq in a terminal, or with answers from a pipe.",
+        )
     if observer is None:
         display = PlainDisplay(LineInput(), sys.stdout, clock)
         yield Participant(display=display, hand=PersonsHand(), clock=clock)

@@ -28,7 +28,8 @@ def withdraw(
             "There is no such session", f"'{session}' was not found in {data}.", "Give its folder, or --data."
         )
     plan = plan_withdrawal(folder)
-    typer.echo(f"To be erased for good: {', '.join(plan.sessions)}", err=True)
+    made_from_them = f", and the analysis in {plan.analysis}" if plan.analysis else ""
+    typer.echo(f"To be erased for good: {', '.join(plan.sessions)}{made_from_them}", err=True)
     if not yes and not typer.confirm("Erase them?", err=True):
         typer.echo("Nothing was erased.", err=True)
         return

@@ -5,6 +5,8 @@ when ticks run in `virtual_drive` and `realtime_drive`.
 """
 
 import atexit
+import contextlib
+import sys
 from collections.abc import Callable
 
 from equalizer.signals.signal import Signal
@@ -106,6 +108,10 @@ class SafeDevice:
         # Last, so that a close that was interrupted is made good for when the program ends.
         self._closed = True
         atexit.unregister(self.close)
+        if not self._runner.force_off:
+            # Closing never raises and may be the last thing a program does: whoever holds the handle must hear it.
+            with contextlib.suppress(OSError):
+                sys.stderr.writelines([f"{Fault.FORCE_LEFT.value}\n"])
 
     def _attend_play(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
         nap_s = min(BLOCK_S, self._limits.watchdog_s / 4)

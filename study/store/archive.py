@@ -1,5 +1,6 @@
 """Where sessions lie: one folder each in the data folder, named after participant code and number."""
 
+import contextlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,6 +58,7 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
     """Make the participant's next folder. Never touches an existing one, also when two programs race."""
     check_subject(subject)
     try:
+        made = not data.exists()
         data.mkdir(parents=True, exist_ok=True)
         for _ in range(1000):
             taken = [folder_number(f.name) for f in session_folders(data) if f.subject == subject]
@@ -66,8 +68,11 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
             except FileExistsError:
                 continue
             (path / "recordings").mkdir()
-            for folder in (path, data, data.absolute().parent):
+            for folder in (path, data):
                 sync_folder(folder)
+            if made:
+                with contextlib.suppress(OSError):  # not every parent may be read
+                    sync_folder(data.absolute().parent)
             return SessionFolder(path)
     except OSError as problem:
         raise StudyError(

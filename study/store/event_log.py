@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -113,7 +114,7 @@ def _own(descriptor: int, path: Path) -> None:
         return
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as problem:
+    except BlockingIOError as problem:
         os.close(descriptor)
         raise StudyError(
             "This session is running elsewhere",
@@ -121,6 +122,21 @@ def _own(descriptor: int, path: Path) -> None:
             "Close it there first.",
             saved="Nothing was changed.",
         ) from problem
+    except OSError:
+        return  # a network folder without such locks: the lock file has to do
+
+
+@contextlib.contextmanager
+def nobody_writes(path: Path) -> Iterator[None]:
+    """Hold the lock of a log that is to be erased, where there is one. Raises StudyError while somebody writes it."""
+    if not path.exists():
+        yield
+        return
+    log = EventLog.reopen(path)
+    try:
+        yield
+    finally:
+        log.close()
 
 
 def _event(path: Path, number: int, line: bytes) -> Event:

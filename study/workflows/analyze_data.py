@@ -93,10 +93,23 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
         ) from problem
 
 
+def written_by_analysis(out: Path) -> tuple[Path, ...]:
+    """The files in `out` that an analysis writes, as far as they are there."""
+    figures = [path for name in OURS for kind in ("svg", "png") for path in (out / "figures").glob(f"{name}.{kind}")]
+    tables = [out / name for name in (THRESHOLDS_NAME, "anova.json", "report.html") if (out / name).is_file()]
+    return (*tables, *figures)
+
+
 def sensor_frame(recording: Recording) -> FloatArray | None:
     """Rotation from the sensor's axes to the device's, as the recording states it; None where it states none."""
-    frame = recording.meta.get("sensor", {}).get("frame_to_device")
-    return None if frame is None else np.asarray(frame, dtype=np.float64)
+    sensor = recording.meta.get("sensor")
+    frame = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
+    if frame is None:
+        return None
+    rotation = np.asarray(frame, dtype=np.float64)
+    if rotation.shape != (3, 3):
+        raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
+    return rotation
 
 
 def _write(
@@ -110,8 +123,9 @@ def _write(
     figures = out / "figures"
     try:
         figures.mkdir(parents=True, exist_ok=True)
-        for stale in (path for name in OURS for kind in ("svg", "png") for path in figures.glob(f"{name}.{kind}")):
-            stale.unlink()
+        for stale in written_by_analysis(out):
+            if stale.parent == figures:
+                stale.unlink()
     except OSError as problem:
         raise CannotWriteError(figures, problem) from problem
     write_thresholds(out / THRESHOLDS_NAME, analysis.thresholds)

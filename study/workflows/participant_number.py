@@ -46,9 +46,9 @@ def begun_in(folder: SessionFolder) -> Begun | None:
             left = read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION).get("begun")
             return Begun(**left) if left else None
         opening = read_opening(folder.log)
-    except (StudyError, OSError, TypeError):
+        if not isinstance(opening, SessionOpened):
+            return None
+        name = tomllib.loads(opening.protocol_text).get("name", "")
+    except (StudyError, OSError, TypeError, ValueError, RecursionError):
         return None
-    if not isinstance(opening, SessionOpened):
-        return None
-    name = tomllib.loads(opening.protocol_text).get("name", "")
     return Begun(name, opening.observer is not None, opening.participant_number)

@@ -1,8 +1,9 @@
 """One trial: log, play, ask, log, release, measure, log. Nothing moves before its fact is on the disk."""
 
+import contextlib
 from dataclasses import dataclass
 
-from study.devices.device import Fault
+from study.devices.device import Fault, Played
 from study.session.delivered import delivered
 from study.session.due_trial import Present
 from study.session.events import AnswerGiven
@@ -51,7 +52,7 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
 
 
 def _close(state: SessionState, present: Present, correct: bool, felt_whole: bool, sitting: Sitting) -> AfterTrial:
-    played = sitting.device.release()
+    played = _released(sitting)
     vector = direction_vector(state.protocol.directions, present.direction)
     values = delivered(played.recording, vector, present.frequency_hz) if played.recording else None
     verdict = judge(played.health, values is not None, state.protocol.measurement, felt_whole)
@@ -64,7 +65,7 @@ def _close(state: SessionState, present: Present, correct: bool, felt_whole: boo
 
 
 def _void(state: SessionState, present: Present, reply: Unanswered, sitting: Sitting) -> AfterTrial:
-    played = sitting.device.release()
+    played = _released(sitting)
     fault = played.health.fault
     reason = fault.value if fault is not Fault.NONE else reply.reason
     state = record(state, spoiled(present, reason, played.health, sitting), sitting)
@@ -73,6 +74,15 @@ def _void(state: SessionState, present: Present, reply: Unanswered, sitting: Sit
     if reply.asked and fault is Fault.NONE:
         return AfterTrial(state, correct=None)
     return _after_void(state, reason, fault)
+
+
+def _released(sitting: Sitting) -> Played:
+    """Whoever holds the handle hears at once of a force that could not be taken away, before any work on disk."""
+    played = sitting.device.release()
+    if played.health.fault is Fault.FORCE_LEFT:
+        with contextlib.suppress(OSError):
+            sitting.display.trouble(played.health.fault.value)
+    return played
 
 
 def _after_void(state: SessionState, reason: str, fault: Fault) -> AfterTrial:

@@ -55,6 +55,8 @@ def record_device(plan: RecordingPlan, on_progress: Callable[[float], None]) -> 
             _play_all(plan.protocol, device, done, on_progress)
         except KeyboardInterrupt as interruption:
             _write_whole_pieces(plan, device, done)
+            if device.fault() is Fault.FORCE_LEFT:
+                raise _still_on(plan, len(done)) from interruption
             raise _left(plan, len(done)) from interruption
         except DeviceError as error:
             _write_whole_pieces(plan, device, done)
@@ -109,6 +111,13 @@ def _left(plan: RecordingPlan, done: int) -> LeftError:
         f"{done} of {all_pieces} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",
         saved=_saved(plan, done),
+    )
+
+
+def _still_on(plan: RecordingPlan, done: int) -> DeviceError:
+    text = Fault.FORCE_LEFT.value
+    return DeviceError(
+        "The force may still be on", f"{text[0].upper()}{text[1:]}.", "Then record again.", saved=_saved(plan, done)
     )
 
 

@@ -103,6 +103,13 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
     else:
         conducted = conduct_resumed(begun, DEVICE, participant)
     write_tables(conducted.folder)
+    if conducted.left:
+        raise StudyError(
+            "A simulated participant did not finish",
+            f"{conducted.folder.name}: {conducted.left}.",
+            "Change what stops it in the protocol, and rehearse in another folder.",
+            saved="Everything so far is in the folder.",
+        )
 
 
 def _begun(data: Path, subject: str) -> SessionFolder | None:

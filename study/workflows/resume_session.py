@@ -25,11 +25,11 @@ from study.workflows.open_session import OpenedSession, device_facts
 def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
     """An existing session, mended and locked as long as the context lasts."""
     with locked(folder.path):
-        folded = fold_session(folder)
-        _check_resumable(folded.state, device, folder)
-        mend(folder.log, folded.contents)
         log = EventLog.reopen(folder.log)
         try:
+            folded = fold_session(folder)
+            _check_resumable(folded.state, device, folder)
+            mend(folder.log, folded.contents)
             resumed = SessionResumed(
                 utc=clock.utc(), device=device_facts(device), versions=versions(), mended=folded.contents.torn
             )

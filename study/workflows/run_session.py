@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from protocols.trial import Phase
 from study.devices.device import Fault
-from study.errors import LeftError, StudyError
+from study.errors import DeviceError, LeftError, StudyError
 from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.machine import Finish, Rest, next_action
@@ -54,19 +54,23 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
 def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
     """What is on the disk decides: a session whose last line was written is finished, however it ended."""
     state = fold_session(sitting.folder).state
-    if state.closed:
+    still_on = sitting.device.fault() is Fault.FORCE_LEFT
+    if state.closed and not still_on:
         return SessionEnd(state, left="")
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
         sitting.log.append(
             SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted: Ctrl-C, or the terminal was closed")
         )
-    raise LeftError(
-        "Interrupted",
-        "The force was released.",
-        f"Go on with: hapteq resume {sitting.folder.path}",
-        saved=f"{state.answers} answers are on disk.",
-    ) from interruption
+    way_back = f"Go on with: hapteq resume {sitting.folder.path}"
+    saved = f"{state.answers} answers are on disk."
+    if still_on:
+        raise DeviceError("The force may still be on", _sentence(Fault.FORCE_LEFT), way_back, saved) from interruption
+    raise LeftError("Interrupted", "The force was released.", way_back, saved) from interruption
+
+
+def _sentence(fault: Fault) -> str:
+    return f"{fault.value[0].upper()}{fault.value[1:]}."
 
 
 def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:

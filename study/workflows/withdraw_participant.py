@@ -9,9 +9,10 @@ from pathlib import Path
 
 from study.errors import StudyError
 from study.store.archive import TOMBSTONE_NAME, SessionFolder, session_folders
+from study.store.event_log import nobody_writes
 from study.store.json_document import write_json
 from study.store.session_lock import LOCK_NAME, locked
-from study.workflows.analyze_data import ANALYSIS_NAME
+from study.workflows.analyze_data import ANALYSIS_NAME, written_by_analysis
 from study.workflows.participant_number import TOMBSTONE_FORMAT, TOMBSTONE_VERSION, begun_in
 
 
@@ -35,7 +36,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
     """Erase. The tombstone is written first, so that an interrupted withdrawal is known and can be repeated."""
     for name in withdrawal.sessions:
         folder = SessionFolder(data / name)
-        with locked(folder.path):
+        with locked(folder.path), nobody_writes(folder.log):
             _erase(folder, utc)
     if withdrawal.analysis is not None:
         _erase_analysis(withdrawal.analysis)
@@ -63,8 +64,13 @@ def _erase(folder: SessionFolder, utc: str) -> None:
 
 
 def _erase_analysis(folder: Path) -> None:
+    """Only what an analysis writes: what else lies there is somebody's own."""
     try:
-        shutil.rmtree(folder)
+        for path in written_by_analysis(folder):
+            path.unlink()
+        for emptied in (folder / "figures", folder):
+            if emptied.is_dir() and not any(emptied.iterdir()):
+                emptied.rmdir()
     except OSError as problem:
         raise StudyError(
             "Not everything could be erased",

@@ -326,3 +326,32 @@ def test_a_changed_threshold_is_found(run, data):
     code, out, _ = run("validate", data / "P01_001")
     assert code == 1
     assert "thresholds.csv does not agree with the log" in out
+
+
+def test_withdrawal_leaves_what_others_put_beside_the_analysis(run, data):
+    assert run("analyze", data)[0] == 0
+    notes = data / "analysis" / "my_notes.R"
+    notes.write_text("mine")
+    code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")
+    assert code == 0
+    assert "and the analysis in" in err.splitlines()[0]
+    assert [p.name for p in (data / "analysis").iterdir()] == ["my_notes.R"]
+
+
+def test_a_damaged_protocol_text_keeps_nobody_out(run, data, small_file):
+    log = data / "P01_001" / "events.jsonl"
+    log.write_text(log.read_text().replace("start_n = 1.0", "start_n = = 1.0", 1))
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)
+    assert code == 0, err
+    assert run("withdraw", "P01_001", "--data", data, "--yes")[0] == 0
+
+
+def test_a_session_that_is_being_written_is_not_withdrawn(run, data):
+    from study.store.event_log import EventLog
+
+    log = EventLog.reopen(data / "P01_001" / "events.jsonl")
+    code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")
+    log.close()
+    assert code == 1
+    assert "Another program is writing to P01_001" in err
+    assert (data / "P01_001" / "trials.csv").exists()

@@ -168,3 +168,16 @@ def test_ctrl_c_at_any_line_leaves_a_session_that_can_be_resumed(sitter, monkeyp
     folder = find_session("P01_001", sitter.data)
     assert str(fold_session(folder).state.answers) == left.value.saved.split()[0]
     assert sitter.resumed(folder).state.closed
+
+
+def test_a_force_that_stayed_on_is_told_before_anything_is_written(sitter, watched, monkeypatch):
+    told: list[str] = []
+    monkeypatch.setattr(
+        "study.workflows.simulated_display.SimulatedDisplay.trouble",
+        lambda _, sentence: (told.append(sentence), watched.calls.append("told")),
+    )
+    watched.fault = Fault.FORCE_LEFT
+    sitter.whole()
+    assert told == [Fault.FORCE_LEFT.value]
+    released = watched.calls.index("release")
+    assert watched.calls[released + 1] == "told"
