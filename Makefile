@@ -33,7 +33,7 @@ fix: $(VENV)/.installed-test ## Let ruff format and mend what it can
 bench: $(VENV)/.installed-test ## Time ours against the same work done plainly; prints ratios
 	@for file in tests/benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
 
-prove-study: $(VENV)/.installed-test ## The slow proofs of the study: 100 killed sessions, long fuzzing
+prove-study: $(VENV)/.installed-test ## The slow proof of the study: 100 sessions killed at random
 	$(BIN)/python -m pytest -m slow
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code

@@ -48,6 +48,10 @@ class DeviceSettings:
 class Fault(Enum):
     """Why the device let go by itself. Each ends a trial."""
 
+    @property
+    def sentence(self) -> str:
+        return f"{self.value[0].upper()}{self.value[1:]}."
+
     NONE = "none"
     NOT_A_NUMBER = "a command or a position was no plausible number"
     STALLED = "the program gave no sign of life, so the force was faded out"

@@ -115,9 +115,8 @@ def _left(plan: RecordingPlan, done: int) -> LeftError:
 
 
 def _still_on(plan: RecordingPlan, done: int) -> DeviceError:
-    text = Fault.FORCE_LEFT.value
     return DeviceError(
-        "The force may still be on", f"{text[0].upper()}{text[1:]}.", "Then record again.", saved=_saved(plan, done)
+        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_saved(plan, done)
     )
 
 

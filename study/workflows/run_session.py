@@ -65,12 +65,8 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
     way_back = f"Go on with: hapteq resume {sitting.folder.path}"
     saved = f"{state.answers} answers are on disk."
     if still_on:
-        raise DeviceError("The force may still be on", _sentence(Fault.FORCE_LEFT), way_back, saved) from interruption
+        raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, way_back, saved) from interruption
     raise LeftError("Interrupted", "The force was released.", way_back, saved) from interruption
-
-
-def _sentence(fault: Fault) -> str:
-    return f"{fault.value[0].upper()}{fault.value[1:]}."
 
 
 def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
