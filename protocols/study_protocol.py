@@ -6,9 +6,12 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from protocols.apparatus import SafetySettings, SpringSettings, TestDirections
+from protocols.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.field_types import Name, Source, StimulusFrequency, Title
+from protocols.preparation import ConsentSettings, DebriefQuestion, DemoSettings, PracticeSettings, SetupSettings
 from protocols.problem import Problem, refuse
 from protocols.staircase_rule import STRICT, StaircaseRule
+from protocols.study_contradictions import contradictions
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -92,6 +95,14 @@ class ScheduleSettings:
 @dataclass(frozen=True, config=STRICT)
 class TrialSettings:
     """One presentation and its answer."""
+
+    device_buttons: Annotated[
+        tuple[int, ...],
+        Field(
+            max_length=2,
+            description="Numbers of the device's buttons that answer 1 and 2, beside the keys. Default: none.",
+        ),
+    ] = ()
 
     feedback: Annotated[
         Literal["none", "after_answer"],
@@ -202,26 +213,25 @@ class StudyProtocol:
     rests: RestSettings = Field(default_factory=RestSettings)
     spring: SpringSettings = Field(default_factory=SpringSettings)
     measurement: MeasurementSettings = Field(default_factory=MeasurementSettings)
+    consent: ConsentSettings = Field(default_factory=ConsentSettings)
+    setup: SetupSettings = Field(default_factory=SetupSettings)
+    demo: DemoSettings = Field(default_factory=DemoSettings)
+    practice: PracticeSettings = Field(default_factory=PracticeSettings)
+    detection: DetectionSettings = Field(default_factory=DetectionSettings)
+    catch: CatchSettings = Field(default_factory=CatchSettings)
+    gate: GateSettings = Field(default_factory=GateSettings)
+    limits: SittingLimits = Field(default_factory=SittingLimits)
+    debrief: Annotated[
+        tuple[DebriefQuestion, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")
+    ] = ()
+
+    @property
+    def all_frequencies_hz(self) -> tuple[float, ...]:
+        """Everything that may be played, each once, ascending."""
+        parts = (self.stimulus, self.training, self.practice, self.detection)
+        return tuple(sorted({frequency_hz for part in parts for frequency_hz in part.frequencies_hz}))
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        problems = []
-        cap_n, limit_s = self.staircase.cap_n, self.trial.time_limit_s
-        if self.safety.stimulus_cap_n < cap_n:
-            wrong = f"is {self.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
-            problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
-        if limit_s >= self.safety.longest_trial_s:
-            wrong = f"is {limit_s} s, not below safety.longest_trial_s, which releases the device"
-            problems.append(
-                Problem("trial.time_limit_s", wrong, f"below {self.safety.longest_trial_s} s, or 0 for none")
-            )
-        if frequencies := (*self.training.frequencies_hz, *self.stimulus.frequencies_hz):
-            period_s = 1 / min(frequencies)
-            if self.measurement.keep_s < period_s:
-                wrong = f"is {self.measurement.keep_s} s, less than one period of the lowest frequency"
-                problems.append(Problem("measurement.keep_s", wrong, f"at least {period_s:g} s"))
-        else:
-            wrong = "is empty, and so is training.frequencies_hz: nothing would be played"
-            problems.append(Problem("stimulus.frequencies_hz", wrong, "at least one frequency in either"))
-        refuse(problems)
+        refuse(contradictions(self))
         return self

@@ -6,12 +6,19 @@ facts (levels, reversals, thresholds) is folded from them; where it is written t
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from protocols.trial import Phase
-
-FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
+from study.session.sitting_events import (
+    FACT,
+    DemoFinished,
+    DemoPlayed,
+    DeviceChecked,
+    FormFilled,
+    NoteTaken,
+    PauseTaken,
+)
 
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 SESSION_VERSION: Literal[1] = 1
@@ -96,6 +103,10 @@ class TrialMeasured:
     off_axis_mps2: float | None = None
     displacement_mm: float | None = None
     missed_ticks: int | None = None
+    vibrated_s: float | None = None
+    """How long the hand was shaken, fades included: for the vibration dose."""
+    offset_mm: float | None = None
+    """Farthest the handle was from its place while recorded: a lean on the spring."""
     event: Literal["trial_measured"] = "trial_measured"
 
 
@@ -109,6 +120,7 @@ class TrialSpoiled:
     attempt: int
     reason: str
     missed_ticks: int | None = None
+    vibrated_s: float | None = None
     event: Literal["trial_spoiled"] = "trial_spoiled"
 
 
@@ -120,14 +132,6 @@ class RestTaken:
     """Index of the trial that comes after the rest."""
     rested_s: float
     event: Literal["rest_taken"] = "rest_taken"
-
-
-@dataclass(frozen=True, config=FACT)
-class NoteTaken:
-    utc: str
-    who: Literal["participant", "experimenter", "program"]
-    text: str
-    event: Literal["note_taken"] = "note_taken"
 
 
 @dataclass(frozen=True, config=FACT)
@@ -165,6 +169,11 @@ Event = (
     | TrialMeasured
     | TrialSpoiled
     | RestTaken
+    | FormFilled
+    | DeviceChecked
+    | DemoPlayed
+    | DemoFinished
+    | PauseTaken
     | NoteTaken
     | SessionInterrupted
     | SessionResumed

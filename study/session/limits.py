@@ -26,7 +26,7 @@ class Limits:
 def limits_of_study(protocol: StudyProtocol) -> Limits:
     """Slew just above the steepest stimulus: the highest frequency at the cap, while it fades."""
     stimulus = protocol.stimulus
-    fastest_hz = max(*stimulus.frequencies_hz, *protocol.training.frequencies_hz, 0.0)
+    fastest_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
     return _limits(protocol.safety, _slew(fastest_hz, protocol.staircase.cap_n, fade_s))
 

@@ -1,9 +1,27 @@
-"""What a display may know. Nothing here gives away level, frequency or correctness."""
+"""What a participant's display may know. Nothing here gives away level, frequency or correctness.
+
+Values only, and light to import: a screen shows its first frame before anything heavy is loaded.
+"""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
 
-from protocols.apparatus import TestDirections
 from protocols.trial import Phase
+
+if TYPE_CHECKING:
+    from protocols.apparatus import TestDirections
+
+
+class Task(Enum):
+    """What a trial asks."""
+
+    DIRECTION = "direction"
+    """Along which of the two directions did it shake?"""
+    INTERVAL = "interval"
+    """In which of the two intervals did it shake at all?"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +49,18 @@ class Welcome:
 
 
 @dataclass(frozen=True, slots=True)
+class Progress:
+    """How far the session is. Made from runs and counted trials, never from levels."""
+
+    share_done: float
+    """0 to 1."""
+    minutes_left: int | None
+    """Rounded up; None until there is a trial to estimate it from."""
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
-    """One trial as the participant sees it."""
+    """One trial as the participant sees it. A catch trial looks like any other: its phase says TEST."""
 
     phase: Phase
     run_number: int
@@ -43,18 +71,128 @@ class Question:
     repeated: bool
     """Drawn again because the last presentation was void."""
     time_limit_s: float
+    picture: DirectionPicture
+    task: Task = Task.DIRECTION
+    practice: bool = False
+    """A short practice at a fixed strength, with a criterion to pass."""
+    progress: Progress | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlayingNotice:
+    """A stimulus (or its absence) of a fixed length, to which nothing is answered yet."""
+
+    title: str
+    """Such as "Direction 1" or "Interval 2"."""
+    number: int
+    """1 or 2: what is highlighted."""
+    seconds: float
+    picture: DirectionPicture | None
+    """None where there is nothing to draw (an interval)."""
+
+
+@dataclass(frozen=True, slots=True)
+class DemoMenu:
+    """The labelled demonstration: each direction at each vibration, as often as wanted."""
+
+    picture: DirectionPicture
+    vibrations: int
+    """How many; number 1 is the slowest."""
+    vibration: int
+    """The present one, from 1."""
+    felt: tuple[tuple[int, int], ...]
+    """(vibration, direction number) already played."""
+    handle_moves: bool
+    """False with a simulated device."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlayDemo:
+    vibration: int
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class DemoDone:
+    """Enough was felt."""
+
+
+DemoChoice = PlayDemo | DemoDone
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFinding:
+    """One line of the device check."""
+
+    name: str
+    value: str
+    fine: bool
+    advice: str = ""
+    """What to do where it is not fine."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceReport:
+    device: str
+    simulated: bool
+    findings: tuple[DeviceFinding, ...]
+
+    @property
+    def fine(self) -> bool:
+        return all(finding.fine for finding in self.findings)
+
+
+@dataclass(frozen=True, slots=True)
+class HandleView:
+    """Whether the handle is where a trial may start."""
+
+    ready: bool
+    sentence: str
+    """Such as "Bring the handle 12 mm back to the centre"."""
+    offset_mm: tuple[float, float]
+    """From the centre, right and up in the plane of the picture."""
+    radius_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class PracticeResult:
+    """After a short practice."""
+
+    passed: bool
+    right: int
+    of: int
+    """Right answers among the last so many."""
+
+
+@dataclass(frozen=True, slots=True)
+class PauseNotice:
+    reason: str
+    """Who asked, or what happened: shown to the participant."""
+    answers: int
+    """On disk."""
+
+
+class AfterPause(Enum):
+    GO_ON = "go_on"
+    LEAVE = "leave"
+    """The session can be resumed."""
+    WITHDRAW = "withdraw"
+    """The participant takes the consent back: leave, and erase after the device is closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class RestNotice:
     seconds: float
     runs_left: int
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Goodbye:
     finished: bool
     answers: int
+    reason: str = ""
+    """Why the sitting ended before the session was finished."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +215,8 @@ class Unanswered:
     """The participant or experimenter ends the sitting; it can be resumed."""
     asked: bool = False
     """The participant asked for the trial again, and so is there."""
+    pause: bool = False
+    """Asked for a pause: hands free at once, and nothing is played until somebody goes on."""
 
 
 Reply = Answered | Unanswered

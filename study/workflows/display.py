@@ -1,32 +1,85 @@
-"""The display port: how a session talks with whoever answers. A line-mode prompt, a screen, or a simulation."""
+"""The display port: how a session talks with whoever answers. A line-mode prompt, a screen, or a simulation.
+
+Any method may raise KeyboardInterrupt to leave: the force is off at once, and the session can be resumed.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from study.session.due_trial import Present
-from study.session.views import Goodbye, Question, Reply, RestNotice, Welcome
+from study.session.form_views import Form, FormReply
+from study.session.views import (
+    AfterPause,
+    DemoChoice,
+    DemoMenu,
+    DeviceReport,
+    Goodbye,
+    HandleView,
+    PauseNotice,
+    PlayingNotice,
+    PracticeResult,
+    Question,
+    Reply,
+    RestNotice,
+    Unanswered,
+    Welcome,
+)
+
+if TYPE_CHECKING:
+    from study.session.due_trial import Present
 
 SignOfLife = Callable[[], bool]
-"""To be called at least every 100 ms while waiting: it keeps the device alive. False: a fault ended the stimulus."""
+"""To be called at least every 100 ms while waiting: it keeps the device alive, and hears who asks for a stop or a
+pause. False: something ended the wait (a fault, a request, a device button); return at once, whatever the reply."""
 
 
 class Display(Protocol):
+    def fill_in(self, form: Form) -> FormReply:
+        """Returns when every needed field has an answer that is one of its choices."""
+        ...
+
+    def device_checked(self, report: DeviceReport) -> bool:
+        """Show the findings. True: go on. False: check again."""
+        ...
+
     def welcome(self, notice: Welcome) -> None:
-        """Returns when the participant is ready. Raises KeyboardInterrupt to leave."""
+        """Instructions. Returns when the participant is ready."""
+        ...
+
+    def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
+        """What to feel next, if anything."""
+        ...
+
+    def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
+        """Wait while something of a fixed length plays. None when its time is over; else why it was cut short."""
+        ...
+
+    def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
+        """Until `look().ready`, looking every 100 ms or so. None when it is; else why the wait was cut short."""
         ...
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """Wait for 1 or 2. Must return at once when `sign_of_life()` is False."""
+        """Wait for 1 or 2."""
         ...
 
     def feedback(self, correct: bool) -> None: ...
 
-    def rest(self, notice: RestNotice) -> float:
-        """An enforced rest; returns the seconds rested, never fewer than `notice.seconds`."""
+    def practice_over(self, result: PracticeResult) -> None:
+        """Returns when the participant has read it."""
+        ...
+
+    def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
+        """An enforced rest; returns the seconds rested. Fewer than `notice.seconds` only where `sign_of_life` ended
+        it."""
+        ...
+
+    def pause(self, notice: PauseNotice) -> AfterPause:
+        """Nothing is played until somebody decides how to go on."""
         ...
 
     def await_return(self, reason: str) -> None:
-        """Nothing is played until somebody is there. Raises KeyboardInterrupt to leave."""
+        """After a void trial: nothing is played until somebody is there."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None: ...

@@ -1,0 +1,91 @@
+"""What lists and viewers of past sessions show. Values only, light to import."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Standing = Literal["finished", "unfinished", "running", "withdrawn", "unreadable"]
+
+
+@dataclass(frozen=True, slots=True)
+class SessionLine:
+    """One session in a list."""
+
+    name: str
+    path: str
+    subject: str
+    protocol: str
+    begun_utc: str
+    observer: str | None
+    """Name of the simulated participant; None for a person."""
+    answers: int
+    runs_done: int
+    runs: int
+    standing: Standing
+    remark: str = ""
+    """Such as why it cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolLine:
+    name: str
+    """Or path: what `--protocol` takes."""
+    title: str
+    locked: bool
+
+
+@dataclass(frozen=True, slots=True)
+class HomeView:
+    """What the start screen offers."""
+
+    data: str
+    sessions: tuple[SessionLine, ...]
+    """Latest first."""
+    protocols: tuple[ProtocolLine, ...]
+    devices: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Staircase:
+    """One run as a drawing needs it."""
+
+    title: str
+    levels_n: tuple[float, ...]
+    correct: tuple[bool, ...]
+    reversals: tuple[bool, ...]
+    threshold_n: float | None
+    cap_n: float
+
+
+@dataclass(frozen=True, slots=True)
+class SessionView:
+    """One session looked at."""
+
+    line: SessionLine
+    facts: tuple[tuple[str, str], ...]
+    """(what, value): participant, protocol, device, seed, dates."""
+    thresholds: tuple[tuple[str, ...], ...]
+    """Rows of text, the first one the header; empty without a complete run."""
+    warnings: tuple[str, ...]
+    staircases: tuple[Staircase, ...]
+    events: tuple[str, ...]
+    """The log in words, oldest first; the direction of an open trial is left out."""
+    report: str
+    """Path of report.html; empty where none was written yet."""
+    figures: tuple[str, ...]
+    """Paths of PNG files."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisView:
+    """One diagnosis.json looked at."""
+
+    path: str
+    verdict: str
+    sentences: tuple[str, ...]
+    """One per named effect, with parameters and intervals."""
+    rivals: tuple[str, ...]
+    mismatch: tuple[tuple[str, ...], ...]
+    """Rows of text, the first one the header."""
+    fit: tuple[tuple[str, ...], ...]
+    remainder: tuple[tuple[str, ...], ...]
+    next_experiment: str

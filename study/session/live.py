@@ -1,0 +1,29 @@
+"""What a running session tells whoever watches it beside its log: how it is right now. Values only, replaced often."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Activity = Literal[
+    "preparing", "form", "instructions", "demo", "waiting for the handle", "trial", "rest", "pause", "idle"
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """Never a direction: it lies open beside the log while a trial runs."""
+
+    utc: str
+    activity: Activity
+    since_utc: str
+    """When this activity began."""
+    fault: str
+    """The device's fault in words; empty where there is none."""
+    offset_mm: float | None
+    """Of the handle from its place, now."""
+    handle_ready: bool
+    """Within the gate's radius; true where there is no gate."""
+    acceleration_mps2: float | None
+    """What the accelerometer reads now, norm; None without a reading."""
+    sensor_clipped: bool
+    missed_ticks: int
+    """In the present stimulus."""

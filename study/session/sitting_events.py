@@ -1,0 +1,71 @@
+"""Facts of a sitting around its trials: forms, checks, demonstrations, pauses, notes."""
+
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, config=FACT)
+class FormFilled:
+    """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why somebody may not take part)
+    is not kept: `answers` holds what the study needs."""
+
+    utc: str
+    form: Literal["consent", "exclusion", "setup", "debrief"]
+    version: str
+    """Of the form, as its protocol states it."""
+    ethics_id: str
+    passed: bool
+    """False: consent was not given, or somebody may not take part. Always true for the other forms."""
+    answers: dict[str, str]
+    event: Literal["form_filled"] = "form_filled"
+
+
+@dataclass(frozen=True, config=FACT)
+class DeviceChecked:
+    utc: str
+    passed: bool
+    findings: tuple[str, ...]
+    """One sentence each."""
+    event: Literal["device_checked"] = "device_checked"
+
+
+@dataclass(frozen=True, config=FACT)
+class DemoPlayed:
+    """A labelled demonstration, written before the device moves."""
+
+    utc: str
+    frequency_hz: float
+    level_n: float
+    direction: Literal[1, 2]
+    """The number on the screen."""
+    angle_deg: float
+    seconds: float
+    event: Literal["demo_played"] = "demo_played"
+
+
+@dataclass(frozen=True, config=FACT)
+class DemoFinished:
+    utc: str
+    event: Literal["demo_finished"] = "demo_finished"
+
+
+@dataclass(frozen=True, config=FACT)
+class PauseTaken:
+    utc: str
+    who: Literal["participant", "experimenter", "program"]
+    paused_s: Annotated[float, Field(ge=0)]
+    event: Literal["pause_taken"] = "pause_taken"
+
+
+@dataclass(frozen=True, config=FACT)
+class NoteTaken:
+    utc: str
+    who: Literal["participant", "experimenter", "program"]
+    text: str
+    adverse: bool = False
+    """Something happened to the participant: pain, numbness, a fright."""
+    event: Literal["note_taken"] = "note_taken"
