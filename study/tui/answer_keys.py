@@ -1,0 +1,57 @@
+"""Keys that answer 1 and 2 beside the digits themselves, as `--keys f,j` names them."""
+
+from dataclasses import dataclass
+
+from study.errors import WrongUseError
+
+RESERVED = "pqrn?"
+"""Pause, leave, repeat, note, help: what a participant must be able to do in any trial."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerKeys:
+    first: str = "1"
+    second: str = "2"
+
+    def answer(self, typed: str) -> int | None:
+        """1 or 2; None where what was typed is neither. The digits are always valid; a locked shift key is no harm."""
+        key = typed.casefold()
+        if key in ("1", self.first):
+            return 1
+        return 2 if key in ("2", self.second) else None
+
+    @property
+    def choice(self) -> str:
+        """As a prompt says it, such as "f for 1, j for 2"; "1 or 2" where no others were named."""
+        if (self.first, self.second) == ("1", "2"):
+            return "1 or 2"
+        return f"{self.first} for 1, {self.second} for 2"
+
+
+DIGITS = AnswerKeys()
+
+
+def parse_keys(text: str) -> AnswerKeys:
+    """From "f,j": the key for 1, then the key for 2. Raises WrongUseError."""
+    keys = [part.strip().casefold() for part in text.split(",")]
+    if len(keys) != 2:
+        raise _refused(f"'{text}' names {len(keys)} of them")
+    first, second = keys
+    for key in keys:
+        if len(key) != 1 or not key.isprintable():
+            raise _refused(f"'{key}' is {'nothing' if not key else 'more than one character'}")
+        if key in RESERVED:
+            raise _refused(f"'{key}' has another meaning in a trial")
+    if first == second:
+        raise _refused(f"'{first}' cannot stand for both")
+    if first == "2" or second == "1":
+        raise _refused("the digits 1 and 2 always stand for themselves")
+    return AnswerKeys(first, second)
+
+
+def _refused(why: str) -> WrongUseError:
+    return WrongUseError(
+        "These answer keys cannot be used",
+        f"{why[0].upper()}{why[1:]}.",
+        f"Name two different single characters, such as --keys f,j; not {' '.join(RESERVED)}. 1 and 2 work in any case.",
+    )
