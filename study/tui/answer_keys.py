@@ -53,5 +53,5 @@ def _refused(why: str) -> WrongUseError:
     return WrongUseError(
         "These answer keys cannot be used",
         f"{why[0].upper()}{why[1:]}.",
-        f"Name two different single characters, such as --keys f,j; not {' '.join(RESERVED)}. 1 and 2 work in any case.",
+        f"Name two different characters, such as --keys f,j; not {' '.join(RESERVED)}. 1 and 2 work in any case.",
     )
