@@ -11,6 +11,7 @@ class LineInput:
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
         self._pending = b""
+        self._over = False
         self.interactive = os.isatty(self._descriptor)
 
     def read(self, timeout_s: float) -> str | None:
@@ -20,11 +21,17 @@ class LineInput:
         ready, _, _ = select.select([self._descriptor], [], [], timeout_s)
         if not ready:
             return None
-        data = os.read(self._descriptor, 4096)
-        if not data:
+        if not self._fetch():
             raise EOFError
-        self._pending += data
         return self._take_line()
+
+    def ended(self) -> bool:
+        """Whether no line is left and none can come. Takes none."""
+        while b"\n" not in self._pending and not self._over:
+            if not select.select([self._descriptor], [], [], 0.0)[0]:
+                return False
+            self._fetch()
+        return b"\n" not in self._pending
 
     def forget(self) -> None:
         """Drop what a person typed or pasted too early. A pipe keeps its lines: its writer planned them."""
@@ -34,6 +41,13 @@ class LineInput:
 
         termios.tcflush(self._descriptor, termios.TCIFLUSH)
         self._pending = b""
+
+    def _fetch(self) -> bool:
+        """Read what is there. False at the end of the input."""
+        data = os.read(self._descriptor, 4096)
+        self._over = not data
+        self._pending += data
+        return not self._over
 
     def _take_line(self) -> str | None:
         line, newline, rest = self._pending.partition(b"\n")

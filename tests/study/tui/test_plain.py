@@ -1,81 +1,69 @@
-import io
-import os
+from dataclasses import replace
 
 import pytest
 
 from protocols.trial import Phase
-from study.devices.clock import RealClock, VirtualClock
-from study.session.views import Answered, DirectionPicture, Question, RestNotice, Unanswered, Welcome
+from study.session.views import (
+    Answered,
+    DirectionPicture,
+    Goodbye,
+    PracticeResult,
+    Progress,
+    Question,
+    Task,
+    Unanswered,
+    Welcome,
+)
+from study.tui.answer_keys import AnswerKeys
 from study.tui.direction_picture import drawing, sentence
-from study.tui.line_input import LineInput
-from study.tui.plain import PlainDisplay
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
-QUESTION = Question(Phase.TEST, run_number=2, runs_in_phase=5, trial_number=7, repeated=False, time_limit_s=0.0)
+QUESTION = Question(Phase.TEST, 2, 5, trial_number=7, repeated=False, time_limit_s=0.0, picture=PICTURE)
 
 
-class Typed:
-    """A pipe with lines in it, read by the display as a terminal would be."""
-
-    def __init__(self) -> None:
-        self._read, self._write = os.pipe()
-        self.out = io.StringIO()
-        self.display = PlainDisplay(LineInput(self._read), self.out, RealClock())
-
-    def type(self, text: str) -> None:
-        os.write(self._write, text.encode())
-
-    def end(self) -> None:
-        os.close(self._write)
-
-    def ask(self, question: Question = QUESTION, alive: bool = True):
-        return self.display.ask(question, lambda: alive)
-
-
-@pytest.fixture
-def typed():
-    return Typed()
+def ask(typed, question: Question = QUESTION, alive: bool = True):
+    return typed.display.ask(question, lambda: alive)
 
 
 def test_one_and_two_answer(typed):
-    typed.type("1\n2\n")
-    assert [typed.ask().answer, typed.ask().answer] == [1, 2]
+    typed.type("1", "2")
+    assert [ask(typed).answer, ask(typed).answer] == [1, 2]
 
 
 def test_a_wrong_key_is_named_and_asked_again(typed):
-    typed.type("3\nyes\n2\n")
-    assert typed.ask().answer == 2
+    typed.type("3", "yes", "2")
+    assert ask(typed).answer == 2
     assert "'3' is no answer. Type 1 or 2 and Enter; ? for help." in typed.out.getvalue()
     assert "'yes' is no answer" in typed.out.getvalue()
 
 
 def test_help_shows_the_picture_again(typed):
-    typed.type("\n?\n1\n")
+    typed.type("", "?", "1")
     typed.display.welcome(Welcome("Title", PICTURE, 5, 1, "a device", felt=True, resumed_after=0))
     before = typed.out.getvalue().count("1: up-left to down-right")
-    typed.ask()
+    ask(typed)
     assert typed.out.getvalue().count("1: up-left to down-right") == before + 1
 
 
 def test_leaving_and_repeating_are_no_answers(typed):
-    typed.type("q\nr\n")
-    assert typed.ask() == Unanswered("the participant left", leave=True)
-    assert typed.ask() == Unanswered("asked to repeat", leave=False, asked=True)
+    typed.type("q", "r")
+    assert ask(typed) == Unanswered("the participant left", leave=True)
+    assert ask(typed) == Unanswered("asked to repeat", leave=False, asked=True)
 
 
 def test_the_end_of_the_input_leaves(typed):
     typed.end()
-    assert typed.ask() == Unanswered("the input ended", leave=True)
+    assert ask(typed) == Unanswered("the input ended", leave=True)
 
 
 def test_a_stimulus_that_ended_by_a_fault_ends_the_question(typed):
-    typed.type("1\n")
-    assert typed.ask(alive=False) == Unanswered("the stimulus ended early", leave=False)
+    typed.type("1")
+    assert ask(typed, alive=False) == Unanswered("the stimulus ended early", leave=False)
 
 
 def test_the_time_limit_ends_the_question(typed):
-    question = Question(Phase.TEST, 1, 1, 1, repeated=False, time_limit_s=0.05)
-    assert typed.ask(question) == Unanswered("no answer within the time limit", leave=False)
+    question = Question(Phase.TEST, 1, 1, 1, repeated=False, time_limit_s=0.05, picture=PICTURE)
+    assert ask(typed, question) == Unanswered("no answer within the time limit", leave=False)
 
 
 def test_the_device_gets_signs_of_life_while_nobody_answers(typed):
@@ -84,7 +72,7 @@ def test_the_device_gets_signs_of_life_while_nobody_answers(typed):
     def sign_of_life() -> bool:
         signs.append(True)
         if len(signs) == 5:
-            typed.type("1\n")
+            typed.type("1")
         return True
 
     assert isinstance(typed.display.ask(QUESTION, sign_of_life), Answered)
@@ -92,20 +80,20 @@ def test_the_device_gets_signs_of_life_while_nobody_answers(typed):
 
 
 def test_nothing_on_the_screen_gives_away_level_frequency_or_correctness(typed):
-    typed.type("1\n")
-    typed.ask()
+    typed.type("1")
+    ask(typed)
     assert typed.out.getvalue().split("\n")[1] == "Run 2 of 5, trial 7"
     assert not any(word in typed.out.getvalue().lower() for word in ("hz", " n ", "newton", "right", "wrong"))
 
 
 def test_a_repeated_trial_says_so(typed):
-    typed.type("1\n")
-    typed.ask(Question(Phase.TRAINING, 1, 1, 3, repeated=True, time_limit_s=0.0))
+    typed.type("1")
+    ask(typed, Question(Phase.TRAINING, 1, 1, 3, repeated=True, time_limit_s=0.0, picture=PICTURE))
     assert "Training 1 of 1, trial 3, once more" in typed.out.getvalue()
 
 
 def test_practice_on_a_simulation_is_called_practice(typed):
-    typed.type("\n")
+    typed.type("")
     typed.display.welcome(Welcome("Title", PICTURE, 5, 0, "simulated omega.3", felt=False, resumed_after=12))
     text = " ".join(typed.out.getvalue().split())
     assert "Practice: the device is a simulation (simulated omega.3), so nothing moves here." in text
@@ -113,20 +101,81 @@ def test_practice_on_a_simulation_is_called_practice(typed):
     assert "Welcome back: 12 answers are on disk" in text
 
 
-def test_a_rest_is_enforced_and_says_what_is_left():
-    read, write = os.pipe()
-    os.write(write, b"\n")
-    out, clock = io.StringIO(), VirtualClock()
-    rested_s = PlainDisplay(LineInput(read), out, clock).rest(RestNotice(seconds=25.0, runs_left=3))
-    assert rested_s == pytest.approx(25.0)
-    assert "for at least 25 s. 3 runs are left." in out.getvalue()
-
-
 def test_after_a_void_trial_nothing_is_played_until_somebody_is_there(typed):
-    typed.type("\n")
+    typed.type("")
     typed.display.await_return("the stimulus was held too long")
     assert "The last trial is void: the stimulus was held too long." in typed.out.getvalue()
     assert "Press Enter when you are ready" in " ".join(typed.out.getvalue().split())
+
+
+def test_a_pause_is_asked_for_in_any_trial(typed):
+    typed.type("p")
+    assert ask(typed) == Unanswered("asked for a pause", leave=False, asked=True, pause=True)
+
+
+def test_keys_of_ones_own_answer_and_the_digits_still_do(typed_in):
+    typed = typed_in(keys=AnswerKeys("f", "j"))
+    typed.type("j", "1", "x", "F")
+    assert [ask(typed).answer for _ in range(3)] == [2, 1, 1]
+    assert "f for 1, j for 2? " in typed.out.getvalue()
+    assert "'x' is no answer. Type f for 1, j for 2 and Enter; ? for help." in typed.said
+
+
+def test_a_detection_trial_asks_for_the_interval_and_explains_it(typed):
+    typed.type("?", "2")
+    assert ask(typed, replace(QUESTION, phase=Phase.DETECTION, task=Task.INTERVAL)).answer == 2
+    assert "Interval run 2 of 5, trial 7 Which interval, 1 or 2? " in typed.said
+    assert "In one of the two intervals it shook" in typed.said
+    assert "up-left" not in typed.said
+
+
+def test_a_practice_trial_is_called_practice(typed):
+    typed.type("1")
+    ask(typed, replace(QUESTION, practice=True, phase=Phase.TRAINING))
+    assert "Practice 2 of 5, trial 7" in typed.said
+
+
+def test_progress_is_told_once_in_a_run(typed):
+    typed.type("1", "1", "2", "1")
+    for trial in (1, 2):
+        ask(typed, replace(QUESTION, trial_number=trial, progress=Progress(0.25, 12)))
+    assert typed.said.count("25% of the session is done, about 12 minutes left.") == 1
+    ask(typed, replace(QUESTION, run_number=3, progress=Progress(0.5, 1)))
+    assert "50% of the session is done, about 1 minute left." in typed.said
+    ask(typed, replace(QUESTION, run_number=4, progress=Progress(0.5, None)))
+    assert "50% of the session is done." in typed.said
+
+
+@pytest.mark.parametrize(
+    ("passed", "words"), [(True, "That is enough to go on."), (False, "hard to tell, for anybody")]
+)
+def test_the_end_of_a_practice_is_told_and_read(typed, passed, words):
+    typed.type("")
+    typed.display.practice_over(PracticeResult(passed, right=3, of=5))
+    assert "3 of the last 5 answers were right." in typed.said
+    assert words in typed.said
+
+
+@pytest.mark.parametrize("call", ["welcome", "practice_over", "await_return"])
+def test_whoever_waits_for_enter_can_leave(typed, call):
+    values = {
+        "welcome": Welcome("Title", PICTURE, 5, 0, "a device", felt=True, resumed_after=0),
+        "practice_over": PracticeResult(True, 4, 5),
+        "await_return": "held too long",
+    }
+    typed.type("q")
+    with pytest.raises(KeyboardInterrupt):
+        getattr(typed.display, call)(values[call])
+    typed.end()
+    with pytest.raises(KeyboardInterrupt):
+        getattr(typed.display, call)(values[call])
+
+
+def test_the_end_is_told_finished_or_not(typed):
+    typed.display.goodbye(Goodbye(finished=True, answers=7))
+    typed.display.goodbye(Goodbye(finished=False, answers=3, reason="the participant left"))
+    assert "Finished: 7 answers. Thank you." in typed.said
+    assert "This sitting is over: the participant left. 3 answers are on disk." in typed.said
 
 
 @pytest.mark.parametrize(

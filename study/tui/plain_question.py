@@ -1,0 +1,124 @@
+"""Line mode: one trial, and what is said around it."""
+
+from protocols.trial import Phase
+from study.session.views import (
+    Answered,
+    DirectionPicture,
+    PracticeResult,
+    Progress,
+    Question,
+    Reply,
+    Task,
+    Unanswered,
+    Welcome,
+)
+from study.tui.answer_keys import AnswerKeys
+from study.tui.conversation import Conversation, Line, WaitOver, shown
+from study.tui.direction_picture import drawing, sentence
+from study.workflows.display import SignOfLife
+
+LEFT = Unanswered("the participant left", leave=True)
+PAUSE = Unanswered("asked for a pause", leave=False, asked=True, pause=True)
+REPEAT = Unanswered("asked to repeat", leave=False, asked=True)
+INTERVALS = "In one of the two intervals it shook, however weakly; in the other it did not. Type the number of the one."
+
+
+def keys_sentence(keys: AnswerKeys) -> str:
+    return (
+        f"Keys: {keys.choice} answers, r skips this one and plays a new one, p pauses, q leaves, ? shows this. Each "
+        "followed by Enter. Ctrl-C stops the device at once."
+    )
+
+
+def pictured(picture: DirectionPicture) -> tuple[str, ...]:
+    """The drawing, and both directions in words."""
+    return (*drawing(picture), sentence(picture, 1), sentence(picture, 2))
+
+
+def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
+    talk.forget()
+    talk.say(notice.title, "")
+    if notice.resumed_after:
+        talk.say(f"Welcome back: {notice.resumed_after} answers are on disk; the study goes on where it stopped.", "")
+    talk.say(
+        "Hold the handle with a constant, comfortable grip. In each trial it shakes along one of two directions:",
+        "",
+        *pictured(notice.picture),
+        "",
+        "Feel as long as you like, then type its number and Enter. When in doubt, guess.",
+        _plan(notice),
+        keys_sentence(keys),
+    )
+    if not notice.felt:
+        talk.say("", f"Practice: the device is a simulation ({notice.device}), so nothing moves here.")
+        talk.say("Your answers are marked 'not felt' and never enter an analysis of people.")
+    talk.say("", "Press Enter to begin.")
+    talk.answer_or_leave()
+
+
+def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
+    talk.forget()
+    talk.say("", heading(question))
+    until_s = talk.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
+    prompt = f"Which interval, {keys.choice}? " if question.task is Task.INTERVAL else f"{keys.choice}? "
+    while True:
+        talk.prompt(prompt)
+        line = talk.wait(sign_of_life, until_s)
+        if isinstance(line, WaitOver):
+            return Unanswered(line.value, leave=line is WaitOver.INPUT_ENDED)
+        reply = understood(line, keys)
+        if reply is not None:
+            return reply
+        if line.word == "?":
+            explanation = (INTERVALS,) if question.task is Task.INTERVAL else pictured(question.picture)
+            talk.say(*explanation, keys_sentence(keys))
+        else:
+            talk.say(f"{shown(line)} is no answer. Type {keys.choice} and Enter; ? for help.")
+
+
+def understood(line: Line, keys: AnswerKeys) -> Reply | None:
+    answer = keys.answer(line.text)
+    if answer is not None:
+        return Answered(answer, line.at_s)
+    return {"q": LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
+
+
+def heading(question: Question) -> str:
+    """Where in the session this trial stands: by runs and counts, which say nothing about levels."""
+    again = ", once more" if question.repeated else ""
+    return (
+        f"{run_name(question)} {question.run_number} of {question.runs_in_phase}, trial {question.trial_number}{again}"
+    )
+
+
+def run_name(question: Question) -> str:
+    if question.practice:
+        return "Practice"
+    if question.task is Task.INTERVAL:
+        return "Interval run"
+    return "Training" if question.phase is Phase.TRAINING else "Run"
+
+
+def progress_sentence(progress: Progress) -> str:
+    left = ""
+    if progress.minutes_left is not None:
+        left = f", about {progress.minutes_left} minute{'s' if progress.minutes_left != 1 else ''} left"
+    return f"{progress.share_done:.0%} of the session is done{left}."
+
+
+def practice_over(result: PracticeResult, talk: Conversation) -> None:
+    talk.forget()
+    talk.say("", f"End of this practice: {result.right} of the last {result.of} answers were right.")
+    if result.passed:
+        talk.say("That is enough to go on.")
+    else:
+        talk.say("Some vibrations are hard to tell, for anybody. The study goes on all the same.")
+    talk.say("Press Enter to go on.")
+    talk.answer_or_leave()
+
+
+def _plan(notice: Welcome) -> str:
+    runs = f"{notice.runs} run{'s' if notice.runs != 1 else ''}"
+    if notice.training_runs and notice.runs:
+        return f"There is some training first, then {runs} with rests between them."
+    return f"There {'are' if notice.runs != 1 else 'is'} {runs}." if notice.runs else "This is a training session."

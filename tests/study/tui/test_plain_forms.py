@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import pytest
+
+from study.session.form_views import Form, FormField, FormKind, missing
+from study.session.views import DeviceFinding, DeviceReport
+
+CONSENT = FormField("hands", "Are both hands well?", ("yes", "no"))
+SCALE = FormField("sure", "How sure were you?", ("0", "1", "2"))
+STRATEGY = FormField("strategy", "What did you go by?", needed=False)
+GRIP = FormField("grip", "How was the handle held?")
+
+
+def form(*fields: FormField) -> Form:
+    return Form(FormKind.DEBRIEF, "A form", "Some words before it.", fields, version="3", ethics_id="EK 12/34")
+
+
+def filled(typed, *fields: FormField) -> dict[str, str]:
+    reply = typed.display.fill_in(form(*fields))
+    assert missing(form(*fields), reply) == ()
+    return reply.answers
+
+
+def test_title_introduction_version_and_approval_are_said(typed):
+    typed.type("yes")
+    filled(typed, CONSENT)
+    assert "A form Some words before it. Version 3. Ethics approval EK 12/34. 1 question." in typed.said
+    assert "1 of 1: Are both hands well?" in typed.said
+
+
+def test_without_version_or_approval_nothing_is_said_of_them(typed):
+    typed.type("yes")
+    typed.display.fill_in(replace(form(CONSENT), version="", ethics_id=""))
+    assert "Version" not in typed.said
+    assert "Ethics" not in typed.said
+
+
+@pytest.mark.parametrize(("line", "answer"), [("1", "yes"), ("2", "no"), ("yes", "yes"), ("No", "no")])
+def test_a_choice_is_its_number_or_its_word(typed, line, answer):
+    typed.type(line)
+    assert filled(typed, CONSENT) == {"hands": answer}
+
+
+def test_choices_that_are_numbers_are_not_numbered_again(typed):
+    typed.type("3", "1")
+    assert filled(typed, SCALE) == {"sure": "1"}
+    assert "'3' is none of the answers. Type 0 or 1 or 2." in typed.said
+
+
+@pytest.mark.parametrize("line", ["3", "0", "maybe", "", "-1", "\x1b[A"])
+def test_an_answer_that_is_no_choice_is_named_and_asked_again(typed, line):
+    typed.type(line, "2")
+    assert filled(typed, CONSENT) == {"hands": "no"}
+    assert "is none of the answers. Type yes or no, or its number, 1 to 2." in typed.said
+
+
+def test_free_text_may_stay_empty_where_it_is_not_needed_only(typed):
+    typed.type("", "", "with two fingers")
+    assert filled(typed, STRATEGY, GRIP) == {"strategy": "", "grip": "with two fingers"}
+    assert typed.said.count("An answer is needed here.") == 1
+
+
+def test_a_choice_that_is_not_needed_may_be_passed_over(typed):
+    typed.type("")
+    assert filled(typed, replace(CONSENT, needed=False)) == {"hands": ""}
+
+
+def test_control_characters_stay_out_of_free_text(typed):
+    typed.type("\x1b[31mred\x07 \x00one")
+    assert filled(typed, GRIP) == {"grip": "[31mred one"}
+
+
+def test_a_mistake_can_be_mended_by_going_back(typed):
+    typed.type("no", "b", "yes", "firmly")
+    assert filled(typed, CONSENT, GRIP) == {"hands": "yes", "grip": "firmly"}
+    assert typed.said.count("1 of 2: Are both hands well?") == 2
+
+
+def test_back_from_the_first_question_asks_it_again(typed):
+    typed.type("b", "yes")
+    assert filled(typed, CONSENT) == {"hands": "yes"}
+
+
+@pytest.mark.parametrize("field", [CONSENT, GRIP, STRATEGY])
+def test_a_form_can_be_left(typed, field):
+    typed.type("q")
+    with pytest.raises(KeyboardInterrupt):
+        filled(typed, field)
+    typed.end()
+    with pytest.raises(KeyboardInterrupt):
+        filled(typed, field)
+
+
+def report(fine: bool) -> DeviceReport:
+    findings = (
+        DeviceFinding("sample rate", "1000 Hz", fine=True, advice="never said"),
+        DeviceFinding("handle", "42 mm from its place", fine, advice="Bring it back."),
+    )
+    return DeviceReport("omega.3", simulated=True, findings=findings)
+
+
+@pytest.mark.parametrize(("line", "goes_on"), [("", True), ("c", False)])
+def test_the_device_check_goes_on_or_is_made_again(typed, line, goes_on):
+    typed.type("x", line)
+    assert typed.display.device_checked(report(fine=True)) is goes_on
+    assert "'x' is no answer." in typed.said
+
+
+def test_each_finding_is_a_line_that_begins_with_its_verdict(typed):
+    typed.type("")
+    typed.display.device_checked(report(fine=False))
+    lines = typed.out.getvalue().splitlines()
+    assert "Device: omega.3 (simulated: nothing moves)" in lines
+    assert "ok: sample rate, 1000 Hz" in lines
+    assert "look: handle, 42 mm from its place. Bring it back." in lines
+    assert "Something needs a look before you go on." in lines
+
+
+def test_the_device_check_can_be_left(typed):
+    typed.type("q")
+    with pytest.raises(KeyboardInterrupt):
+        typed.display.device_checked(report(fine=True))
