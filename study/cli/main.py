@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from study.cli import analyze, protocol, record, rehearse, resume, study, validate, withdraw
+from study.cli import analyze, noise, protocol, record, rehearse, resume, study, validate, withdraw
 from study.errors import ExitCode, StudyError
 
 app = typer.Typer(
@@ -33,6 +33,7 @@ app.command("rehearse")(rehearse.rehearse)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
 app.add_typer(protocol.app, name="protocol")
+app.command("noise")(noise.noise)
 app.command("withdraw")(withdraw.withdraw)
 app.command("validate")(validate.validate)
 

@@ -1,0 +1,46 @@
+"""Noise that hides the sound of a device, made so that it can be looped without a seam."""
+
+import math
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+SLOPE_DB_PER_OCTAVE = -3.0103
+"""Of the power density: the same power in every octave between the corners, none outside them."""
+
+HEADROOM_DB = 3.0
+"""The highest sample stays this far below full scale, for a converter that overshoots between samples."""
+
+FULL_SCALE = 2**15 - 1
+
+
+def masking_noise(
+    seconds: int, low_hz: float, high_hz: float, seed: int, sample_rate_hz: int = 44_100
+) -> NDArray[np.int16]:
+    """Pink noise, mono, 16 bit, shape (seconds * sample_rate_hz,).
+
+    It is one period of a periodic signal: its last sample leads to its first as to any other. Every line of its
+    spectrum has the stated size and a random phase, so the slope holds exactly; the values are distributed
+    normally. Raises ValueError where there is no time, or no frequency between the corners.
+    """
+    if seconds < 1:
+        raise ValueError(f"seconds is {seconds}; noise lasts at least 1 s")
+    if not 0 < low_hz < high_hz <= sample_rate_hz / 2:
+        raise ValueError(
+            f"noise needs 0 < low_hz < high_hz <= {sample_rate_hz / 2:g} Hz (half the rate), "
+            f"not {low_hz:g} to {high_hz:g}"
+        )
+    # Lines are 1 / seconds apart; whole seconds keep the number of samples a product of small primes.
+    first, last = math.ceil(low_hz * seconds), math.floor(high_hz * seconds)
+    if last < first:
+        raise ValueError(f"no multiple of 1 / {seconds} Hz lies between {low_hz:g} and {high_hz:g} Hz")
+    n = seconds * sample_rate_hz
+    # Single precision is far finer than 16 bit and halves the memory of minutes.
+    phases = 2 * np.pi * np.random.default_rng(seed).random(last - first + 1, dtype=np.float32)
+    spectrum = np.zeros(n // 2 + 1, dtype=np.complex64)
+    spectrum[first : last + 1] = np.exp(1j * phases) / np.sqrt(np.arange(first, last + 1, dtype=np.float32))
+    wave = scipy.fft.irfft(spectrum, n)
+    wave *= FULL_SCALE * 10 ** (-HEADROOM_DB / 20) / np.abs(wave).max()
+    samples: NDArray[np.int16] = np.rint(wave).astype(np.int16)
+    return samples

@@ -1,0 +1,22 @@
+"""`hapteq noise`: a file of masking noise, so that a participant does not hear the device."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def noise(
+    out: Annotated[Path, typer.Argument(help="The sound to write, OUT.wav.")],
+    minutes: Annotated[float, typer.Option(min=0.05, max=15, help="Length; it is made to be looped.")] = 5.0,
+    seed: Annotated[int, typer.Option(min=0, help="Another seed gives other noise of the same kind.")] = 1,
+    low_hz: Annotated[float, typer.Option(min=1, max=20_000, help="Lower corner.")] = 40.0,
+    high_hz: Annotated[float, typer.Option(min=1, max=20_000, help="Upper corner.")] = 8000.0,
+) -> None:
+    """Write pink noise that hides the sound of the device, and say how to use it."""
+    from study.workflows.write_masking_noise import HOW_TO_USE, NoisePlan, write_masking_noise
+
+    write_masking_noise(out, NoisePlan(minutes=minutes, low_hz=low_hz, high_hz=high_hz, seed=seed))
+    typer.echo(str(out))
+    for sentence in HOW_TO_USE:
+        typer.echo(sentence, err=True)

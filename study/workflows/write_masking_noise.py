@@ -1,0 +1,49 @@
+"""A file of noise to be played while a participant sits at the device, so that the device is not heard."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from equalizer.signals.masking_noise import masking_noise
+from study.errors import WrongUseError
+from study.store.file_errors import AlreadyThereError
+from study.store.wav_file import write_wav
+
+SAMPLE_RATE_HZ = 44_100
+
+HOW_TO_USE = (
+    "Play it in a loop, without a gap, from before the demonstration until after the last trial: it repeats without "
+    "a seam.",
+    "Set the level with the device playing its loudest stimulus and your hand off the handle: raise it until you can "
+    "no longer hear the device, and no further.",
+    "Keep it below 80 dB(A), the lower action value of directive 2003/10/EC for a working day. If the device is heard "
+    "through that, add ear protection rather than level.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class NoisePlan:
+    minutes: float
+    """Rounded to whole seconds."""
+    low_hz: float
+    high_hz: float
+    seed: int
+
+
+def write_masking_noise(path: Path, plan: NoisePlan) -> None:
+    """A WAV file, 5 MB per minute.
+
+    Raises WrongUseError where the plan gives no noise, AlreadyThereError, CannotWriteError.
+    """
+    if path.suffix.lower() != ".wav":
+        raise WrongUseError(
+            "That is no name for a sound", f"{path.name} does not end in .wav.", "Give a name such as noise.wav."
+        )
+    if path.exists():
+        raise AlreadyThereError(path)
+    try:
+        samples = masking_noise(round(60 * plan.minutes), plan.low_hz, plan.high_hz, plan.seed, SAMPLE_RATE_HZ)
+    except ValueError as problem:
+        raise WrongUseError(
+            "Such noise cannot be made", f"{problem}.", "Choose other corners or minutes.", saved="Nothing was written."
+        ) from problem
+    write_wav(path, samples, SAMPLE_RATE_HZ)
