@@ -1,6 +1,6 @@
 """Bare rigs that write down every force they are given, for tests of the safety layer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -48,8 +48,8 @@ def _advance(state, parameters, force_n) -> None:
         state[i] += 0.001 * state[3 + i]
 
 
-def compiled_rig(capacity: int = 60_000) -> CompiledRig:
-    """A free mass with a damper, from rest. Remembers `capacity` writes."""
+def compiled_rig(capacity: int = 60_000, pressed: Iterable[int] = ()) -> CompiledRig:
+    """A free mass with a damper, from rest. Remembers `capacity` writes. `pressed` is asked anew each time."""
     return CompiledRig(
         info=INFO,
         state=np.zeros(LOG + 3 * capacity),
@@ -57,6 +57,7 @@ def compiled_rig(capacity: int = 60_000) -> CompiledRig:
         noise=np.zeros(1, dtype=np.uint64),
         sense=_sense,
         advance=_advance,
+        buttons=lambda: frozenset(pressed),
     )
 
 
@@ -68,8 +69,9 @@ def written(rig: CompiledRig) -> FloatArray:
 class ScriptedRig:
     """The same mass, stepped from Python. It can be told to answer nonsense, to fail and to be slow."""
 
-    def __init__(self) -> None:
+    def __init__(self, pressed: Iterable[int] = ()) -> None:
         self.drops_force_after_s = 0.1
+        self.pressed = pressed
         self.mass = compiled_rig()
         self.closed = False
         self.instead_of_sensing: Callable[[], FloatArray] | None = None
@@ -85,6 +87,9 @@ class ScriptedRig:
         reading = np.zeros(READING_SIZE)
         _sense(self.mass.state, self.mass.parameters, self.mass.noise, reading)
         return reading
+
+    def buttons(self) -> frozenset[int]:
+        return frozenset(self.pressed)
 
     def write(self, force_n: FloatArray) -> None:
         if self.instead_of_writing is not None:
@@ -114,6 +119,9 @@ class HeldForceRig:
         if self.before_sensing is not None:
             self.before_sensing()
         return np.zeros(READING_SIZE)
+
+    def buttons(self) -> frozenset[int]:
+        return frozenset()
 
     def write(self, force_n: FloatArray) -> None:
         if self.before_writing is not None:

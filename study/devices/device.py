@@ -90,6 +90,21 @@ class Played:
     """The handle's true acceleration, beside the recording: for tests and benchmarks of simulated devices."""
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the handle does right now. Position and acceleration are both None where there is no reading."""
+
+    position_m: tuple[float, float, float] | None
+    """x, y, z; None where the encoders gave no numbers."""
+    acceleration_mps2: tuple[float, float, float] | None
+    """As the accelerometer reads it, in the device's axes; None where it gave no numbers."""
+    sensor_clipped: bool
+    buttons: frozenset[int]
+    """Of the device's own buttons those that are down, as its driver numbers them."""
+    missed_ticks: int
+    """Of the present stimulus; 0 while there is none."""
+
+
 class Device(Protocol):
     """A device behind its safety layer. Opened by `study.devices.opening.open_device`, closed by `close`."""
 
@@ -128,6 +143,14 @@ class Device(Protocol):
         `on_progress(share)` is called now and then with the share that is over; what it raises ends the playing,
         as Ctrl-C does, with a fade. Raises `DeviceError` for commands that are not within the limits, before
         anything moves, and for a lost device.
+        """
+        ...
+
+    def look(self) -> Look:
+        """What the handle does right now, at any time and from any thread: no force is commanded for it.
+
+        Cheap enough for twenty times a second. A device that is lost, closed or late gives a `Look` without reading;
+        one that hangs makes the first caller wait for 0.1 s, and no later one.
         """
         ...
 

@@ -52,6 +52,10 @@ class Governor:
     def ticks(self) -> int:
         return int(self.state[govern.TICKS])
 
+    @property
+    def missed(self) -> int:
+        return int(self.state[govern.MISSED])
+
     def begin_hold(self, stimulus: HeldStimulus) -> None:
         fade_in, fade_out = self._ticks(stimulus.fade_in_s), self._ticks(stimulus.fade_out_s)
         self._begin(stimulus.loop, self._kept_of_loop(len(stimulus.loop)))

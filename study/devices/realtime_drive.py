@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from study.devices.clock import Clock
 from study.devices.device import Fault
+from study.devices.glances import Glances
 from study.devices.governor import Governor
 from study.devices.runner import Runner
 from study.devices.virtual_drive import ticks_by
@@ -46,6 +47,7 @@ class RealtimeDrive:
         self._run = 0
         self._lock = threading.Lock()
         self._awake = threading.Event()
+        self._glances = Glances(clock, wake=self._awake.set)
         self._closing = False
         self._thread = threading.Thread(target=self._attend, name="haptic loop", daemon=True)
         self._thread.start()
@@ -77,6 +79,12 @@ class RealtimeDrive:
             if self._late():
                 self._runner.give_up(TimeoutError("its loop gave no sign of life"))
 
+    def refresh(self) -> bool:
+        """Before somebody looks: whether what the runner saw last is of now. Waits for the loop while all is still."""
+        if self._runner.moving:
+            return True
+        return self._thread.is_alive() and not self._closing and self._glances.ask()
+
     def stop(self) -> None:
         """After a stop was asked for: see to it that the loop hears it, or do without the loop."""
         until_s = self._clock.now_s() + STOP_S
@@ -97,6 +105,9 @@ class RealtimeDrive:
                 self._awake.clear()
                 if self._closing:
                     self._awake.set()
+                elif self._glances.wanted:
+                    self._runner.glance()
+                    self._glances.taken()
                 return
             gap_s, self._last_s = now_s - self._last_s, now_s
             if gap_s > self._longest_gap_s:
@@ -109,6 +120,8 @@ class RealtimeDrive:
                 self._run += late
             self._runner.run(due - self._run)
             self._run = due
+            if self._glances.wanted:  # asked for a moment before this stimulus began
+                self._glances.taken()
 
     def _late(self) -> bool:
         if not self._thread.is_alive():
@@ -119,7 +132,8 @@ class RealtimeDrive:
         while not self._closing:
             try:
                 self._awake.wait()
-                self._wait_for_tick()
+                if self._governor.moving:
+                    self._wait_for_tick()
                 self.pump(self._clock.now_s())
             except BaseException as error:  # noqa: BLE001 - a dead loop must not leave a force behind
                 self._runner.give_up(error)

@@ -30,8 +30,9 @@ READING_SIZE = 10
 class Rig(Protocol):
     """Driven tick by tick from Python: a real or a scripted device.
 
-    One thread calls `sense` and `write` in turn. While one of these hangs, another thread calls `write` with a zero
-    force, and `close`: a driver that is not made for that must serve them all the same, and release no force after.
+    One thread calls `sense`, `write` and `buttons` in turn. While one of these hangs, another thread calls `write`
+    with a zero force, and `close`: a driver that is not made for that must serve them all the same, and release no
+    force after.
     """
 
     @property
@@ -50,6 +51,10 @@ class Rig(Protocol):
         """A reading, shape (READING_SIZE,). Raises `study.errors.DeviceError` when the device is gone."""
         ...
 
+    def buttons(self) -> frozenset[int]:
+        """Numbers of the buttons that are down. Asked after every reading, in the same thread: as cheap as one."""
+        ...
+
     def write(self, force_n: FloatArray) -> None:
         """Command a force, shape (3,), x, y, z; held until the next one."""
         ...
@@ -57,6 +62,10 @@ class Rig(Protocol):
     def close(self) -> None:
         """Force off, disconnect. Never raises; may be called again."""
         ...
+
+
+def no_buttons() -> frozenset[int]:
+    return frozenset()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,3 +82,5 @@ class CompiledRig:
     """sense(state, parameters, noise, reading): fills reading, shape (READING_SIZE,)."""
     advance: Callable[..., Any]
     """advance(state, parameters, force_n): holds force_n, shape (3,), for one tick."""
+    buttons: Callable[[], frozenset[int]] = no_buttons
+    """Numbers of the buttons that are down."""

@@ -8,6 +8,7 @@ from study.devices.block import parts, run_block
 from study.devices.device import Fault
 from study.devices.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig
+from study.devices.seen import Seen
 
 
 class Runner(Protocol):
@@ -21,6 +22,15 @@ class Runner(Protocol):
     @property
     def moving(self) -> bool:
         """Until the governor is still and the rig has its last zero."""
+        ...
+
+    @property
+    def seen(self) -> Seen | None:
+        """What was read last, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
+        ...
+
+    def glance(self) -> None:
+        """Read once while nothing moves, and write nothing. Never raises. Only in the thread that runs the ticks."""
         ...
 
     def run(self, ticks: int) -> None:
@@ -52,7 +62,11 @@ class CompiledRunner:
 
     def __init__(self, rig: CompiledRig, governor: Governor, block_ticks: int) -> None:
         self._parts = parts(rig.sense, rig.advance)
+        self._rig = rig
         self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
+        # Of its own: how often somebody looks must not change what is recorded.
+        self._glance_noise = ~rig.noise
+        self._seen: Seen | None = None
         self._governor = governor
         self._block_ticks = block_ticks
         self.failure: BaseException | None = None
@@ -62,10 +76,23 @@ class CompiledRunner:
     def moving(self) -> bool:
         return self._governor.moving
 
+    @property
+    def seen(self) -> Seen | None:
+        return self._seen if self.failure is None else None
+
+    def glance(self) -> None:
+        rig, reading = self._rig, np.zeros(READING_SIZE)
+        try:
+            rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
+            self._seen = Seen(reading, rig.buttons())
+        except Exception:  # noqa: BLE001 - whoever looks hears that there is no reading
+            self._seen = None
+
     def run(self, ticks: int) -> None:
         try:
             for start in range(0, ticks, self._block_ticks):
                 self._run_block(min(self._block_ticks, ticks - start))
+                self._seen = Seen(self._arrays[-1].copy(), self._rig.buttons())
                 if not self._governor.moving:
                     break
         except Exception as error:  # noqa: BLE001 - whatever it is: the force goes off, and the next call says why

@@ -12,12 +12,13 @@ from collections.abc import Callable
 from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, VirtualClock
-from study.devices.device import DeviceInfo, DeviceSettings, Fault, Played
+from study.devices.device import DeviceInfo, DeviceSettings, Fault, Look, Played
 from study.devices.governor import SETTLE_S, Governor
 from study.devices.played import played_loop, played_once
 from study.devices.realtime_drive import RealtimeDrive
 from study.devices.rig import CompiledRig, Rig
 from study.devices.runner import CompiledRunner, Runner
+from study.devices.seen import look_of
 from study.devices.stepped_runner import SteppedRunner
 from study.devices.virtual_drive import VirtualDrive
 from study.errors import DeviceError
@@ -89,6 +90,12 @@ class SafeDevice:
         self._wait_until_still(0.0)
         self._must_be_there()
         return played_once(self._governor, self._info)
+
+    def look(self) -> Look:
+        self._drive.check()
+        fresh = not self._closing and self._drive.refresh()
+        missed_ticks = self._governor.missed if self._held is not None or self._runner.moving else 0
+        return look_of(self._runner.seen if fresh else None, missed_ticks)
 
     def stop(self) -> None:
         self._governor.ask_stop()

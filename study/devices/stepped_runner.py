@@ -9,10 +9,12 @@ import threading
 
 import numpy as np
 
+from equalizer.signals.signal import FloatArray
 from study.devices import govern
 from study.devices.device import Fault
 from study.devices.governor import Governor
 from study.devices.rig import READING_SIZE, Rig
+from study.devices.seen import Seen
 from study.devices.standby import Standby
 
 ZERO_PATIENCE_S = 0.1
@@ -28,6 +30,7 @@ class SteppedRunner:
         self.catches_up = catches_up
         self.failure: BaseException | None = None
         self.force_off = True
+        self._seen: Seen | None = None
         self._gone = threading.Event()
         self._closed = self._ended = False
         self._deciding = self._writing = False
@@ -37,6 +40,18 @@ class SteppedRunner:
     @property
     def moving(self) -> bool:
         return self._governor.moving or self._deciding
+
+    @property
+    def seen(self) -> Seen | None:
+        return None if self._gone.is_set() else self._seen
+
+    def glance(self) -> None:
+        if self._gone.is_set():
+            return
+        try:
+            self._seen = Seen(self._read(), self._rig.buttons())
+        except Exception:  # noqa: BLE001 - whoever looks hears that there is no reading; the next tick says why
+            self._seen = None
 
     def run(self, ticks: int) -> None:
         if self._gone.is_set():
@@ -82,9 +97,7 @@ class SteppedRunner:
 
     def _tick(self) -> bool:
         governor = self._governor
-        reading = np.array(self._rig.sense(), dtype=np.float64)
-        if reading.shape != (READING_SIZE,):
-            raise ValueError(f"a reading has the shape {reading.shape}; it must be ({READING_SIZE},)")
+        reading = self._read()
         if self._gone.is_set():
             return True
         self._deciding = True
@@ -95,7 +108,15 @@ class SteppedRunner:
         finally:
             self._writing = False
         self._deciding = False
+        if not over:
+            self._seen = Seen(reading, self._rig.buttons())
         return bool(over)
+
+    def _read(self) -> FloatArray:
+        reading = np.array(self._rig.sense(), dtype=np.float64)
+        if reading.shape != (READING_SIZE,):
+            raise ValueError(f"a reading has the shape {reading.shape}; it must be ({READING_SIZE},)")
+        return reading
 
     def _silence(self, fault: Fault) -> None:
         """Zero force first, then the governor is still: nobody shall hear that all is over before it is."""

@@ -30,6 +30,12 @@ class VirtualDrive:
     def check(self) -> None:
         """Nothing can hang: ticks run in the caller's own thread."""
 
+    def refresh(self) -> bool:
+        """Before somebody looks: whether what the runner saw last is of now."""
+        if not (self._runner.moving or self._closed):
+            self._runner.glance()
+        return not self._closed
+
     def stop(self) -> None:
         """The next tick hears it; none is under way."""
 
