@@ -7,14 +7,19 @@ perfect: an upper bound of what this trick can do.
 Model: the felt strength in dB is normal around +difference_db/2 (direction 1) or -difference_db/2 (direction 2) of
 the remembered one, with the spread noise_db sqrt(1 + (detection_n / level)^2): a constant Weber fraction well above
 the detection level, growing noise towards it. So d' = difference_db / spread. Without a difference it is chance.
+
+Whether it shakes at all is felt as everybody feels it, with the detection level as threshold.
 """
 
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
 
+from protocols.trial import Phase
 from study.participants.chance import response_time_s, uniform
+from study.participants.detection import DETECTION_SLOPE
 from study.participants.observer import Felt, Reply
+from study.participants.psychometric_curve import WeibullCurve
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +30,14 @@ class IntensityCue:
     noise_db: float = 1.0
     """Spread of one judgement of strength, about the difference limen of vibration."""
     detection_n: float = 0.1
-    """Level at which the noise has grown by the square root of two."""
+    """Level at which the noise has grown by the square root of two, and threshold of detection."""
 
     def reply(self, felt: Felt, seed: int) -> Reply:
         luck, delay = uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        share_of_1 = NormalDist().cdf(sign * self.d_prime(felt.level_n) / 2)
+        detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
+        distance = detection.distance if felt.phase is Phase.DETECTION else self.d_prime
+        share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2)
         return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
 
     def d_prime(self, level_n: float) -> float:

@@ -7,6 +7,7 @@ like 35 Hz. Nobody's published threshold is copied.
 
 import numpy as np
 
+from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
 
 TYPICAL_THRESHOLDS_N = ((5.0, 0.35), (15.0, 0.6), (25.0, 0.85), (35.0, 2.2), (45.0, 2.2))
@@ -16,6 +17,9 @@ SPREAD_OF_PERSON_DB = 2.5
 """Standard deviation of what makes one person better or worse at all frequencies."""
 SPREAD_OF_FREQUENCY_DB = 1.7
 """And of what differs from frequency to frequency. Together 3 dB between participants."""
+SPREAD_OF_DETECTION_DB = 2.5
+"""Standard deviation of what makes one person feel weaker vibrations than another, at all frequencies. Nothing of it
+is shared with the sense of direction."""
 
 
 def population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
@@ -38,4 +42,10 @@ def person(number: int, seed: int) -> DirectionFeeler:
         lapse=float(rng.beta(1.0, 60.0)),
         criterion=float(rng.normal(0.0, 0.15)),
         drift_db_per_100_trials=float(abs(rng.normal(0.0, 0.2))),
+        # Drawn last, so that the people of older studies are still the same.
+        detection_n=_shifted(TYPICAL_DETECTION_N, rng.normal(0.0, SPREAD_OF_DETECTION_DB)),
     )
+
+
+def _shifted(thresholds_n: tuple[tuple[float, float], ...], offset_db: float) -> tuple[tuple[float, float], ...]:
+    return tuple((frequency_hz, float(n * 10.0 ** (offset_db / 20.0))) for frequency_hz, n in thresholds_n)

@@ -1,8 +1,9 @@
-"""The share of right answers against the level, for choosing one of two directions."""
+"""The share of right answers against the level, for choosing one of two: directions, or intervals."""
 
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import NormalDist
 
 TARGET = 0.5 ** (1 / 3)
 """Where one wrong and three right answers in a row are equally likely: 79.37 % right (Levitt 1971)."""
@@ -18,6 +19,13 @@ class WeibullCurve:
     def share_right(self, level_n: float) -> float:
         return 1.0 - 0.5 * math.exp(-_AT_TARGET * (level_n / self.threshold_n) ** self.slope)
 
+    def distance(self, level_n: float) -> float:
+        """Between the two alternatives, in standard deviations of the evidence, for this share without a bias."""
+        return 2.0 * NormalDist().inv_cdf(min(self.share_right(level_n), _SUREST))
+
+
+_SUREST = 1.0 - 1e-12
+"""The inverse of the normal distribution ends before 1."""
 
 _AT_TARGET = -math.log(2.0 * (1.0 - TARGET))
 """(x / a)^slope at the threshold."""

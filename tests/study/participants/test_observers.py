@@ -9,6 +9,7 @@ from protocols.schedule import draw_trial
 from protocols.study_protocol import ScheduleSettings
 from protocols.trial import Phase
 from study.errors import WrongUseError
+from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Felt, Observer
@@ -134,6 +135,65 @@ def test_between_frequencies_thresholds_lie_between_and_beyond_the_ends_they_sta
     assert isinstance(ideal, DirectionFeeler)
     shares = [ideal.share_right(replace(FELT, frequency_hz=f)) for f in (1.0, 5.0, 10.0, 15.0, 45.0, 200.0)]
     assert shares[0] == shares[1] > shares[2] > shares[3] > shares[4] == shares[5]
+
+
+def detection(frequency_hz: float, level_n: float) -> list[Felt]:
+    return [replace(felt, phase=Phase.DETECTION) for felt in trials(frequency_hz, level_n)]
+
+
+@pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_DETECTION_N)
+def test_the_interval_is_found_79_percent_of_the_time_at_the_detection_threshold(frequency_hz, threshold_n):
+    felt = detection(frequency_hz, threshold_n)
+    assert share_right(observer_named("ideal", 0), felt) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
+
+
+@pytest.mark.parametrize("level_n", [0.02, 0.05, 0.1, 0.2])
+def test_finding_the_interval_follows_a_weibull_curve_of_its_own(level_n):
+    """Textbook form, with slope 2.5 and a so that 0.08 N gives the cube root of one half."""
+    a = 0.08 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2.5)
+    expected = 0.5 + 0.5 * (1 - np.exp(-((level_n / a) ** 2.5)))
+    found = share_right(observer_named("ideal", 0), detection(15.0, level_n))
+    assert found == pytest.approx(expected, abs=FOUR_ERRORS)
+
+
+@pytest.mark.parametrize("name", ["ideal", "vibration_only", "intensity_cue"])
+def test_who_finds_no_direction_feels_the_vibration_all_the_same(name):
+    observer = observer_named(name, 0)
+    assert share_right(observer, detection(35.0, 0.5)) > 0.99
+    assert share_right(observer, trials(35.0, 0.02)) < 0.7
+
+
+def test_the_intensity_cue_finds_the_interval_79_percent_of_the_time_at_its_detection_level():
+    cue = observer_named("intensity_cue", 0)
+    assert share_right(cue, detection(25.0, 0.1)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
+
+
+@pytest.mark.parametrize("name", ["guesser", "alternator", "always_1", "always_2"])
+def test_who_feels_nothing_finds_no_interval(name):
+    assert share_right(observer_named(name, 1), detection(15.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
+
+
+def test_lapses_and_a_liking_for_1_show_in_detection_trials_too():
+    assert share_right(observer_named("lapsing", 0), detection(15.0, 3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
+    liked = share_of_1(observer_named("biased", 0), detection(15.0, 0.005))
+    assert liked == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)
+
+
+def test_a_drift_raises_the_detection_threshold_too():
+    drifting = observer_named("drifting", 0)
+    assert isinstance(drifting, DirectionFeeler)
+    early = replace(FELT, phase=Phase.DETECTION, level_n=0.08)
+    late = replace(early, trials_before=300, level_n=0.08 * 10 ** (3 / 20))
+    assert drifting.share_right(late) == pytest.approx(drifting.share_right(early))
+    assert drifting.share_right(replace(early, trials_before=300)) < drifting.share_right(early) - 0.05
+
+
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_a_catch_trial_is_answered_as_any_other_trial_at_its_level(name):
+    observer = observer_named(name, 1)
+    felt = trials(level_n=3.0)[:200]
+    caught = [observer.reply(replace(one, phase=Phase.CATCH), 1) for one in felt]
+    assert caught == [observer.reply(one, 1) for one in felt]
 
 
 def test_the_scripted_observer_looks_at_run_and_trial_alone():

@@ -11,6 +11,7 @@ from protocols.schedule import draw_trial, runs
 from protocols.staircase import begin, finished, level_n, step, to_newton
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase
+from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.observer import Felt, Observer
 from study.participants.observers import observer_named
 from study.participants.population import population
@@ -80,6 +81,28 @@ def test_people_differ_by_about_three_decibels():
     assert thresholds_db.std(axis=0, ddof=1) == pytest.approx(np.full(5, 3.02), abs=0.4)
     # Who is good at one frequency is good at another: 2.5^2 / (2.5^2 + 1.7^2).
     assert np.corrcoef(thresholds_db.T)[np.triu_indices(5, 1)].mean() == pytest.approx(0.68, abs=0.08)
+
+
+def test_people_feel_that_it_shakes_far_below_where_they_feel_the_direction():
+    for someone in population(200, seed=2):
+        pairs = zip(someone.detection_n, someone.thresholds_n, strict=True)
+        assert all(detection_n < 0.8 * direction_n for (_, detection_n), (_, direction_n) in pairs)
+
+
+def test_people_differ_in_detection_by_as_much_and_independently():
+    people = population(400, seed=2)
+    detection_db = 20 * np.log10([someone.detection_n[0][1] / TYPICAL_DETECTION_N[0][1] for someone in people])
+    direction_db = 20 * np.log10([np.prod([n for _, n in someone.thresholds_n]) ** 0.2 for someone in people])
+    assert detection_db.std(ddof=1) == pytest.approx(2.5, abs=0.35)
+    assert abs(np.corrcoef(detection_db, direction_db)[0, 1]) < 4 / np.sqrt(400)
+
+
+def test_the_people_of_older_studies_are_still_the_same():
+    """Values of the version before detection trials."""
+    someone = population(1, seed=1)[0]
+    assert [round(n, 6) for _, n in someone.thresholds_n] == [0.520389, 0.724903, 1.034365, 2.866593, 2.684562]
+    assert round(someone.slope, 6) == 1.618158
+    assert round(someone.drift_db_per_100_trials, 6) == 0.146749
 
 
 def test_a_larger_population_begins_with_the_same_people():
