@@ -20,12 +20,19 @@ def clock():
     return VirtualClock()
 
 
+@pytest.fixture
+def pressed():
+    """Buttons that are held down, where the device has any."""
+    return set()
+
+
 @pytest.fixture(params=KINDS)
-def device(request, rigs, clock):
+def device(request, rigs, clock, pressed):
     if request.param == "simulated omega.3":
         opened = open_device("simulated", rigs.SETTINGS, clock, seed=3)
     else:
-        rig = rigs.compiled_rig() if request.param == "compiled mass" else rigs.ScriptedRig()
+        kind = rigs.compiled_rig if request.param == "compiled mass" else rigs.ScriptedRig
+        rig = kind(pressed=pressed)
         opened = SafeDevice(rig, rigs.SETTINGS, clock)
     with contextlib.closing(opened):
         yield opened
@@ -127,6 +134,78 @@ def test_it_may_be_closed_at_any_time_and_twice(device, clock, rigs):
     device.close()
     with pytest.raises(DeviceError, match="is closed"):
         device.hold(rigs.sine(1.0))
+
+
+def test_an_idle_device_can_be_looked_at(device):
+    look = device.look()
+    assert np.linalg.norm(look.position_m) < 1e-3
+    assert np.linalg.norm(look.acceleration_mps2) < 1.0
+    assert (look.sensor_clipped, look.buttons, look.missed_ticks) == (False, frozenset(), 0)
+
+
+def test_a_look_at_a_held_handle_follows_it(device, clock, rigs):
+    device.hold(rigs.sine(1.0, periods_per_s=5, fade_s=0.0))
+    looks = []
+    for _ in range(40):
+        clock.sleep(0.005)
+        looks.append(device.look())
+    assert np.ptp([look.position_m[2] for look in looks]) > 1e-4
+    assert np.ptp([look.acceleration_mps2[2] for look in looks]) > 0.5
+    assert all(look.missed_ticks == 0 for look in looks)
+
+
+def test_a_look_right_after_a_stimulus_begins_has_a_reading(device, rigs):
+    device.look()
+    device.hold(rigs.sine(1.0))
+    assert device.look().position_m is not None
+
+
+def test_buttons_are_seen_whether_something_is_held_or_not(device, clock, rigs, pressed):
+    has_buttons = device.info.name == "mass"
+    pressed.add(0)
+    assert device.look().buttons == ({0} if has_buttons else set())
+    device.hold(rigs.sine(1.0))
+    pressed.add(3)
+    feel(device, clock, 0.1)
+    assert device.look().buttons == ({0, 3} if has_buttons else set())
+    pressed.clear()
+    feel(device, clock, 0.1)
+    assert device.look().buttons == set()
+
+
+def test_a_look_at_a_device_that_is_lost_or_closed_has_no_reading(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    feel(device, clock, 0.1)
+    device._runner.give_up(OSError("usb"))
+    lost = device.look()
+    assert (lost.position_m, lost.acceleration_mps2, lost.sensor_clipped, lost.buttons) == (None, None, False, set())
+    device.release()
+    assert device.look() == lost
+    device.close()
+    assert device.look() == lost
+
+
+def test_a_device_that_was_stopped_can_still_be_looked_at(device, clock, rigs):
+    device.hold(rigs.sine(1.0))
+    feel(device, clock, 0.5)
+    device.stop()
+    device.release()
+    assert device.look().position_m is not None
+
+
+def test_looking_changes_nothing_that_is_recorded(rigs):
+    recordings = []
+    for looks in (0, 25):
+        clock = VirtualClock()
+        with contextlib.closing(open_device("simulated", rigs.SETTINGS, clock, seed=8)) as device:
+            for _ in range(looks):
+                device.look()
+            device.hold(rigs.sine(1.0))
+            feel(device, clock, 1.0)
+            for _ in range(looks):
+                device.look()
+            recordings.append(device.release().recording.response.samples)
+    assert (recordings[0] == recordings[1]).all()
 
 
 def test_the_same_seed_and_calls_give_the_same_recording(rigs):

@@ -148,6 +148,12 @@ class Calls(RuleBasedStateMachine):
         except DeviceError:
             pass
 
+    @rule()
+    def look(self) -> None:
+        given = len(self.rigs.written(self.bare))
+        assert self.device.look().missed_ticks == 0
+        assert len(self.rigs.written(self.bare)) == given
+
     @precondition(lambda self: self.held)
     @rule()
     def release(self) -> None:
