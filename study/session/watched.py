@@ -1,0 +1,73 @@
+"""A session as somebody follows it: its state, and the facts that decide nothing (notes, remarks, how it ended)."""
+
+from dataclasses import dataclass, replace
+
+from protocols.study_protocol import StudyProtocol
+from study.session.events import (
+    Event,
+    SessionInterrupted,
+    SessionOpened,
+    SessionResumed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
+from study.session.fold import apply, begin_session
+from study.session.sitting_events import FormFilled, NoteTaken
+from study.session.state import SessionState
+from study.session.watch_view import FormLine, NoteLine
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    state: SessionState
+    remarks: tuple[str, ...]
+    """One for each of `state.trials`: its flags, or why it is void."""
+    forms: tuple[FormLine, ...]
+    notes: tuple[NoteLine, ...]
+    """Oldest first."""
+    left: str
+    """Why the sitting was ended; empty while nobody ended it."""
+    sitting_utc: str
+    """When the present sitting was opened."""
+    last_utc: str
+    """Of the last fact."""
+
+
+def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
+    return Watched(
+        state=begin_session(opened, protocol),
+        remarks=(),
+        forms=(),
+        notes=(),
+        left="",
+        sitting_utc=opened.utc,
+        last_utc=opened.utc,
+    )
+
+
+def follow(watched: Watched, event: Event) -> Watched:
+    """After one more event. Raises LogContradiction where it cannot follow."""
+    after = replace(watched, state=apply(watched.state, event), last_utc=event.utc)
+    match event:
+        case TrialPresented():
+            return replace(after, remarks=(*watched.remarks, ""))
+        case TrialMeasured():
+            return _remarked(after, ", ".join(event.flags))
+        case TrialSpoiled():
+            return _remarked(after, event.reason)
+        case FormFilled():
+            return replace(after, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
+        case NoteTaken():
+            note = NoteLine(event.utc, event.who, event.text, event.adverse)
+            return replace(after, notes=(*watched.notes, note))
+        case SessionInterrupted():
+            return replace(after, left=event.reason)
+        case SessionResumed():
+            return replace(after, left="", sitting_utc=event.utc)
+        case _:
+            return after
+
+
+def _remarked(watched: Watched, remark: str) -> Watched:
+    return replace(watched, remarks=(*watched.remarks[:-1], remark))

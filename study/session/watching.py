@@ -1,0 +1,137 @@
+"""From a followed session to what its watcher sees. Pure: the same session and time give the same view."""
+
+from dataclasses import dataclass
+
+from protocols.trial import Phase
+from study.session.live import Live
+from study.session.sitting_state import minutes_between
+from study.session.vibration_dose import a8_mps2
+from study.session.watch_alarms import Situation, alarms_of
+from study.session.watch_view import ON, Exposure, Standing, WatchView
+from study.session.watched import Watched
+from study.session.watched_trials import last_trials, next_level_n, open_trial, points, practice, run_line, shown_run
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What is known of a session from beside its log."""
+
+    live: Live | None = None
+    writer: bool | None = None
+    """Whether a program holds the session; None where nobody asked."""
+    problem: str = ""
+    """Why the log cannot be followed any further; empty where it can."""
+
+
+def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView | None = None) -> WatchView:
+    """before: the view shown last, so that an alarm that lasts keeps its time."""
+    state = watched.state
+    live = _of_this_sitting(watched, beside.live)
+    standing = _standing(watched, live, beside.writer)
+    exposure = _exposure(watched, standing, now_utc)
+    situation = Situation(watched, live, beside.problem, standing, exposure, now_utc)
+    activity, since_utc = _activity(watched, live, standing)
+    catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.counts]
+    run = shown_run(state)
+    return WatchView(
+        utc=now_utc,
+        session=state.opened.session,
+        subject=state.opened.subject,
+        protocol=state.protocol.title,
+        device=state.opened.device.name,
+        simulated=state.opened.device.simulated,
+        observer=state.opened.observer,
+        standing=standing,
+        reason=_reason(watched, standing),
+        activity=activity,
+        activity_s=_seconds(since_utc, now_utc),
+        runs=tuple(run_line(state, run) for run in state.runs),
+        shown_run=run,
+        points=points(state, run),
+        next_level_n=next_level_n(state, run),
+        cap_n=state.protocol.staircase.cap_n,
+        open_trial=open_trial(state, _seconds(state.presented.utc, now_utc) if state.presented else 0.0),
+        last=last_trials(watched),
+        answers=state.answers,
+        exposure=exposure,
+        catch_given=len(catches),
+        catch_lapses=sum(not trial.correct for trial in catches),
+        practice=practice(state),
+        forms=watched.forms,
+        notes=watched.notes[::-1],
+        gate_radius_mm=state.protocol.gate.radius_mm,
+        live=live if standing in ON else None,
+        alarms=alarms_of(situation, before.alarms if before is not None else ()),
+    )
+
+
+def _of_this_sitting(watched: Watched, live: Live | None) -> Live | None:
+    """What an earlier sitting left behind says nothing of this one."""
+    return live if live is not None and live.utc >= watched.sitting_utc else None
+
+
+def _standing(watched: Watched, live: Live | None, writer: bool | None) -> Standing:
+    if watched.state.closed:
+        return "finished"
+    if watched.left:
+        return "stopped"
+    if writer is False:
+        return "not running"
+    if live is not None and live.activity == "pause":
+        return "paused"
+    resting = live.activity == "rest" if live is not None else watched.state.rest_due_s > 0
+    return "resting" if resting else "running"
+
+
+def _reason(watched: Watched, standing: Standing) -> str:
+    match standing:
+        case "stopped":
+            return watched.left
+        case "not running":
+            return "the program that ran it is gone; every answer is in the log"
+        case "finished":
+            return "all runs are done"
+        case _:
+            return ""
+
+
+_WORDS = {
+    "preparing": "getting ready",
+    "form": "filling in a form",
+    "instructions": "reading the instructions",
+    "demo": "feeling the demonstration",
+    "waiting for the handle": "waiting for the handle to come to its place",
+    "trial": "between two trials",
+    "rest": "resting",
+    "pause": "pausing",
+    "idle": "between two trials",
+}
+
+
+def _activity(watched: Watched, live: Live | None, standing: Standing) -> tuple[str, str]:
+    """In words, and since when. What the log says of a trial goes before what `live` said a moment earlier."""
+    state = watched.state
+    if standing not in ON:
+        return standing, watched.last_utc
+    if state.presented is not None:
+        waiting = state.answered is None
+        return ("waiting for the answer" if waiting else "measuring"), (state.answered or state.presented).utc
+    if live is None:
+        return ("resting" if standing == "resting" else "between two trials"), watched.last_utc
+    return _WORDS[live.activity], live.since_utc
+
+
+def _exposure(watched: Watched, standing: Standing, now_utc: str) -> Exposure:
+    sitting, limits = watched.state.sitting, watched.state.protocol.limits
+    until_utc = max(now_utc, watched.last_utc) if standing in ON else watched.last_utc
+    return Exposure(
+        elapsed_min=max(0.0, minutes_between(sitting.began_utc, until_utc)),
+        limit_min=limits.longest_min,
+        dose_a8_mps2=a8_mps2(sitting.dose) if sitting.moved_utc[:10] == until_utc[:10] else 0.0,
+        dose_limit_mps2=limits.dose_a8_mps2,
+    )
+
+
+def _seconds(since_utc: str, now_utc: str) -> float:
+    """Never negative: the clocks of two computers differ."""
+    return max(0.0, 60.0 * minutes_between(since_utc, now_utc))

@@ -1,0 +1,120 @@
+"""Follow a running session from beside it, reading only, and ask it to stop, to pause, or to note something."""
+
+import io
+from pathlib import Path
+
+from study.errors import StudyError
+from study.session.draw_check import LogContradiction
+from study.session.events import SessionOpened, parse_event
+from study.session.live import Live
+from study.session.requests import Request
+from study.session.sitting_state import minutes_between
+from study.session.watch_alarms import SILENT_AFTER_S
+from study.session.watch_view import WatchView
+from study.session.watched import Watched, begin_watching
+from study.session.watched import follow as after
+from study.session.watching import Beside, watch_view
+from study.store.archive import SessionFolder
+from study.store.live_file import read_live
+from study.store.log_writer import somebody_writes
+from study.store.request_inbox import RequestInbox
+from study.workflows.fold_session import protocol_of
+
+PROBE_EVERY_S = 1.0
+"""How often at most the lock of a session that gives no sign of life is looked at."""
+
+
+def follow(folder: Path) -> "Follower":
+    return Follower(SessionFolder(folder))
+
+
+def ask(folder: Path, request: Request) -> str:
+    """Returns the request's name in the session's inbox. Raises StudyError where it cannot be written."""
+    return RequestInbox(folder).send(request)
+
+
+class Follower:
+    """Reads what is new in the log at every look, and never writes to it."""
+
+    def __init__(self, folder: SessionFolder) -> None:
+        self._folder = folder
+        self._watched: Watched | None = None
+        self._read_bytes = 0
+        self._last_line = b""
+        self._problem = ""
+        self._missing = False
+        self._view: WatchView | None = None
+        self._writer: bool | None = None
+        self._probed_utc = ""
+
+    def look(self, now_utc: str) -> WatchView | None:
+        """None while there is no first line. Raises StudyError where the first line cannot be used."""
+        self._take_in_what_is_new()
+        if self._watched is None:
+            return None
+        live = read_live(self._folder.path)
+        beside = Beside(live, self._somebody_writes(live, now_utc), self._problem)
+        self._view = watch_view(self._watched, beside, now_utc, self._view)
+        return self._view
+
+    def _take_in_what_is_new(self) -> None:
+        try:
+            with self._folder.log.open("rb") as file:
+                self._begin_again_if_rewritten(file)
+                file.seek(self._read_bytes)
+                fresh = file.read()
+        except OSError as problem:
+            self._problem, self._missing = f"{problem.strerror or problem}.", isinstance(problem, FileNotFoundError)
+            return
+        self._problem, self._missing = "", False
+        # What comes after the last line end is being written, or was torn by a crash.
+        for line in (whole + b"\n" for whole in fresh.split(b"\n")[:-1]):
+            self._problem = self._take_in(line)
+            if self._problem:
+                return
+            self._read_bytes += len(line)
+            self._last_line = line
+
+    def _begin_again_if_rewritten(self, file: io.BufferedReader) -> None:
+        """A line that could not be synced is cut off again by its writer, after it was seen here."""
+        file.seek(self._read_bytes - len(self._last_line))
+        if file.read(len(self._last_line)) != self._last_line:
+            self._watched, self._read_bytes, self._last_line = None, 0, b""
+
+    def _take_in(self, line: bytes) -> str:
+        """Returns the problem with this line; empty where there is none."""
+        try:
+            event = parse_event(line)
+        except ValueError:
+            if self._watched is None:
+                raise _not_ours(self._folder) from None
+            return "a line of it is no event that this version knows."
+        if self._watched is None:
+            if not isinstance(event, SessionOpened):
+                raise _not_ours(self._folder)
+            self._watched = begin_watching(event, protocol_of(event, self._folder))
+            return ""
+        try:
+            self._watched = after(self._watched, event)
+        except LogContradiction:
+            # Not in the problem's own words: they may tell what the open trial plays.
+            return "it contradicts the rules."
+        return ""
+
+    def _somebody_writes(self, live: Live | None, now_utc: str) -> bool | None:
+        if self._missing:
+            return False
+        if live is not None and 60.0 * minutes_between(live.utc, now_utc) <= SILENT_AFTER_S:
+            self._writer = None
+        elif 60.0 * abs(minutes_between(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
+            self._probed_utc = now_utc
+            self._writer = somebody_writes(self._folder.log)
+        return self._writer
+
+
+def _not_ours(folder: SessionFolder) -> StudyError:
+    return StudyError(
+        "This session cannot be followed",
+        f"The first line of the log of {folder.name} is none that this version knows.",
+        "Use the hapteq that runs the session; hapteq validate says more.",
+    )
