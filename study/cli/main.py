@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from study.cli import analyze, noise, protocol, record, rehearse, resume, study, validate, withdraw
+from study.cli import analyze, doctor, noise, protocol, record, rehearse, resume, study, validate, withdraw
 from study.errors import ExitCode, StudyError
 
 app = typer.Typer(
@@ -36,6 +36,7 @@ app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
 app.command("withdraw")(withdraw.withdraw)
 app.command("validate")(validate.validate)
+app.command("doctor")(doctor.doctor)
 
 
 WrongCommandLine: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")

@@ -1,0 +1,77 @@
+"""`hapteq doctor`: is this computer, and the device at it, fit for a study?"""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.study import DataOption, DeviceOption
+
+if TYPE_CHECKING:
+    from study.session.views import DeviceFinding
+    from study.workflows.examine_setup import Examination
+
+NAME_WIDTH = 17
+
+
+def doctor(
+    device: DeviceOption = "simulated",
+    timing: Annotated[
+        float, typer.Option(min=0, max=500, help="How long the 1 kHz loop is timed, with zero force; 0: not at all.")
+    ] = 2.0,
+    data: DataOption = Path("data"),
+    as_json: JsonOption = False,
+) -> None:
+    """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves."""
+    from study.cli.progress import bar
+    from study.workflows.check_installation import this_terminal
+    from study.workflows.examine_setup import examine_setup
+
+    with bar("Timing the loop (s)", total=timing) as show:
+        examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
+    if as_json:
+        typer.echo(json.dumps(_document(examination), indent=2))
+    else:
+        _say(examination)
+    if examination.exit_code:
+        raise typer.Exit(examination.exit_code)
+
+
+def _say(examination: "Examination") -> None:
+    timing = examination.timing
+    parts = {
+        "Installation": examination.installation,
+        "Device": examination.device.findings,
+        "Timing": timing.findings if timing is not None else (),
+    }
+    for title, findings in parts.items():
+        if findings:
+            typer.echo(title)
+        for finding in findings:
+            _say_one(finding)
+    wrong = sum(not finding.fine for finding in examination.findings)
+    checked = len(examination.findings)
+    typer.echo(f"All {checked} checks are fine." if not wrong else f"{wrong} of {checked} checks are not fine.")
+
+
+def _say_one(finding: "DeviceFinding") -> None:
+    typer.echo(f"  {'fine ' if finding.fine else 'WRONG'}  {finding.name:<{NAME_WIDTH}}  {finding.value}")
+    if finding.advice:
+        typer.echo(f"         {'':<{NAME_WIDTH}}  {finding.advice}")
+
+
+def _document(examination: "Examination") -> dict[str, Any]:
+    timing = examination.timing
+    document = {
+        "fine": not examination.exit_code,
+        "installation": [asdict(finding) for finding in examination.installation],
+        "device": asdict(examination.device),
+        "timing": None,
+    }
+    if timing is not None:
+        health = asdict(timing.health) | {"fault": timing.health.fault.name.lower()}
+        document["timing"] = asdict(timing) | {"health": health}
+    return document

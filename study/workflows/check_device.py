@@ -1,0 +1,116 @@
+"""Whether a device is fit for a sitting: it is watched for half a second, and never told to do anything."""
+
+import math
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.clock import Clock
+from study.devices.device import Device, DeviceInfo, Look
+from study.session.views import DeviceFinding, DeviceReport
+
+LOOKS = 50
+EVERY_S = 0.01
+
+ENOUGH = 0.9
+"""Of the looks must be answered: a busy computer is late now and then."""
+
+FAR_MM = 20.0
+"""From there the centring spring of the shipped protocols pulls with a few newtons."""
+
+NOISY_MPS2 = 1.0
+"""An accelerometer at rest has about 0.1 m/s² (its noise over 500 Hz); a trembling hand on the handle, up to 0.5."""
+
+RATE_HZ = 1000.0
+
+MM_PER_M = 1000.0
+
+
+CENTRE_M = (0.0, 0.0, 0.0)
+
+
+def check_device(
+    device: Device, clock: Clock, place_m: tuple[float, float, float] = CENTRE_M, total_cap_n: float | None = None
+) -> DeviceReport:
+    """Findings of an idle device; takes `LOOKS` times `EVERY_S`. Commands no force and raises nothing.
+
+    place_m: where trials start. total_cap_n: the largest force that will be asked for, if it is known.
+    """
+    looks = []
+    for _ in range(LOOKS):
+        looks.append(device.look())
+        clock.sleep(EVERY_S)
+    answered = [look for look in looks if look.position_m is not None or look.acceleration_mps2 is not None]
+    sensors = (_handle(answered, place_m), _accelerometer(answered)) if answered else ()
+    info = device.info
+    findings = (_kind(info), _answers(len(answered)), *sensors, _rate(info), _largest_force(info, total_cap_n))
+    return DeviceReport(info.name, info.simulated, findings)
+
+
+def _kind(info: DeviceInfo) -> DeviceFinding:
+    kind = "simulated: no handle moves" if info.simulated else "a real device"
+    return DeviceFinding("Device", f"{info.name} ({kind})", fine=True)
+
+
+def _answers(answered: int) -> DeviceFinding:
+    fine = answered >= ENOUGH * LOOKS
+    advice = "Check its power and its cable, then open it again."
+    return DeviceFinding("Answers", f"{answered} of {LOOKS} times", fine, "" if fine else advice)
+
+
+def _handle(looks: list[Look], place_m: tuple[float, float, float]) -> DeviceFinding:
+    positions_m = [look.position_m for look in looks if look.position_m is not None]
+    if len(positions_m) < ENOUGH * len(looks):
+        advice = "Switch the device off and on, and calibrate it as its manual says."
+        return DeviceFinding("Handle", "its position is no number", fine=False, advice=advice)
+    away_mm = MM_PER_M * math.dist(np.mean(positions_m, axis=0), place_m)
+    fine = away_mm <= FAR_MM
+    advice = f"Bring the handle to within {FAR_MM:g} mm of its place."
+    return DeviceFinding("Handle", f"{away_mm:.1f} mm from its place", fine, "" if fine else advice)
+
+
+def _accelerometer(looks: list[Look]) -> DeviceFinding:
+    readings = np.array([look.acceleration_mps2 for look in looks if look.acceleration_mps2 is not None])
+    clipped = sum(look.sensor_clipped for look in looks)
+    if len(readings) < ENOUGH * len(looks):
+        return _broken("its reading is no number", "Check the sensor's cable and its power.")
+    if clipped:
+        return _broken(
+            f"at its limit in {clipped} of {len(looks)} readings",
+            "Lay the handle at rest. If that does not help, check the sensor's range, cable and mounting.",
+        )
+    return _noise(readings)
+
+
+def _noise(readings_mps2: FloatArray) -> DeviceFinding:
+    """readings_mps2 (n, 3)."""
+    dead = [axis for axis, channel in zip("xyz", readings_mps2.T, strict=True) if np.ptp(channel) == 0.0]
+    if dead:
+        return _broken(
+            f"always exactly the same along {' and '.join(dead)}",
+            "The sensor is dead, or not plugged in: check its cable and its power.",
+        )
+    rms_mps2 = float(np.sqrt(readings_mps2.var(axis=0).sum()))
+    if rms_mps2 > NOISY_MPS2:
+        return _broken(
+            f"{rms_mps2:.2f} m/s² rms at rest, more than {NOISY_MPS2:g}",
+            "Let go of the handle and check again. If it stays, check the sensor's cable, shield and mounting.",
+        )
+    return DeviceFinding("Accelerometer", f"{rms_mps2:.2f} m/s² rms at rest", fine=True)
+
+
+def _broken(value: str, advice: str) -> DeviceFinding:
+    return DeviceFinding("Accelerometer", value, fine=False, advice=advice)
+
+
+def _rate(info: DeviceInfo) -> DeviceFinding:
+    fine = abs(info.sample_rate_hz - RATE_HZ) <= 0.01 * RATE_HZ
+    advice = f"Stimuli are made for {RATE_HZ:g} Hz: set the device's loop to that."
+    return DeviceFinding("Rate", f"{info.sample_rate_hz:g} Hz", fine, "" if fine else advice)
+
+
+def _largest_force(info: DeviceInfo, total_cap_n: float | None) -> DeviceFinding:
+    needed = "" if total_cap_n is None else f"; at most {total_cap_n:g} N will be asked for"
+    fine = info.max_force_n > 0 and (total_cap_n is None or info.max_force_n >= total_cap_n)
+    advice = "Lower total_cap_n in the protocol's [safety] section, or take a stronger device."
+    return DeviceFinding("Largest force", f"{info.max_force_n:g} N{needed}", fine, "" if fine else advice)

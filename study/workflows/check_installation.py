@@ -1,0 +1,150 @@
+"""Whether this computer has what a study needs: Python, packages, their names, a terminal, a folder to write to."""
+
+import importlib.util
+import locale
+import os
+import platform
+import shutil
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, metadata, packages_distributions, requires, version
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+import study
+from study.session.views import DeviceFinding
+
+HAPTEQ = "hapteq"
+IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
+
+SMALLEST = (80, 24)
+"""Columns and rows of a terminal in which every screen fits."""
+
+ROOM_BYTES = 10**9
+"""Some ten sessions with all their recordings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    encoding: str
+    kind: str
+    """TERM."""
+    columns: int
+    rows: int
+
+
+def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
+    """`terminal`: `this_terminal()`. Writes one empty file into `data`, or into the folder it would be made in."""
+    owners, home = packages_distributions(), Path(study.__file__).parents[1]
+    return (
+        *check_packages(),
+        *(check_name(name, owners, home) for name in IMPORT_NAMES),
+        *check_terminal(terminal),
+        check_folder(data),
+    )
+
+
+def check_packages() -> tuple[DeviceFinding, ...]:
+    """Python and what hapteq was installed with, against what it needs."""
+    try:
+        wanted_python, wanted = metadata(HAPTEQ)["Requires-Python"], requires(HAPTEQ) or []
+    except PackageNotFoundError:
+        advice = "Run `make study` in its folder once: that installs hapteq and what it needs."
+        return (DeviceFinding(HAPTEQ, "not installed, so what it needs is not known", fine=False, advice=advice),)
+    return (
+        DeviceFinding(HAPTEQ, version(HAPTEQ), fine=True),
+        check_version("Python", platform.python_version(), SpecifierSet(wanted_python)),
+        *(check_requirement(requirement) for requirement in map(Requirement, wanted) if _always(requirement)),
+    )
+
+
+def check_requirement(requirement: Requirement) -> DeviceFinding:
+    try:
+        return check_version(requirement.name, version(requirement.name), requirement.specifier)
+    except PackageNotFoundError:
+        return DeviceFinding(requirement.name, "not installed", fine=False, advice=_INSTALL)
+
+
+def check_version(name: str, found: str, wanted: SpecifierSet) -> DeviceFinding:
+    fine = wanted.contains(found, prereleases=True)
+    needs = f" (needs {wanted})" if str(wanted) else ""
+    return DeviceFinding(name, f"{found}{needs}", fine, "" if fine else _INSTALL)
+
+
+def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> DeviceFinding:
+    """Whether hapteq's package of this generic name is its own. owners: distributions that install it."""
+    others = sorted(set(owners.get(name, ())) - {HAPTEQ})
+    if others:
+        advice = f"Install hapteq into an environment of its own: {', '.join(others)} must not share one with it."
+        return DeviceFinding(f"Name {name}", f"belongs to {' and '.join(others)} as well", fine=False, advice=advice)
+    spec = importlib.util.find_spec(name)
+    if spec is None or spec.origin is None or Path(spec.origin) != home / name / "__init__.py":
+        where = "nowhere to be found" if spec is None or spec.origin is None else f"taken from {spec.origin}"
+        advice = "Rename that file, or start hapteq without its folder on PYTHONPATH."
+        return DeviceFinding(f"Name {name}", where, fine=False, advice=advice)
+    return DeviceFinding(f"Name {name}", "hapteq's own", fine=True)
+
+
+def this_terminal() -> Terminal | None:
+    """The one that output or talk goes to; None where there is none."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None and stream.isatty():
+            size = os.get_terminal_size(stream.fileno())
+            encoding = stream.encoding or locale.getpreferredencoding(False)
+            return Terminal(encoding, os.environ.get("TERM", ""), size.columns, size.lines)
+    return None
+
+
+def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
+    if terminal is None:
+        return (DeviceFinding("Terminal", "none here, so it was not checked", fine=True),)
+    unicode = terminal.encoding.lower().replace("-", "") == "utf8"
+    size = (terminal.columns, terminal.rows)
+    large = all(has >= needs for has, needs in zip(size, SMALLEST, strict=True))
+    able = terminal.kind not in ("", "dumb")
+    smallest = f"{SMALLEST[0]} x {SMALLEST[1]}"
+    return (
+        DeviceFinding("Characters", terminal.encoding, unicode, "" if unicode else f"Set LANG=C.UTF-8, {_OR_PLAIN}"),
+        DeviceFinding(
+            "Terminal size",
+            f"{size[0]} x {size[1]} (needs {smallest})",
+            large,
+            "" if large else f"Make the window larger, {_OR_PLAIN}",
+        ),
+        DeviceFinding("Colours", _colours(terminal.kind), able, "" if able else f"Take another terminal, {_OR_PLAIN}"),
+    )
+
+
+def check_folder(data: Path) -> DeviceFinding:
+    """Whether sessions can be written below it. A folder that is not there yet is made by the first session."""
+    name = "Data folder"
+    folder = next(place for place in (data.absolute(), *data.absolute().parents) if place.exists())
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            free_bytes = shutil.disk_usage(folder).free
+    except OSError as problem:
+        advice = "Choose another folder with --data, or change the rights of this one."
+        return DeviceFinding(name, f"{data}: {problem.strerror}", fine=False, advice=advice)
+    fine = free_bytes >= ROOM_BYTES
+    value = f"{data}: can be written, {free_bytes / 1e9:.1f} GB free"
+    return DeviceFinding(name, value, fine, "" if fine else "Make room, or choose another folder with --data.")
+
+
+def _always(requirement: Requirement) -> bool:
+    return requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+
+
+def _colours(kind: str) -> str:
+    if os.environ.get("NO_COLOR"):
+        return "switched off by NO_COLOR; nothing is told by colour alone"
+    if os.environ.get("COLORTERM") in ("truecolor", "24bit"):
+        return "16 million"
+    return "256" if "256color" in kind else f"few (TERM={kind or 'not set'})"
+
+
+_OR_PLAIN = "or use `hapteq study --plain`."
+_INSTALL = "Run `make study` in hapteq's folder, or install hapteq again."
