@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from study.cli import analyze, doctor, noise, protocol, record, rehearse, resume, study, validate, withdraw
+from study.cli import analyze, doctor, noise, protocol, record, rehearse, resume, serve, study, validate, withdraw
 from study.errors import ExitCode, StudyError
 
 app = typer.Typer(
@@ -29,6 +29,7 @@ app = typer.Typer(
 )
 app.command("study")(study.study)
 app.command("resume")(resume.resume)
+app.command("serve", context_settings=serve.PASSES_OPTIONS_ON)(serve.serve)
 app.command("rehearse")(rehearse.rehearse)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
