@@ -26,7 +26,7 @@ class Run:
     run: int
     frequency_hz: float
     answered: tuple[Trial, ...]
-    """The trials that moved the staircase, in order."""
+    """The trials that moved the staircase, in order; catch trials among them are not here."""
     spoiled_trials: int
     state: StaircaseState
     """Where the staircase stands after the last of them."""
@@ -37,61 +37,78 @@ class Run:
 def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST) -> tuple[Run, ...]:
     """All runs of one phase, in the order in which they first occur.
 
+    Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
+    staircase: whoever asks for TRAINING leaves them out of `trials` (see `analysis.practice`).
+
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
     answers before it lead to, or where a row is missing, doubled or too many.
     """
+    phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
     grouped: dict[tuple[str, str, int], list[Trial]] = {}
     for trial in trials:
-        if trial.phase is phase:
+        if trial.phase in phases:
             grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
     return tuple(_recompute(rows, rule) for rows in grouped.values())
 
 
 def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
     first = rows[0]
-    answered = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
-    _refuse_strange_rows(rows, answered)
-    state = _fold(answered, rule)
+    counted = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
+    _refuse_strange_rows(rows, counted)
+    state = _fold(counted, rule)
+    steering = [trial for trial in rows if trial.phase is not Phase.CATCH]
     return Run(
         subject=first.subject,
         session=first.session,
         run=first.run,
         frequency_hz=first.frequency_hz,
-        answered=answered,
-        spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in rows),
+        answered=tuple(trial for trial in counted if trial.phase is not Phase.CATCH),
+        spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in steering),
         state=state,
         complete=state.reversals >= rule.reversals,
     )
 
 
-def _fold(answered: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
+def _fold(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
     state = begin(rule)
-    for trial in answered:
+    for trial in counted:
         if finished(rule, state):
             raise InconsistentTrialsError(
                 f"{_place(trial)}: an answer follows although the run was over after {state.trials} trials "
                 f"with {state.reversals} reversals"
             )
+        if trial.correct is None:
+            raise InconsistentTrialsError(f"{_place(trial)}: there is an answer, but correct is empty")
+        if trial.phase is Phase.CATCH:
+            _refuse_weak_catch_trial(trial, rule)
+            continue
         expected_n = level_n(rule, state)
         if not math.isclose(trial.level_n, expected_n, rel_tol=LEVEL_TOLERANCE):
             raise InconsistentTrialsError(
                 f"{_place(trial)}: level_n is {trial.level_n:.6g} N, but the answers before it lead to "
                 f"{expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
             )
-        if trial.correct is None:
-            raise InconsistentTrialsError(f"{_place(trial)}: there is an answer, but correct is empty")
         state = step(rule, state, trial.correct)
     return state
 
 
-def _refuse_strange_rows(rows: list[Trial], answered: tuple[Trial, ...]) -> None:
+def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
+    """A test trial that was renamed would be missed by nobody: below the cap it shows."""
+    if not math.isclose(trial.level_n, rule.cap_n, rel_tol=LEVEL_TOLERANCE):
+        raise InconsistentTrialsError(
+            f"{_place(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the cap "
+            f"of {rule.cap_n:g} N"
+        )
+
+
+def _refuse_strange_rows(rows: list[Trial], counted: tuple[Trial, ...]) -> None:
     first = rows[0]
     for trial in rows:
         if trial.frequency_hz != first.frequency_hz:
             raise InconsistentTrialsError(
                 f"{_place(trial)}: {trial.frequency_hz:g} Hz in a run that began at {first.frequency_hz:g} Hz"
             )
-    for before, after in itertools.pairwise(answered):
+    for before, after in itertools.pairwise(counted):
         if after.trial == before.trial:
             raise InconsistentTrialsError(f"{_place(after)}: two attempts of this trial have an answer that counts")
         if after.trial != before.trial + 1:

@@ -5,12 +5,15 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from analysis.anova import OneWayAnova, one_way
+from analysis.catch_trials import CatchTally, catch_tallies
 from analysis.comparisons import Comparisons, compare_all
+from analysis.detection import detection_thresholds
 from analysis.friedman import Friedman, friedman
 from analysis.population import Population, split_by_population
+from analysis.practice import PracticeRun, practice_runs
 from analysis.repeated_measures import RepeatedMeasures, repeated_measures
 from analysis.runs import Run, recompute_runs
-from analysis.study_warnings import design_difference, study_warnings
+from analysis.study_warnings import design_difference, side_warnings, study_warnings
 from analysis.threshold_table import ThresholdTable, threshold_table
 from analysis.thresholds import Threshold, threshold_of
 from protocols.study_protocol import StudyProtocol
@@ -37,6 +40,11 @@ class StudyAnalysis:
     difference: str
     """What separates the published one-way analysis from the one within participants, here."""
     warnings: tuple[str, ...]
+    detection: tuple[Threshold, ...]
+    """One per detection run."""
+    detection_table: ThresholdTable
+    catches: tuple[CatchTally, ...]
+    practice: tuple[PracticeRun, ...]
 
 
 def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnalysis:
@@ -56,6 +64,9 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     rows = tuple(threshold_of(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
     table = threshold_table(rows, protocol.stimulus.frequencies_hz)
+    detection = detection_thresholds(trials, protocol)
+    detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
+    catches = catch_tallies(trials)
     anova = one_way(table.groups())
     within = repeated_measures(table.subjects, table.values)
     return StudyAnalysis(
@@ -70,7 +81,14 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         within=within,
         ranks=friedman(table.values),
         difference=design_difference(anova, within),
-        warnings=study_warnings(tested, rows, table, protocol),
+        warnings=(
+            *study_warnings(tested, rows, table, protocol),
+            *side_warnings(catches, detection, table, detection_table),
+        ),
+        detection=detection,
+        detection_table=detection_table,
+        catches=catches,
+        practice=practice_runs(trials, protocol),
     )
 
 

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 from scipy.stats import binom
 
 from analysis.anova import OneWayAnova
+from analysis.catch_trials import CatchTally, wilson_interval
+from analysis.detection import directions_below_detection
 from analysis.repeated_measures import RepeatedMeasures
 from analysis.threshold_table import ThresholdTable
 from analysis.thresholds import Threshold
@@ -17,6 +19,14 @@ FEW_PARTICIPANTS = 5
 STRONG_BIAS = 0.6
 """Criterion beyond which a liking for one answer costs a staircase four in a hundred right answers. An observer
 without any exceeds it by chance in about one of 250 runs."""
+
+MANY_LAPSES = 0.1
+"""Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
+FELT_BY_ALL_HZ = 15.0
+"""Up to here everybody is expected to feel the direction at full level, so that an error there is a lapse."""
+REPEAT_SD_DB = 2.4
+"""Standard deviation of the difference of two runs with the same true threshold: sqrt(2) times 1.7 dB, the spread of
+500 simulated runs under the published rule (Weibull slope 2, 2 % lapses)."""
 
 
 def study_warnings(
@@ -37,6 +47,23 @@ def study_warnings(
         _flagged(trials),
         _unmeasured(trials),
         *table.notes,
+    )
+    return tuple(sentence for sentence in candidates if sentence)
+
+
+def side_warnings(
+    catches: Sequence[CatchTally], detection: Sequence[Threshold], table: ThresholdTable, felt: ThresholdTable
+) -> tuple[str, ...]:
+    """Of catch trials and detection runs. table: thresholds of direction, felt: of detection, both in newtons."""
+    broken = [_run(row) for row in detection if not row.complete]
+    bounds = [_run(row) for row in detection if row.complete and row.censored]
+    candidates = (
+        _lapsing(catches),
+        f"{_count(broken, 'detection run')} not complete and without a threshold: {listed(broken)}." if broken else "",
+        f"{_count(bounds, 'detection threshold')} only a lower bound: {listed(bounds)}." if bounds else "",
+        _undetected(detection),
+        _below_detection(table, felt),
+        *felt.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
 
@@ -110,12 +137,16 @@ def _unequal(table: ThresholdTable) -> str:
 
 
 def _at_chance(rows: Sequence[Threshold]) -> str:
-    guessed = [
+    guessed = _guessed(rows)
+    return f"Answers no better than chance (one-sided binomial test, 5 %): {listed(guessed)}." if guessed else ""
+
+
+def _guessed(rows: Sequence[Threshold]) -> list[str]:
+    return [
         f"{_run(row)} ({row.percent_correct:.0f} % right of {row.trials})"
         for row in rows
         if row.percent_correct is not None and not _better_than_chance(row.percent_correct, row.trials)
     ]
-    return f"Answers no better than chance (one-sided binomial test, 5 %): {listed(guessed)}." if guessed else ""
 
 
 def _better_than_chance(percent_correct: float, trials: int) -> bool:
@@ -149,6 +180,42 @@ def _flagged(trials: Iterable[Trial]) -> str:
 def _unmeasured(trials: Iterable[Trial]) -> str:
     count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
     return f"{count} counted trial{'s' if count != 1 else ''} without a measured acceleration." * bool(count)
+
+
+def _lapsing(catches: Sequence[CatchTally]) -> str:
+    lapsing = []
+    slow = [tally for tally in catches if tally.frequency_hz <= FELT_BY_ALL_HZ]
+    for subject in dict.fromkeys(tally.subject for tally in slow):
+        wrong = sum(tally.wrong for tally in slow if tally.subject == subject)
+        given = sum(tally.given for tally in slow if tally.subject == subject)
+        if wrong > MANY_LAPSES * given:
+            lower, upper = wilson_interval(wrong, given)
+            lapsing.append(f"{subject} ({wrong} of {given}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
+    if not lapsing:
+        return ""
+    return (
+        f"More than {100 * MANY_LAPSES:.0f} % wrong in catch trials at full level, up to {FELT_BY_ALL_HZ:g} Hz, where "
+        f"inattention raises a threshold: {listed(lapsing)}."
+    )
+
+
+def _undetected(detection: Sequence[Threshold]) -> str:
+    guessed = _guessed(detection)
+    return f"Vibration was not detected better than by chance: {listed(guessed)}." if guessed else ""
+
+
+def _below_detection(table: ThresholdTable, felt: ThresholdTable) -> str:
+    found = [
+        f"{one.subject} at {one.frequency_hz:g} Hz ({one.direction_n:.2f} N, detected from {one.detection_n:.2f} N)"
+        for one in directions_below_detection(table, felt)
+    ]
+    if not found:
+        return ""
+    return (
+        f"The direction was told at a level below that at which the vibration was felt: {listed(found)}. Two runs of "
+        f"one threshold differ by {REPEAT_SD_DB:g} dB (standard deviation); more than twice that asks for another cue "
+        "than touch, or a lapse of attention in the detection run."
+    )
 
 
 def _run(row: Threshold) -> str:

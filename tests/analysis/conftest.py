@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from protocols.apparatus import SafetySettings, TestDirections
+from protocols.exposure import CatchSettings, DetectionSettings
+from protocols.preparation import PracticeSettings
+from protocols.run_rules import staircase_rule
 from protocols.staircase import StaircaseState, begin, finished, level_n, step
 from protocols.staircase_rule import StaircaseRule, StepPhase
-from protocols.study_protocol import StimulusSettings, StudyProtocol
+from protocols.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
 from protocols.trial import Phase, Trial, TrialStatus
 
 PUBLISHED = StaircaseRule(
@@ -77,6 +80,23 @@ def simulated_run(
     return trials
 
 
+def caught_run(
+    generator: np.random.Generator, *, lapse: float, one_in: int, true_n: float = 0.6, **columns: object
+) -> list[Trial]:
+    """A test run with a catch trial in every block of `one_in`, wrong with the chance `lapse`; it steers nothing."""
+    steering, trials = simulated_run(true_n, generator, **columns), []
+    for trial in steering:
+        place = len(trials) % one_in
+        if place == one_in - 1:
+            wrong = bool(generator.random() < lapse)
+            shown = trial.direction_shown
+            answer = 3 - shown if wrong else shown
+            full = replace(trial, phase=Phase.CATCH, level_n=PUBLISHED.cap_n, correct=not wrong, answer=answer)
+            trials.append(replace(full, trial=len(trials) + 1, reversal=False))
+        trials.append(replace(trial, trial=len(trials) + 1))
+    return trials
+
+
 def played(
     rule: StaircaseRule, state: StaircaseState, template: Trial, correct: bool, shown: int
 ) -> tuple[StaircaseState, Trial]:
@@ -131,6 +151,11 @@ def simulate() -> Callable[..., list[Trial]]:
 
 
 @pytest.fixture
+def caught() -> Callable[..., list[Trial]]:
+    return caught_run
+
+
+@pytest.fixture
 def answered() -> Callable[..., list[Trial]]:
     return answered_run
 
@@ -162,3 +187,35 @@ def simulate_study() -> Callable[..., list[Trial]]:
         return trials
 
     return study
+
+
+@pytest.fixture
+def full_protocol(protocol: StudyProtocol) -> StudyProtocol:
+    """The protocol with training, practice, catch trials and a detection run."""
+    return replace(
+        protocol,
+        training=TrainingSettings(frequencies_hz=(5.0,)),
+        practice=PracticeSettings(frequencies_hz=(15.0, 35.0)),
+        catch=CatchSettings(one_in=10),
+        detection=DetectionSettings(frequencies_hz=(35.0,)),
+    )
+
+
+@pytest.fixture
+def everything(simulate_study: Callable[..., list[Trial]], full_protocol: StudyProtocol) -> list[Trial]:
+    """Three participants of `simulate_study` with every kind of trial beside the staircases."""
+    trials = [replace(trial, run=trial.run + 2) for trial in simulate_study(subjects=3)]
+    rule = staircase_rule(full_protocol, Phase.DETECTION)
+    generator = np.random.default_rng(6)
+    beside: list[Trial] = []
+    for subject in dict.fromkeys(trial.subject for trial in trials):
+        mine = {"subject": subject}
+        beside += simulated_run(0.5, generator, run=0, phase=Phase.TRAINING, frequency_hz=5.0, **mine)
+        for run, frequency in ((1, 15.0), (2, 35.0)):
+            practice = replace(TEMPLATE, run=run, phase=Phase.TRAINING, frequency_hz=frequency, level_n=2.0, **mine)
+            beside += [replace(practice, trial=number) for number in range(4)]
+        beside += simulated_run(0.1, generator, rule=rule, run=8, phase=Phase.DETECTION, frequency_hz=35.0, **mine)
+    for last in {(trial.subject, trial.run): trial for trial in trials}.values():
+        first = replace(last, trial=0, phase=Phase.CATCH, level_n=PUBLISHED.cap_n, correct=True)
+        beside.append(replace(first, answer=first.direction_shown, reversal=False))
+    return beside + trials

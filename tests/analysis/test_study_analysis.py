@@ -74,6 +74,24 @@ def test_training_alone_gives_no_threshold(simulate_study, protocol):
     assert (analysis.trials, analysis.thresholds) == ((), ())
 
 
+def test_detection_practice_and_catch_trials_change_no_threshold(everything, full_protocol, protocol):
+    analysis = analyse_study(everything, full_protocol)
+    plain = analyse_study([trial for trial in everything if trial.phase is Phase.TEST], protocol)
+    assert analysis.thresholds == plain.thresholds
+    assert analysis.anova == plain.anova
+    assert analysis.trials == plain.trials
+    assert (len(analysis.detection), len(analysis.catches), len(analysis.practice)) == (3, 15, 6)
+    assert {tally.wrong for tally in analysis.catches} == {0}
+    assert all(run.passed for run in analysis.practice)
+
+
+def test_a_study_of_detection_alone_has_thresholds_of_detection(everything, full_protocol):
+    alone = [trial for trial in everything if trial.phase is Phase.DETECTION]
+    analysis = analyse_study(alone, full_protocol)
+    assert (analysis.thresholds, len(analysis.detection)) == ((), 3)
+    assert analysis.detection_table.frequencies_hz == (35.0,)
+
+
 def test_two_kinds_of_participants_are_refused(simulate_study, protocol):
     people = [replace(trial, subject="p1", session="9", felt=True) for trial in simulate_study(subjects=1)]
     with pytest.raises(ValueError, match="trials of people and simulated participants cannot enter one analysis"):

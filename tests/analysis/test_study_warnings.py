@@ -1,12 +1,14 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from analysis.anova import one_way
 from analysis.repeated_measures import repeated_measures
 from analysis.study_analysis import analyse_study
 from analysis.study_warnings import design_difference
-from protocols.trial import TrialStatus
+from protocols.run_rules import staircase_rule
+from protocols.trial import Phase, TrialStatus
 
 
 @pytest.fixture
@@ -82,6 +84,64 @@ def test_a_second_run_at_a_frequency_is_named(able, protocol):
     again = [replace(trial, session="2") for trial in able if trial.subject == "s01" and trial.run == 1]
     (second,) = warnings([*able, *again], protocol)
     assert "completed more than one run" in second
+
+
+def test_detection_practice_and_catch_trials_of_able_people_are_no_warning(everything, full_protocol, protocol):
+    plain = warnings([trial for trial in everything if trial.phase is Phase.TEST], protocol)
+    assert warnings(everything, full_protocol) == plain
+
+
+def lapses(able, frequency, wrong):
+    """One catch trial before every run at this frequency; wrong: whether its answer is."""
+    runs = {(t.subject, t.run): t for t in able if t.frequency_hz == frequency}
+    return [
+        replace(t, phase=Phase.CATCH, trial=0, level_n=3.0, correct=not wrong, answer=1, direction_shown=1 + wrong)
+        for t in runs.values()
+    ]
+
+
+def test_lapses_at_low_frequencies_are_named_with_their_interval(able, protocol):
+    (sentence,) = warnings([*able, *lapses(able, 5.0, wrong=True)], protocol)
+    assert sentence.startswith("More than 10 % wrong in catch trials at full level, up to 15 Hz,")
+    assert "s01 (1 of 1; 95 % interval 21 to 100 %)" in sentence
+
+
+def test_an_error_at_full_level_and_high_frequency_is_no_lapse(able, protocol):
+    assert warnings([*able, *lapses(able, 45.0, wrong=True)], protocol) == ()
+    assert warnings([*able, *lapses(able, 5.0, wrong=False)], protocol) == ()
+
+
+@pytest.fixture
+def with_detection(full_protocol, simulate):
+    """One detection run of s01 at 35 Hz after the runs of the able, who tell the direction from 0.4 N."""
+
+    def rows(able, true_n):
+        rule = staircase_rule(full_protocol, Phase.DETECTION)
+        generator = np.random.default_rng(3)
+        return [*able, *simulate(true_n, generator, rule=rule, run=9, phase=Phase.DETECTION, frequency_hz=35.0)]
+
+    return rows
+
+
+def test_a_direction_below_the_detection_threshold_is_named(able, full_protocol, with_detection):
+    (sentence,) = warnings(with_detection(able, 2.0), full_protocol)
+    assert sentence.startswith("The direction was told at a level below that at which the vibration was felt: s01 at 35")
+    assert "differ by 2.4 dB" in sentence
+
+
+def test_a_vibration_that_is_felt_before_its_direction_is_as_it_should_be(able, full_protocol, with_detection):
+    assert warnings(with_detection(able, 0.05), full_protocol) == ()
+
+
+def test_somebody_who_feels_nothing_is_named(able, full_protocol, with_detection):
+    bound, chance, _ = warnings(with_detection(able, float("inf")), full_protocol)
+    assert bound == "1 detection threshold is only a lower bound: s01 at 35 Hz."
+    assert chance.startswith("Vibration was not detected better than by chance: s01 at 35 Hz (")
+
+
+def test_a_detection_run_that_was_broken_off_is_named(able, full_protocol, with_detection):
+    (sentence,) = warnings(with_detection(able, 0.05)[:-5], full_protocol)
+    assert sentence == "1 detection run is not complete and without a threshold: s01 at 35 Hz."
 
 
 DRUGS = ((30.0, 28.0, 16.0, 34.0), (14.0, 18.0, 10.0, 22.0), (24.0, 20.0, 18.0, 30.0), (38.0, 34.0, 20.0, 44.0))
