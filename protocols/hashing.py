@@ -4,8 +4,24 @@ import hashlib
 import json
 
 from protocols.dumping import protocol_values
+from protocols.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
+from protocols.preparation import ConsentSettings, DemoSettings, PracticeSettings, SetupSettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.study_protocol import StudyProtocol
+
+TABLES_SINCE = {
+    "consent": ConsentSettings(),
+    "setup": SetupSettings(),
+    "demo": DemoSettings(),
+    "practice": PracticeSettings(),
+    "detection": DetectionSettings(),
+    "catch": CatchSettings(),
+    "gate": GateSettings(),
+    "limits": SittingLimits(),
+    "debrief": (),
+}
+"""Tables that came after the first locks and sessions, as they are where nobody writes them: then they do not count,
+or an old fingerprint would fit no more."""
 
 
 def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
@@ -14,8 +30,15 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
     Comments, the order of keys, and whether a default is written out make no difference. The title and the source
     count: they, too, are what was fixed before data came in.
     """
+    values = protocol_values(protocol)
+    if isinstance(protocol, StudyProtocol):
+        for name, untouched in TABLES_SINCE.items():
+            if getattr(protocol, name) == untouched:
+                del values[name]
+        if not protocol.trial.device_buttons:
+            del values["trial"]["device_buttons"]
     # JSON writes 0.0 and -0.0 apart, though the values are equal.
-    text = json.dumps(protocol_values(protocol), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
     plain = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
     canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()

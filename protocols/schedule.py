@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from protocols.exposure import CatchSettings
 from protocols.study_protocol import ScheduleSettings, StudyProtocol
 from protocols.trial import Phase
 from protocols.williams import williams_rows
@@ -22,9 +23,11 @@ class Run:
     """One staircase."""
 
     index: int
-    """From 0, training runs first."""
+    """From 0: training, practice, test, detection."""
     phase: Phase
     frequency_hz: float
+    practice: bool = False
+    """A training run at a fixed level, with a criterion to pass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +39,15 @@ class Draw:
 
 
 def runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[Run, ...]:
-    """All runs of a sitting: training in the listed order, then the test runs in the order of the schedule."""
+    """All runs of a session: training and practice as listed, the test runs in the order of the schedule, detection."""
     order = frequency_order(protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number)
-    training = [(Phase.TRAINING, frequency_hz) for frequency_hz in protocol.training.frequencies_hz]
-    test = [(Phase.TEST, frequency_hz) for frequency_hz in order]
-    return tuple(Run(index, phase, frequency_hz) for index, (phase, frequency_hz) in enumerate(training + test))
+    planned = [
+        *((Phase.TRAINING, frequency_hz, False) for frequency_hz in protocol.training.frequencies_hz),
+        *((Phase.TRAINING, frequency_hz, True) for frequency_hz in protocol.practice.frequencies_hz),
+        *((Phase.TEST, frequency_hz, False) for frequency_hz in order),
+        *((Phase.DETECTION, frequency_hz, False) for frequency_hz in protocol.detection.frequencies_hz),
+    ]
+    return tuple(Run(index, *run) for index, run in enumerate(planned))
 
 
 def frequency_order(
@@ -68,6 +75,23 @@ def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: 
         block, place = divmod(trial, BLOCK)
         direction = 1 + _permutation(seed, (run, block), BLOCK)[place] % 2
     return Draw(direction, 1 if onset_polarity == "positive" else 1 - 2 * sign)
+
+
+def is_catch_trial(settings: CatchSettings, seed: int, run: int, trial: int) -> bool:
+    """Whether this trial of a test run is a catch trial: one in each block of `one_in`, its place drawn by lot."""
+    if not settings.one_in:
+        return False
+    block, place = divmod(trial, settings.one_in)
+    return keyed_words(seed, (run, block, _CATCH, 0), 1)[0] % settings.one_in == place
+
+
+def detection_direction(seed: int, run: int, trial: int, attempt: int) -> int:
+    """The direction, 1 or 2, of a detection trial's stimulus. Which interval holds it is a draw of its own."""
+    return 1 + (keyed_words(seed, (run, trial, attempt, _DETECTION), 1)[0] >> 63)
+
+
+_CATCH, _DETECTION = 0, 1
+"""Last part of keys that are one longer than a trial's."""
 
 
 def labels_swapped(settings: ScheduleSettings, frequencies: int, participant_number: int) -> bool:

@@ -42,8 +42,8 @@ def _times(protocol: StudyProtocol) -> list[Problem]:
             wrong = f"is {protocol.measurement.keep_s} s, less than one period of the lowest frequency"
             problems.append(Problem("measurement.keep_s", wrong, f"at least {period_s:g} s"))
     else:
-        wrong = "is empty, and so is training.frequencies_hz: nothing would be played"
-        problems.append(Problem("stimulus.frequencies_hz", wrong, "at least one frequency in either"))
+        wrong = "is empty, and so are training, practice and detection: nothing would be played"
+        problems.append(Problem("stimulus.frequencies_hz", wrong, "at least one frequency in one of them"))
     detection, fades_s = protocol.detection, protocol.stimulus.fade_in_s + protocol.stimulus.fade_out_s
     if detection.frequencies_hz and detection.interval_s <= fades_s:
         wrong = f"is {detection.interval_s} s, no longer than the fades together"

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from protocols.schedule import Run, draw_trial, label_of, labels_swapped
-from protocols.staircase import StaircaseState, level_n
+from protocols.schedule import Run, detection_direction, draw_trial, is_catch_trial, label_of, labels_swapped
+from protocols.staircase import StaircaseState, level_n, to_db
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase
@@ -23,7 +23,7 @@ class Present:
     level_db: float
     level_n: float
     label: int
-    """The number that is the right answer."""
+    """The number that is the right answer: of a direction, in a detection run of an interval."""
     direction: int
     """The protocol's direction to play; another number than the label where labels are swapped."""
     angle_deg: float
@@ -43,17 +43,27 @@ class Place:
 def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> Present:
     run, polarity = place.run, protocol.stimulus.onset_polarity
     draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, place.attempt)
+    label, direction = label_of(draw.direction, labels_are_swapped(protocol, opened)), draw.direction
+    if run.phase is Phase.DETECTION:  # the answer is an interval; the direction matters to nobody
+        label = draw.direction
+        direction = detection_direction(opened.seed, run.index, place.trial, place.attempt)
+    phase, level_db = run.phase, place.staircase.level_db
+    newton = level_n(rule, place.staircase)
+    if run.practice:
+        newton, level_db = protocol.practice.level_n, to_db(protocol.practice.level_n)
+    elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
+        phase, newton, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
     return Present(
         run=run.index,
         trial=place.trial,
         attempt=place.attempt,
-        phase=run.phase,
+        phase=phase,
         frequency_hz=run.frequency_hz,
-        level_db=place.staircase.level_db,
-        level_n=level_n(rule, place.staircase),
-        label=label_of(draw.direction, labels_are_swapped(protocol, opened)),
-        direction=draw.direction,
-        angle_deg=direction_angle_deg(protocol.directions, draw.direction),
+        level_db=level_db,
+        level_n=newton,
+        label=label,
+        direction=direction,
+        angle_deg=direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
     )
 

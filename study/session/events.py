@@ -20,6 +20,31 @@ from study.session.sitting_events import (
     PauseTaken,
 )
 
+__all__ = [
+    "EVENTS",
+    "SESSION_FORMAT",
+    "SESSION_VERSION",
+    "AnswerGiven",
+    "DemoFinished",
+    "DemoPlayed",
+    "DeviceChecked",
+    "DeviceFacts",
+    "Event",
+    "FormFilled",
+    "NoteTaken",
+    "PauseTaken",
+    "RestTaken",
+    "SessionClosed",
+    "SessionInterrupted",
+    "SessionOpened",
+    "SessionResumed",
+    "TrialMeasured",
+    "TrialPresented",
+    "TrialSpoiled",
+    "event_line",
+    "parse_event",
+]
+
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 SESSION_VERSION: Literal[1] = 1
 

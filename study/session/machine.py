@@ -3,7 +3,26 @@
 from dataclasses import dataclass
 
 from study.session.due_trial import Present
+from study.session.form_views import Form, FormKind
+from study.session.forms import form_of
+from study.session.sitting_state import minutes_between
 from study.session.state import SessionState, due
+from study.session.vibration_dose import a8_mps2
+
+
+@dataclass(frozen=True, slots=True)
+class FillIn:
+    form: Form
+
+
+@dataclass(frozen=True, slots=True)
+class CheckDevice:
+    """Before anybody holds the handle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demonstrate:
+    """Each direction at each frequency, labelled, as often as the participant wants."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,19 +31,70 @@ class Rest:
 
 
 @dataclass(frozen=True, slots=True)
+class Leave:
+    """The sitting must end here; the session can go on another time."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Finish:
     """Nothing is left to do."""
 
 
-Action = Present | Rest | Finish
+Preparation = FillIn | CheckDevice | Leave
+Action = Demonstrate | Present | Rest | FillIn | Leave | Finish
 
 
-def next_action(state: SessionState) -> Action:
-    """Raises ValueError while a trial is open: it must be answered, measured or spoiled first."""
+def next_preparation(state: SessionState) -> Preparation | None:
+    """What comes before the instructions, in each sitting; None when all is done. Simulated participants need none."""
+    sitting = state.sitting
+    if state.opened.observer is not None or state.finished:
+        return None
+    if sitting.refused:
+        return Leave(sitting.refused)
+    forms = (
+        (FormKind.CONSENT, sitting.consented),
+        (FormKind.EXCLUSION, sitting.included),
+        (FormKind.SETUP, sitting.setup_done),
+    )
+    for kind, done in forms:
+        form = None if done else form_of(state.protocol, kind)
+        if form is not None:
+            return FillIn(form)
+    return None if sitting.device_checked else CheckDevice()
+
+
+def next_action(state: SessionState, utc: str = "") -> Action:
+    """Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
+
+    utc: the time now, ISO 8601, against the limits of a sitting; empty where nobody is to be sent home.
+    """
     if state.presented is not None:
         raise ValueError("a trial is open; it must be closed before the next action")
+    person = state.opened.observer is None
     if state.finished:
-        return Finish()
+        form = form_of(state.protocol, FormKind.DEBRIEF) if person and not state.sitting.debriefed else None
+        return FillIn(form) if form is not None and not state.closed else Finish()
+    if person and utc and (reason := limit_reached(state, utc)):
+        return Leave(reason)
+    if person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
+        return Demonstrate()
     if state.rest_due_s > 0:
         return Rest(seconds=state.rest_due_s)
     return due(state)
+
+
+def limit_reached(state: SessionState, utc: str) -> str:
+    """Why this sitting must end; empty where it may go on."""
+    limits = state.protocol.limits
+    minutes = minutes_between(state.sitting.began_utc, utc)
+    if minutes >= limits.longest_min:
+        return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
+    dose = a8_mps2(state.sitting.dose) if state.sitting.moved_utc[:10] == utc[:10] else 0.0
+    if dose >= limits.dose_a8_mps2:
+        return (
+            f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "
+            "go on another day"
+        )
+    return ""

@@ -1,4 +1,4 @@
-"""From a folder of sessions to thresholds.csv, anova.json, figures and one report."""
+"""From a folder of sessions to thresholds.csv, detection.csv, anova.json, figures and one report."""
 
 import io
 from pathlib import Path
@@ -20,7 +20,7 @@ from study.store.json_document import write_json
 from study.store.provenance import Provenance, gather_provenance
 from study.store.recording_file import read_recording
 from study.store.text_file import write_text
-from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.workflows.collect_sessions import Collected, collect_sessions
 from study.workflows.written_analysis import WrittenAnalysis
 
@@ -31,6 +31,8 @@ FIGURE_DPI = 150
 
 OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
 """Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""
+
+OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, "anova.json", "report.html")
 
 
 def analyze_data(
@@ -96,7 +98,7 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
 def written_by_analysis(out: Path) -> tuple[Path, ...]:
     """The files in `out` that an analysis writes, as far as they are there."""
     figures = [path for name in OURS for kind in ("svg", "png") for path in (out / "figures").glob(f"{name}.{kind}")]
-    tables = [out / name for name in (THRESHOLDS_NAME, "anova.json", "report.html") if (out / name).is_file()]
+    tables = [out / name for name in OUR_FILES if (out / name).is_file()]
     return (*tables, *figures)
 
 
@@ -124,11 +126,13 @@ def _write(
     try:
         figures.mkdir(parents=True, exist_ok=True)
         for stale in written_by_analysis(out):
-            if stale.parent == figures:
+            if stale.parent == figures or stale.name == DETECTION_NAME:
                 stale.unlink()
     except OSError as problem:
         raise CannotWriteError(figures, problem) from problem
     write_thresholds(out / THRESHOLDS_NAME, analysis.thresholds)
+    if analysis.detection:
+        write_thresholds(out / DETECTION_NAME, analysis.detection)
     document = anova_document(analysis)
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)

@@ -80,13 +80,13 @@ def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> De
     others = sorted(set(owners.get(name, ())) - {HAPTEQ})
     if others:
         advice = f"Install hapteq into an environment of its own: {', '.join(others)} must not share one with it."
-        return DeviceFinding(f"Name {name}", f"belongs to {' and '.join(others)} as well", fine=False, advice=advice)
+        return DeviceFinding(f"import {name}", f"belongs to {' and '.join(others)} as well", fine=False, advice=advice)
     spec = importlib.util.find_spec(name)
     if spec is None or spec.origin is None or Path(spec.origin) != home / name / "__init__.py":
         where = "nowhere to be found" if spec is None or spec.origin is None else f"taken from {spec.origin}"
         advice = "Rename that file, or start hapteq without its folder on PYTHONPATH."
-        return DeviceFinding(f"Name {name}", where, fine=False, advice=advice)
-    return DeviceFinding(f"Name {name}", "hapteq's own", fine=True)
+        return DeviceFinding(f"import {name}", where, fine=False, advice=advice)
+    return DeviceFinding(f"import {name}", "hapteq's own", fine=True)
 
 
 def this_terminal() -> Terminal | None:

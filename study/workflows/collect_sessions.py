@@ -111,5 +111,9 @@ def _choose_protocol(
             f"'{protocol_name}' was asked for; {data} holds sessions of {there}.",
             "Give one of these names, or the first twelve digits of its hash.",
         )
-    # A protocol without test runs (practice) has nothing to analyse; it is chosen only where there is no other.
-    return max(named, key=lambda key: (bool(named[key][0].protocol.stimulus.frequencies_hz), len(named[key])))
+    # A protocol of training alone has nothing to analyse; it is chosen only where there is no other.
+    return max(named, key=lambda key: (_measures(named[key][0].protocol), len(named[key])))
+
+
+def _measures(protocol: StudyProtocol) -> bool:
+    return bool(protocol.stimulus.frequencies_hz or protocol.detection.frequencies_hz)

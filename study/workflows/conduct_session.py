@@ -1,7 +1,7 @@
 """A whole sitting, from opening the device to closing the log."""
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from equalizer.tracking.equalizer import Identity
 from study.devices.clock import Clock
@@ -9,6 +9,9 @@ from study.devices.device import Device, Fault
 from study.devices.opening import open_device
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
+from study.store.live_file import write_live
+from study.store.request_inbox import RequestInbox
+from study.workflows.attendant import Attendant
 from study.workflows.display import Display, Hand
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import (
@@ -18,6 +21,7 @@ from study.workflows.open_session import (
     device_settings,
     opened_session,
 )
+from study.workflows.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.resume_session import resumed_session
 from study.workflows.run_session import run_session
 from study.workflows.sitting import Sitting
@@ -30,6 +34,8 @@ class Participant:
     display: Display
     hand: Hand
     clock: Clock
+    requests: Requests = field(default_factory=QueuedRequests)
+    """What is asked for from within this program: notes typed at the display, a stop from its other screens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +46,8 @@ class Conducted:
     """Why the sitting ended before the session was finished; empty where it is finished."""
     fault: Fault
     """What was wrong with the device, if that was why."""
+    withdrawn: bool = False
+    """The participant takes the consent back: whoever conducted this erases the data."""
 
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> Conducted:
@@ -65,14 +73,28 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
 
 
 def _run(opened: OpenedSession, device: Device, participant: Participant) -> Conducted:
+    folder, protocol = opened.folder, opened.state.protocol
+    place_m = device_settings(protocol).place_m
+    inbox = RequestInbox(folder.path)
+    inbox.clear()
+    attendant = Attendant(
+        device,
+        participant.clock,
+        ManyRequests(participant.requests, inbox),
+        tell=lambda live: write_live(folder.path, live),
+        buttons=protocol.trial.device_buttons,
+        place_m=place_m,
+    )
     sitting = Sitting(
-        folder=opened.folder,
+        folder=folder,
         log=opened.log,
         clock=participant.clock,
         device=device,
         equalizer=Identity(),
         display=participant.display,
         hand=participant.hand,
+        attendant=attendant,
+        place_m=place_m,
     )
     end = run_session(opened.state, sitting)
-    return Conducted(opened.folder, end.state, end.left, end.fault)
+    return Conducted(folder, end.state, end.left, end.fault, end.withdrawn)

@@ -8,7 +8,8 @@ from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
 from study.session.draw_check import LogContradiction
 from study.session.events import SessionOpened
-from study.session.state import SessionState, apply, begin_session
+from study.session.fold import apply, begin_session
+from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import LogContents, read_log
 
@@ -36,7 +37,7 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             "Give the folder its own name back, or take the copy away.",
             saved="Nothing was changed.",
         )
-    state = begin_session(opened, _protocol_of(opened, folder))
+    state = begin_session(opened, protocol_of(opened, folder))
     for number, event in enumerate(contents.events[1:], start=2):
         try:
             state = apply(state, event)
@@ -50,7 +51,8 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
     return FoldedSession(state, contents)
 
 
-def _protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
+def protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
+    """The protocol that a log carries. Raises StudyError where it cannot be read, or is not the one that was begun."""
     try:
         protocol = load_protocol(opened.protocol_text, f"the log of {folder.name}")
     except ProtocolError as problem:

@@ -128,13 +128,15 @@ _TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
         "trials.csv",
         Trial,
         "One row per presentation. Further columns may follow. `felt` is false where a person answered while no device "
-        "moved, and empty for simulated participants.",
+        "moved, and empty for simulated participants. In rows of the phase `catch` the level is the cap, and the "
+        "staircase does not move; in rows of the phase `detection`, `direction_shown` and `answer` are intervals.",
     ),
     (
         "thresholds.csv",
         Threshold,
         "One row per run. `threshold_n` is the arithmetic mean of the averaged levels in newtons, `threshold_db` the "
-        "mean of the same levels in dB re 1 N; then the same threshold in delivered m/s² and mm.",
+        "mean of the same levels in dB re 1 N; then the same threshold in delivered m/s² and mm. `detection.csv` has "
+        "the same columns, one row per detection run; its `d_prime` is that of two intervals.",
     ),
 )
 

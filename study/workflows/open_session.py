@@ -12,8 +12,9 @@ from study.devices.clock import Clock
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
+from study.session.fold import begin_session
 from study.session.limits import limits_of_study
-from study.session.state import SessionState, begin_session
+from study.session.state import SessionState
 from study.store.archive import SessionFolder, new_session_folder
 from study.store.event_log import EventLog
 from study.store.provenance import versions

@@ -14,7 +14,7 @@ from study.store.file_errors import UnusableFileError
 from study.store.identified_model_file import read_identified_model
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
-from study.store.thresholds_file import THRESHOLDS_HEADER, read_thresholds
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_HEADER, read_thresholds
 from study.store.trajectory_file import read_trajectory
 from study.store.trials_file import TRIALS_HEADER, read_trials
 from study.workflows.file_content import FileContent
@@ -101,7 +101,8 @@ def recognise_trials(content: FileContent) -> str | None:
 def recognise_thresholds(content: FileContent) -> str | None:
     if content.header[:2] != THRESHOLDS_HEADER[:2] and header_problem(content.header, THRESHOLDS_HEADER):
         return None
-    return f"table of {_count(len(read_thresholds(content.path)), 'threshold')}"
+    what = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"
+    return f"table of {_count(len(read_thresholds(content.path)), what)}"
 
 
 def _count(number: int, what: str) -> str:

@@ -1,5 +1,6 @@
 """The port of requests: what watchers and second screens ask of a running session."""
 
+from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from study.session.requests import Request
@@ -11,8 +12,29 @@ class Requests(Protocol):
         ...
 
 
-class NoRequests:
-    """Nobody can reach the session."""
+class QueuedRequests:
+    """From within the program: `send` may be called from any thread."""
+
+    def __init__(self) -> None:
+        self._queue: SimpleQueue[Request] = SimpleQueue()
+
+    def send(self, request: Request) -> None:
+        self._queue.put(request)
 
     def take(self) -> tuple[Request, ...]:
-        return ()
+        taken = []
+        while True:
+            try:
+                taken.append(self._queue.get_nowait())
+            except Empty:
+                return tuple(taken)
+
+
+class ManyRequests:
+    """Several sources as one."""
+
+    def __init__(self, *sources: Requests) -> None:
+        self._sources = sources
+
+    def take(self) -> tuple[Request, ...]:
+        return tuple(request for source in self._sources for request in source.take())

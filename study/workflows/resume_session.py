@@ -10,7 +10,8 @@ from study.errors import StudyError
 from study.session.delivered import delivered
 from study.session.due_trial import labels_are_swapped
 from study.session.events import SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
-from study.session.state import SessionState, apply
+from study.session.fold import apply
+from study.session.state import SessionState
 from study.session.stimulus import direction_vector
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend

@@ -1,19 +1,25 @@
 """The loop of a session: ask the machine what is next, do it, log it, until nothing is left."""
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from protocols.practice import practice_passed, practised, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
-from study.session.machine import Finish, Rest, next_action
+from study.session.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
+from study.session.progress import progress
 from study.session.state import SessionState, felt
-from study.session.views import Goodbye, RestNotice, Welcome, picture_of
+from study.session.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
+from study.workflows.after_trial import AfterTrial
+from study.workflows.demonstrate import demonstrate
 from study.workflows.fold_session import fold_session
-from study.workflows.present_trial import AfterTrial, present_trial
-from study.workflows.sitting import Sitting, record
+from study.workflows.prepare_sitting import fill_in, prepare_sitting
+from study.workflows.present_trial import present_trial
+from study.workflows.sitting import Sitting, record, write_notes
+from study.workflows.take_pause import take_pause
 
 VOID_TRIALS_IN_A_ROW = 3
 """After so many presentations that nobody asked to repeat were void, the sitting ends: nobody is there, or the device
@@ -27,6 +33,8 @@ class SessionEnd:
     """Why the sitting ended before the session was finished; empty where it is finished."""
     fault: Fault = Fault.NONE
     """What was wrong with the device, if that was why."""
+    withdrawn: bool = False
+    """The participant takes the consent back: the data are to be erased."""
 
 
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
@@ -36,8 +44,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     on the way leaves with the number of answers that are on disk, and how to go on.
     """
     try:
-        sitting.display.welcome(_welcome(state, sitting))
-        end = _loop(state, sitting)
+        end = _sit(state, sitting)
     except KeyboardInterrupt as interruption:
         sitting.device.stop()
         return _interrupted(sitting, interruption)
@@ -47,8 +54,17 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     except BaseException:
         sitting.device.stop()
         raise
-    sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers))
+    sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers, reason=end.left))
     return end
+
+
+def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
+    state, refused = prepare_sitting(state, sitting)
+    if refused:
+        return _end(AfterTrial(state, leave=refused), sitting)
+    sitting.attendant.begin("instructions")
+    sitting.display.welcome(_welcome(state, sitting))
+    return _loop(state, sitting)
 
 
 def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
@@ -80,29 +96,74 @@ def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
 def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
     voids = 0
     while True:
-        match next_action(state):
-            case Finish():
-                closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
-                return SessionEnd(record(state, closed, sitting), left="")
-            case Rest(seconds=seconds):
-                state = _rest(state, seconds, sitting)
-            case Present() as present:
-                after = present_trial(state, present, sitting)
-                state = after.state
-                voids = voids + 1 if after.void else 0
-                leave = after.leave or _too_many(voids, after.void)
-                if leave:
-                    left = SessionInterrupted(utc=sitting.clock.utc(), reason=leave)
-                    return SessionEnd(record(state, left, sitting), leave, after.fault)
-                _between_trials(after, present, sitting, state)
+        state = write_notes(state, sitting)
+        action = next_action(state, sitting.clock.utc())
+        if isinstance(action, Finish):
+            closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
+            return SessionEnd(record(state, closed, sitting), left="")
+        after = _act(state, action, sitting)
+        voids = voids + 1 if after.void else 0
+        if too_many := _too_many(voids, after.void):
+            after = replace(after, leave=after.leave or too_many)
+        pause = _pause_wanted(after, sitting)
+        if pause and not after.leave:
+            broken = take_pause(after.state, pause, sitting)
+            after = replace(after, state=broken.state, leave=broken.leave)
+            if broken.withdrawn:
+                return replace(_end(after, sitting), withdrawn=True)
+        if stopped := sitting.attendant.stop_asked:
+            after = replace(after, leave=after.leave or f"the {stopped} stopped the session")
+        if after.leave:
+            return _end(after, sitting)
+        state = after.state
 
 
-def _between_trials(after: AfterTrial, present: Present, sitting: Sitting, state: SessionState) -> None:
+def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
+    match action:
+        case Leave(reason=reason):
+            return AfterTrial(state, leave=reason)
+        case Rest(seconds=seconds):
+            return AfterTrial(_rest(state, seconds, sitting))
+        case FillIn(form=form):
+            return AfterTrial(fill_in(state, form, sitting))
+        case Demonstrate():
+            return demonstrate(state, sitting)
+        case Present() as present:
+            after = present_trial(state, present, sitting)
+            if not after.leave:
+                _between_trials(after, present, state, sitting)
+            return after
+        case Finish():
+            return AfterTrial(state)
+
+
+def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
+    state = write_notes(after.state, sitting)
+    left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
+    return SessionEnd(record(state, left, sitting), after.leave, after.fault)
+
+
+def _pause_wanted(after: AfterTrial, sitting: Sitting) -> str:
+    sitting.attendant.listen()
+    who = sitting.attendant.pause_asked
+    return after.pause or (f"the {who} asked for a pause" if who else "")
+
+
+def _between_trials(after: AfterTrial, present: Present, before: SessionState, sitting: Sitting) -> None:
     if after.void:
         sitting.display.await_return(after.void)
-    if after.correct is not None and _feedback_wanted(state, present.phase):
-        sitting.display.feedback(after.correct)
-    sitting.clock.sleep(state.protocol.trial.pause_between_s)
+    if after.correct is not None:
+        if _feedback_wanted(before, present):
+            sitting.display.feedback(after.correct)
+        if before.runs[present.run].practice and after.state.run > before.run:
+            sitting.display.practice_over(_practice_result(before, after.correct))
+    sitting.clock.sleep(before.protocol.trial.pause_between_s)
+
+
+def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
+    settings, done = before.protocol.practice, practised(before.practice, correct)
+    asked = min(settings.of_last, len(done.correct))
+    return PracticeResult(practice_passed(settings, done), right_of_last(settings, done), asked)
 
 
 def _too_many(voids: int, reason: str) -> str:
@@ -110,14 +171,21 @@ def _too_many(voids: int, reason: str) -> str:
 
 
 def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
-    notice = RestNotice(seconds=seconds, runs_left=len(state.runs) - state.run)
-    rested_s = sitting.display.rest(notice)
+    """A rest that a pause or a stop cuts short counts for nothing: it is due again afterwards."""
+    sitting.attendant.begin("rest")
+    notice = RestNotice(seconds, len(state.runs) - state.run, progress(state, sitting.clock.utc()))
+    rested_s = sitting.display.rest(notice, sitting.attendant.glance)
+    if rested_s < seconds and (sitting.attendant.stop_asked or sitting.attendant.pause_asked):
+        return state
     event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)
     return record(state, event, sitting)
 
 
-def _feedback_wanted(state: SessionState, phase: Phase) -> bool:
-    settings = state.protocol.training if phase is Phase.TRAINING else state.protocol.trial
+def _feedback_wanted(state: SessionState, present: Present) -> bool:
+    protocol, run = state.protocol, state.runs[present.run]
+    if run.practice:
+        return protocol.practice.feedback == "after_answer"
+    settings = protocol.training if run.phase is Phase.TRAINING else protocol.trial
     return settings.feedback == "after_answer"
 
 

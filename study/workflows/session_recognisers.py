@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from analysis.thresholds import thresholds
+from analysis.detection import detection_thresholds
+from analysis.thresholds import Threshold, thresholds
 from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
 from study.errors import StudyError
@@ -12,7 +13,7 @@ from study.store.event_log import LOG_NAME
 from study.store.file_errors import UnusableFileError
 from study.store.json_document import read_json
 from study.store.provenance import sha256_of
-from study.store.thresholds_file import THRESHOLDS_NAME, read_thresholds
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.workflows.file_content import FileContent
 from study.workflows.fold_session import FoldedSession, fold_session
@@ -114,15 +115,22 @@ def _table_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
 
 
 def _threshold_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
-    table = folder.path / THRESHOLDS_NAME
+    trials, protocol = folded.state.trials, folded.state.protocol
+    return [
+        *_computed_problems(folder.path / THRESHOLDS_NAME, thresholds(trials, protocol.staircase)),
+        *_computed_problems(folder.path / DETECTION_NAME, detection_thresholds(trials, protocol)),
+    ]
+
+
+def _computed_problems(table: Path, computed: tuple[Threshold, ...]) -> list[str]:
     if not table.exists():
         return []
     try:
-        if read_thresholds(table) == thresholds(folded.state.trials, folded.state.protocol.staircase):
+        if read_thresholds(table) == computed:
             return []
     except UnusableFileError as error:
-        return [f"{THRESHOLDS_NAME}: {problem}" for problem in error.problems]
-    return [f"{THRESHOLDS_NAME} does not agree with the log; hapteq analyze computes it anew"]
+        return [f"{table.name}: {problem}" for problem in error.problems]
+    return [f"{table.name} does not agree with the log; hapteq analyze computes it anew"]
 
 
 def _described(folded: FoldedSession) -> str:

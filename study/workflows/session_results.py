@@ -2,12 +2,13 @@
 
 from dataclasses import asdict
 
+from analysis.detection import detection_thresholds
 from analysis.thresholds import thresholds
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.json_document import write_json
 from study.store.provenance import gather_provenance
-from study.store.thresholds_file import THRESHOLDS_NAME, write_thresholds
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.trials_file import TRIALS_NAME, write_trials
 from study.workflows.analyze_data import ANALYSIS_NAME, analyze_data
 from study.workflows.fold_session import fold_session
@@ -19,11 +20,13 @@ SUMMARY_VERSION = 1
 
 
 def write_tables(folder: SessionFolder) -> SessionState:
-    """trials.csv, thresholds.csv and session.json, from the log alone."""
+    """trials.csv, thresholds.csv, detection.csv (where there are such runs) and session.json, from the log alone."""
     state = fold_session(folder).state
     write_trials(folder.path / TRIALS_NAME, state.trials)
     rows = thresholds(state.trials, state.protocol.staircase)
     write_thresholds(folder.path / THRESHOLDS_NAME, rows)
+    if detection := detection_thresholds(state.trials, state.protocol):
+        write_thresholds(folder.path / DETECTION_NAME, detection)
     _write_summary(folder, state)
     return state
 

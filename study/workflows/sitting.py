@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from equalizer.tracking.equalizer import Equalizer
 from study.devices.clock import Clock
 from study.devices.device import Device
-from study.session.events import Event
-from study.session.state import SessionState, apply
+from study.session.events import Event, NoteTaken
+from study.session.fold import apply
+from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog
+from study.workflows.attendant import Attendant
 from study.workflows.display import Display, Hand
 
 
@@ -21,6 +23,9 @@ class Sitting:
     equalizer: Equalizer
     display: Display
     hand: Hand
+    attendant: Attendant
+    place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the spring's centre, where the handle belongs."""
 
 
 def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
@@ -28,3 +33,11 @@ def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
     after = apply(state, event)
     sitting.log.append(event)
     return after
+
+
+def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
+    """What was noted meanwhile, by whomever."""
+    for note in sitting.attendant.take_notes():
+        event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
+        state = record(state, event, sitting)
+    return state

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Health, Played
 from study.session.delivered import Delivered
@@ -41,14 +43,16 @@ def presented(present: Present, sitting: Sitting) -> TrialPresented:
     )
 
 
-def spoiled(present: Present, reason: str, health: Health, sitting: Sitting) -> TrialSpoiled:
+def spoiled(present: Present, reason: str, health: Health | None, sitting: Sitting) -> TrialSpoiled:
+    """health: None where nothing was played yet."""
     return TrialSpoiled(
         utc=sitting.clock.utc(),
         run=present.run,
         trial=present.trial,
         attempt=present.attempt,
         reason=reason,
-        missed_ticks=health.missed_ticks,
+        missed_ticks=health.missed_ticks if health else None,
+        vibrated_s=_seconds(health, sitting) if health else 0.0,
     )
 
 
@@ -73,7 +77,22 @@ def measured(present: Present, outcome: Outcome, state: SessionState, sitting: S
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
         missed_ticks=outcome.played.health.missed_ticks,
+        vibrated_s=_seconds(outcome.played.health, sitting),
+        offset_mm=_farthest_mm(outcome.played, sitting),
     )
+
+
+def _seconds(health: Health, sitting: Sitting) -> float:
+    """From the onset to stillness, fades included."""
+    return health.ticks / sitting.device.info.sample_rate_hz
+
+
+def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
+    """How far the handle was from its place at the most, while it was recorded."""
+    if played.recording is None or played.recording.position is None:
+        return None
+    offset_m = np.linalg.norm(played.recording.position.samples - np.asarray(sitting.place_m), axis=1)
+    return 1000.0 * float(np.nanmax(offset_m)) if np.isfinite(offset_m).any() else None
 
 
 def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> dict[str, Any]:

@@ -146,10 +146,11 @@ def test_a_value_where_a_table_belongs_is_refused(threshold_text):
 
 def test_a_study_without_any_frequency_is_refused(threshold_text):
     text = changed(threshold_text, "[5.0, 15.0, 25.0, 35.0, 45.0]", "[]")
+    text = changed(text, "[15.0, 25.0, 35.0, 45.0]", "[]")
     error = refused(changed(text, "frequencies_hz = [5.0]", "frequencies_hz = []"))
     assert error.key == "stimulus.frequencies_hz"
-    assert error.problem == "is empty, and so is training.frequencies_hz: nothing would be played"
-    assert error.allowed == "at least one frequency in either"
+    assert error.problem == "is empty, and so are training, practice and detection: nothing would be played"
+    assert error.allowed == "at least one frequency in one of them"
 
 
 def test_a_list_that_may_not_be_empty_says_so(threshold_text):

@@ -6,10 +6,23 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy import stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.schedule import Draw, draw_trial, frequency_order, keyed_words, label_of, labels_swapped, runs
+from protocols.exposure import CatchSettings, DetectionSettings
+from protocols.preparation import PracticeSettings
+from protocols.schedule import (
+    Draw,
+    detection_direction,
+    draw_trial,
+    frequency_order,
+    is_catch_trial,
+    keyed_words,
+    label_of,
+    labels_swapped,
+    runs,
+)
 from protocols.study_protocol import ScheduleSettings
 from protocols.trial import Phase
 
@@ -28,14 +41,40 @@ def neighbour_correlation(values: np.ndarray) -> float:
 
 def test_training_comes_first_and_then_every_frequency_once(threshold):
     plan = runs(threshold, seed=3, participant_number=0)
-    assert [run.index for run in plan] == list(range(6))
-    assert [run.phase for run in plan] == [Phase.TRAINING] + [Phase.TEST] * 5
-    assert plan[0].frequency_hz == 5.0
-    assert sorted(run.frequency_hz for run in plan[1:]) == list(FIVE)
+    assert [run.index for run in plan] == list(range(10))
+    assert [run.phase for run in plan] == [Phase.TRAINING] * 5 + [Phase.TEST] * 5
+    assert [run.practice for run in plan] == [False] + [True] * 4 + [False] * 5
+    assert [run.frequency_hz for run in plan[:5]] == list(FIVE)
+    assert sorted(run.frequency_hz for run in plan[5:]) == list(FIVE)
+
+
+def test_detection_runs_come_last(threshold):
+    asked = replace(threshold, detection=DetectionSettings(frequencies_hz=(45.0, 35.0)))
+    assert [(run.phase, run.frequency_hz) for run in runs(asked, seed=3, participant_number=0)[-2:]] == [
+        (Phase.DETECTION, 45.0),
+        (Phase.DETECTION, 35.0),
+    ]
+
+
+def test_one_trial_in_each_block_is_a_catch_trial_at_a_place_that_is_drawn():
+    settings_ = CatchSettings(one_in=10)
+    caught = [trial for trial in range(4000) if is_catch_trial(settings_, 5, 0, trial)]
+    assert [trial // 10 for trial in caught] == list(range(400))
+    places = np.bincount([trial % 10 for trial in caught], minlength=10)
+    assert stats.chisquare(places).pvalue > 1e-3
+    assert caught != [trial for trial in range(4000) if is_catch_trial(settings_, 6, 0, trial)]
+    assert not any(is_catch_trial(CatchSettings(), 5, 0, trial) for trial in range(100))
+
+
+def test_the_direction_of_a_detection_trial_tells_nothing_of_its_interval():
+    intervals = np.array([draw_trial(RANDOM, "random", 7, 2, trial, 0).direction for trial in range(4000)])
+    along = np.array([detection_direction(7, 2, trial, 0) for trial in range(4000)])
+    assert set(along) == {1, 2}
+    assert abs(np.corrcoef(intervals, along)[0, 1]) < 0.06
 
 
 def test_training_alone_has_no_test_run(threshold):
-    alone = replace(threshold, stimulus=replace(threshold.stimulus, frequencies_hz=()))
+    alone = replace(threshold, stimulus=replace(threshold.stimulus, frequencies_hz=()), practice=PracticeSettings())
     assert [run.phase for run in runs(alone, seed=3, participant_number=0)] == [Phase.TRAINING]
     williams = replace(alone, schedule=ScheduleSettings(order="williams", labels="swapped_for_half"))
     assert len(runs(williams, seed=3, participant_number=0)) == 1

@@ -23,8 +23,8 @@ from study.session.events import (
     event_line,
     parse_event,
 )
+from study.session.fold import apply, begin_session
 from study.session.machine import Finish, Present, Rest, next_action
-from study.session.state import apply, begin_session
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 

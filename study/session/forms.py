@@ -1,0 +1,121 @@
+"""The forms of a sitting, made from its protocol, and what a filled one means."""
+
+from dataclasses import dataclass
+
+from protocols.preparation import ConsentSettings, DebriefQuestion, SetupSettings
+from protocols.study_protocol import StudyProtocol
+from study.session.form_views import Form, FormField, FormKind, FormReply
+
+YES_NO = ("yes", "no")
+HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothing")
+
+
+@dataclass(frozen=True, slots=True)
+class FormOutcome:
+    passed: bool
+    kept: dict[str, str]
+    """Of the answers, what goes into the log."""
+    reminders: tuple[str, ...] = ()
+    """Where the set-up is not what the protocol asks for."""
+
+
+def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
+    """None where the protocol asks nothing of that kind."""
+    match kind:
+        case FormKind.CONSENT:
+            return _consent(protocol.consent) if protocol.consent.statements else None
+        case FormKind.EXCLUSION:
+            return _exclusion(protocol.consent) if protocol.consent.exclusions else None
+        case FormKind.SETUP:
+            return _setup(protocol.setup) if protocol.setup.ask else None
+        case FormKind.DEBRIEF:
+            return _debrief(protocol.debrief) if protocol.debrief else None
+
+
+def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> FormOutcome:
+    answers = {key: answer.strip() for key, answer in reply.answers.items()}
+    match kind:
+        case FormKind.CONSENT:
+            return FormOutcome(all(answer == "yes" for answer in answers.values()), answers)
+        case FormKind.EXCLUSION:
+            # Which question it was is about somebody's health, and no study needs it.
+            return FormOutcome(all(answer == "no" for answer in answers.values()), {})
+        case FormKind.SETUP:
+            return FormOutcome(True, answers, _reminders(protocol.setup, answers))
+        case FormKind.DEBRIEF:
+            return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
+
+
+def _consent(settings: ConsentSettings) -> Form:
+    fields = tuple(
+        FormField(f"statement_{number}", statement, YES_NO)
+        for number, statement in enumerate(settings.statements, start=1)
+    )
+    return Form(
+        FormKind.CONSENT,
+        "Consent",
+        "Please read each statement. The study begins only if you agree to all of them.",
+        fields,
+        settings.version,
+        settings.ethics_id,
+    )
+
+
+def _exclusion(settings: ConsentSettings) -> Form:
+    fields = tuple(
+        FormField(f"question_{number}", question, YES_NO)
+        for number, question in enumerate(settings.exclusions, start=1)
+    )
+    return Form(
+        FormKind.EXCLUSION,
+        "Before anything moves",
+        "With one yes you cannot take part today. Your answers are not kept, only whether you can take part.",
+        fields,
+        settings.version,
+        settings.ethics_id,
+    )
+
+
+def _setup(settings: SetupSettings) -> Form:
+    wanted = "The protocol asks for {}."
+    return Form(
+        FormKind.SETUP,
+        "How you sit",
+        "Arrange these with the experimenter; they are kept with the data.",
+        (
+            FormField("hearing", _asked("What covers the sound of the device?", wanted.format(
+                "ear protection or masking noise (hapteq noise makes a file)"), settings.hearing_masked), HEARING),
+            FormField("hand_hidden", _asked("Is the hand hidden from your eyes?", wanted.format("a hidden hand"),
+                                            settings.hand_hidden), YES_NO),
+            FormField("arm_supported", _asked("Does your forearm rest on a support?", wanted.format("a supported arm"),
+                                              settings.arm_supported), YES_NO),
+            FormField("grip", f"How do you hold the handle? Asked for: {settings.grip}.",
+                      ("pen grip", "whole hand", "finger tips", "other")),
+            FormField("hand", "Which hand holds it?", ("right", "left")),
+        ),
+    )  # fmt: skip
+
+
+def _asked(question: str, wish: str, wished: bool) -> str:
+    return f"{question} {wish}" if wished else question
+
+
+def _reminders(settings: SetupSettings, answers: dict[str, str]) -> tuple[str, ...]:
+    differing = (
+        (settings.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
+        (settings.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
+        (settings.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
+    )
+    return tuple(f"The set-up is not the protocol's: {what}." for differs, what in differing if differs)
+
+
+def _debrief(questions: tuple[DebriefQuestion, ...]) -> Form:
+    return Form(
+        FormKind.DEBRIEF,
+        "Looking back",
+        "A few questions to end with. Free text may stay empty.",
+        tuple(
+            FormField(question.key, question.question, question.choices, needed=bool(question.choices))
+            for question in questions
+        ),
+    )

@@ -1,0 +1,80 @@
+"""Play one stimulus and get its answer: held until the answer, or, in a detection trial, in one of two intervals."""
+
+from dataclasses import dataclass
+
+from protocols.trial import Phase
+from study.devices.device import Fault, Played
+from study.session.due_trial import Present
+from study.session.held_stimulus import HeldStimulus
+from study.session.state import SessionState
+from study.session.stimulus import direction_vector, held_stimulus
+from study.session.views import Answered, PlayingNotice, Question, Reply, Unanswered
+from study.workflows.release import released
+from study.workflows.sitting import Sitting
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    reply: Reply
+    started_s: float
+    """From when on an answer could be given."""
+    felt_whole: bool
+    """Nothing was wrong with the stimulus when the answer came. What happens to it afterwards, while a slow disk
+    holds us up, cannot spoil the answer."""
+    played: Played | None
+    """Of a stimulus that is over before the question; None where it is still held, or was never begun."""
+    holding: bool
+    """It must still be released."""
+
+
+def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+    sitting.attendant.begin("trial")
+    if present.phase is Phase.DETECTION:
+        return _in_one_of_two_intervals(state, present, question, sitting)
+    sitting.device.hold(_stimulus(state, present, sitting))
+    sitting.hand.feel(present, state.answers)
+    started_s = sitting.clock.now_s()
+    reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+    sitting.device.keep_alive()
+    return Asked(reply, started_s, sitting.device.fault() is Fault.NONE, played=None, holding=True)
+
+
+def _in_one_of_two_intervals(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+    played: Played | None = None
+    sitting.hand.feel(present, state.answers)
+    for interval in (1, 2):
+        holding = interval == present.label
+        if holding:
+            sitting.device.hold(_stimulus(state, present, sitting))
+        cut = _wait(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
+        if cut is not None:
+            return Asked(cut, sitting.clock.now_s(), False, played, holding)
+        if holding:
+            played = released(sitting)
+        cut = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
+        if cut is not None:
+            return Asked(cut, sitting.clock.now_s(), False, played, holding=False)
+    started_s = sitting.clock.now_s()
+    reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+    whole = played is not None and played.health.fault is Fault.NONE
+    return Asked(reply, started_s, whole, played, holding=False)
+
+
+def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
+    """A button pressed during an interval answers nothing yet."""
+    reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.attendant.glance)
+    if reply is None and sitting.attendant.glance():
+        return None
+    resolved = sitting.attendant.resolve(reply or Unanswered("the stimulus ended early", leave=False))
+    return Unanswered("answered before both intervals", leave=False) if isinstance(resolved, Answered) else resolved
+
+
+def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldStimulus:
+    return held_stimulus(
+        state.protocol.stimulus,
+        direction_vector(state.protocol.directions, present.direction),
+        present.frequency_hz,
+        present.polarity * present.level_n,
+        sitting.equalizer,
+        sitting.device.info.sample_rate_hz,
+    )

@@ -1,0 +1,55 @@
+"""Before the instructions, in each sitting: consent, exclusion, the set-up, and a look at the device."""
+
+from study.session.events import DeviceChecked, FormFilled
+from study.session.form_views import Form
+from study.session.forms import judge_form
+from study.session.machine import CheckDevice, FillIn, Leave, next_preparation
+from study.session.requests import NoteAsked
+from study.session.state import SessionState
+from study.workflows.check_device import check_device
+from study.workflows.sitting import Sitting, record, write_notes
+
+
+def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState, str]:
+    """Returns why the sitting ends before it began; empty where it goes on."""
+    while (due := next_preparation(state)) is not None:
+        match due:
+            case Leave(reason=reason):
+                return state, reason
+            case FillIn(form=form):
+                state = fill_in(state, form, sitting)
+            case CheckDevice():
+                state = _check_device(state, sitting)
+        state = write_notes(state, sitting)
+        if sitting.attendant.stop_asked is not None:
+            return state, f"the {sitting.attendant.stop_asked} stopped the session"
+    return state, ""
+
+
+def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
+    sitting.attendant.begin("form")
+    outcome = judge_form(state.protocol, form.kind, sitting.display.fill_in(form))
+    event = FormFilled(
+        utc=sitting.clock.utc(),
+        form=form.kind.value,
+        version=form.version,
+        ethics_id=form.ethics_id,
+        passed=outcome.passed,
+        answers=outcome.kept,
+    )
+    state = record(state, event, sitting)
+    for reminder in outcome.reminders:
+        sitting.display.trouble(reminder)
+        sitting.attendant.note(NoteAsked("program", reminder))
+    return state
+
+
+def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
+    """As often as somebody wants to check again. Going on in spite of a finding is their decision, and is logged."""
+    sitting.attendant.begin("preparing")
+    report = check_device(sitting.device, sitting.clock, sitting.place_m, state.protocol.safety.total_cap_n)
+    go_on = sitting.display.device_checked(report)
+    findings = tuple(
+        f"{finding.name}: {finding.value}{'' if finding.fine else ' (not fine)'}" for finding in report.findings
+    )
+    return record(state, DeviceChecked(utc=sitting.clock.utc(), passed=go_on, findings=findings), sitting)

@@ -1,0 +1,24 @@
+"""A due trial as the participant sees it: everything that could give the answer away left out."""
+
+from protocols.trial import Phase
+from study.session.due_trial import Present, labels_are_swapped
+from study.session.progress import progress
+from study.session.state import SessionState
+from study.session.views import Question, Task, picture_of
+
+
+def question_of(state: SessionState, present: Present, utc: str) -> Question:
+    run = state.runs[present.run]
+    alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
+    return Question(
+        phase=run.phase,  # a catch trial is one of the test run's, as far as anybody can see
+        run_number=1 + alike.index(present.run),
+        runs_in_phase=len(alike),
+        trial_number=present.trial + 1,
+        repeated=present.attempt > 0,
+        time_limit_s=state.protocol.trial.time_limit_s,
+        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
+        task=Task.INTERVAL if run.phase is Phase.DETECTION else Task.DIRECTION,
+        practice=run.practice,
+        progress=progress(state, utc),
+    )

@@ -1,0 +1,31 @@
+"""A pause: nothing is played until somebody decides how to go on."""
+
+from dataclasses import dataclass
+
+from study.session.events import PauseTaken
+from study.session.state import SessionState
+from study.session.views import AfterPause, PauseNotice
+from study.workflows.sitting import Sitting, record, write_notes
+
+
+@dataclass(frozen=True, slots=True)
+class AfterTheBreak:
+    state: SessionState
+    leave: str
+    """Why the sitting ends here; empty where it goes on."""
+    withdrawn: bool
+
+
+LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
+
+
+def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBreak:
+    who = sitting.attendant.pause_asked or "participant"
+    sitting.attendant.begin("pause")
+    started_s = sitting.clock.now_s()
+    decision = sitting.display.pause(PauseNotice(reason, state.answers))
+    sitting.attendant.pause_asked = None
+    state = write_notes(state, sitting)
+    paused_s = sitting.clock.now_s() - started_s
+    state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)
+    return AfterTheBreak(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)
