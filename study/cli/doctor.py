@@ -26,11 +26,13 @@ def doctor(
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves."""
+    from contextlib import nullcontext
+
     from study.cli.progress import bar
     from study.workflows.check_installation import this_terminal
     from study.workflows.examine_setup import examine_setup
 
-    with bar("Timing the loop (s)", total=timing) as show:
+    with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
         examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
     if as_json:
         typer.echo(json.dumps(_document(examination), indent=2))
