@@ -42,8 +42,9 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
 def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
     """A key typed meanwhile is no answer yet: only p and q are heard."""
     talk.forget()
-    words = f" ({sentence(notice.picture, notice.number)[3:]})" if notice.picture is not None else ""
-    talk.say(f"{notice.title}{words}")
+    if notice.title:  # a gap between two intervals has none
+        words = f" ({sentence(notice.picture, notice.number)[3:]})" if notice.picture is not None else ""
+        talk.say(f"{notice.title}{words}")
     until_s = talk.clock.now_s() + notice.seconds
     while (left_s := until_s - talk.clock.now_s()) > 1e-9:
         cut = _glance(talk, sign_of_life, min(GLANCE_S, left_s))

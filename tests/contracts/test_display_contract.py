@@ -162,7 +162,12 @@ def resting(display, signs) -> object:
     return display.rest(REST, signs)
 
 
-WAITS: dict[str, Callable[..., object]] = {"something plays": playing, "a rest": resting}
+def still(display, signs) -> object:
+    """Between two intervals: nothing to name, nothing to highlight."""
+    return display.show_playing(replace(PLAYING, title="", number=0), signs)
+
+
+WAITS: dict[str, Callable[..., object]] = {"something plays": playing, "a gap": still, "a rest": resting}
 
 
 @pytest.mark.parametrize("wait", WAITS)

@@ -99,6 +99,12 @@ def test_lines_in_a_pipe_wait_for_the_question_after_what_plays(unhurried):
     assert unhurried.said == "Interval 1"
 
 
+def test_a_gap_between_two_intervals_is_silent(unhurried):
+    assert unhurried.display.show_playing(PlayingNotice("", 0, 0.5, None), lambda: True) is None
+    assert unhurried.out.getvalue() == ""
+    assert unhurried.clock.now_s() == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(
     ("text", "reply", "after_s"),
     [
