@@ -34,7 +34,7 @@ def study_warnings(
 ) -> tuple[str, ...]:
     """trials: of the test phase. rows, table: what was computed from them."""
     if not rows:
-        return ("No test trial is there, so there is nothing to analyse.",)
+        return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
         _incomplete(rows, protocol.staircase.reversals),
         _missing(table),

@@ -10,6 +10,10 @@ def number(value: float | None, digits: int = 2) -> str:
     return NONE if value is None else f"{value:.{digits}f}"
 
 
+def bounded(value: float | None, lower_bound: bool) -> str:
+    return f"≥ {number(value)}" if lower_bound and value is not None else number(value)
+
+
 def count(value: int | None) -> str:
     return NONE if value is None else str(value)
 

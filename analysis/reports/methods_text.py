@@ -31,7 +31,7 @@ _STATISTICS = (
 
 
 def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
-    """One paragraph each: task, stimulus, schedule, staircase, threshold, statistics."""
+    """One paragraph each: task, stimulus, schedule, staircase, threshold, what stood beside it, statistics."""
     rule = protocol.staircase
     return (
         _task(protocol),
@@ -39,6 +39,7 @@ def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
         _schedule(protocol),
         _staircase(rule),
         _threshold(rule),
+        *_beside(protocol),
         _STATISTICS,
     )
 
@@ -113,3 +114,38 @@ def _threshold(rule: StaircaseRule) -> str:
         "one-interval identification over all trials of a run, with the log-linear correction; the criterion is "
         "positive for a liking of the answer 2."
     )
+
+
+def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
+    demo, practice, catch, detection = protocol.demo, protocol.practice, protocol.catch, protocol.detection
+    sentences = []
+    if demo.level_n:
+        sentences.append(
+            f"Before anything was asked, both directions were played at every frequency, labelled, for "
+            f"{demo.seconds:g} s each at {demo.level_n:g} N."
+        )
+    if protocol.gate.radius_mm:
+        sentences.append(f"A trial began with the handle within {protocol.gate.radius_mm:g} mm of its place.")
+    if practice.frequencies_hz:
+        feedback = "with" if practice.feedback == "after_answer" else "without"
+        sentences.append(
+            f"Practice at {_hz(practice.frequencies_hz)} used a fixed level of {practice.level_n:g} N, {feedback} "
+            f"feedback, until {practice.right_needed} of the last {practice.of_last} answers were right or "
+            f"{practice.trial_limit} trials were over. It excluded nobody and enters no result."
+        )
+    if catch.one_in:
+        sentences.append(
+            f"One in {catch.one_in} trials of a test run, at a place drawn by lot, was a catch trial at "
+            f"{protocol.staircase.cap_n:g} N. It moved no staircase and enters no threshold."
+        )
+    if detection.frequencies_hz:
+        sentences.append(
+            f"Detection was tested after the test runs, at {_hz(detection.frequencies_hz)}: one of two intervals of "
+            f"{detection.interval_s:g} s, {detection.gap_s:g} s apart, held a stimulus, and the participant said "
+            f"which. The staircase was the same, from {detection.start_n:g} N."
+        )
+    return (" ".join(sentences),) if sentences else ()
+
+
+def _hz(frequencies_hz: tuple[float, ...]) -> str:
+    return f"{listed([f'{frequency:g}' for frequency in frequencies_hz])} Hz"

@@ -7,6 +7,7 @@ from analysis.figures.picture import Picture
 from analysis.population import Population
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
+from analysis.reports.side_tables import catch_table, detection_run_table, detection_table, practice_table
 from analysis.reports.study_tables import (
     ellipsoid_table,
     group_table,
@@ -39,6 +40,7 @@ def render_study_report(
     sections = [
         _warnings(analysis),
         *_results(analysis, by_name),
+        *_beside(analysis),
         *_delivery(by_name),
         *_ellipsoids(ellipsoids, by_name),
         *_runs(analysis, pictures),
@@ -58,7 +60,7 @@ def render_study_report(
 
 def _summary(analysis: StudyAnalysis) -> str:
     if not analysis.thresholds:
-        return "There is no run to analyse."
+        return _without_directions(analysis)
     complete = sum(row.complete for row in analysis.thresholds)
     people, runs = len(analysis.table.subjects), len(analysis.thresholds)
     simulated = "simulated " if analysis.population is Population.SIMULATED else ""
@@ -66,6 +68,13 @@ def _summary(analysis: StudyAnalysis) -> str:
         f"{people} {simulated}participant{'s' if people != 1 else ''}, {runs} run{'s' if runs != 1 else ''}, "
         f"{complete} of them complete, {sum(row.trials for row in analysis.thresholds)} counted trials."
     )
+
+
+def _without_directions(analysis: StudyAnalysis) -> str:
+    if not analysis.detection:
+        return "There is no run to analyse."
+    runs = len(analysis.detection)
+    return f"No test run; {runs} detection run{'s' if runs != 1 else ''}."
 
 
 def _warnings(analysis: StudyAnalysis) -> Section:
@@ -90,6 +99,22 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
         tables=(one_way_table(analysis), *pairs, within_table(analysis)),
     )
     return [thresholds, comparison]
+
+
+def _beside(analysis: StudyAnalysis) -> list[Section]:
+    """Detection, catch trials, practice: each only where somebody took it."""
+    sections = []
+    if analysis.detection:
+        felt = "Which of two intervals held a vibration, at whatever direction: the level from which it is felt at all."
+        tables = (detection_table(analysis), detection_run_table(analysis))
+        sections.append(Section("Is the vibration felt at all?", paragraphs=(felt,), tables=tables))
+    if analysis.catches:
+        steer = "Trials at full level, mixed into the test runs. They moved no staircase and enter no threshold."
+        sections.append(Section("Catch trials", paragraphs=(steer,), tables=(catch_table(analysis),)))
+    if analysis.practice:
+        enter = "Short runs at a fixed level, before the test runs. They enter no result; not passing excluded nobody."
+        sections.append(Section("Practice", paragraphs=(enter,), tables=(practice_table(analysis),)))
+    return sections
 
 
 def _delivery(by_name: Mapping[str, Picture]) -> list[Section]:

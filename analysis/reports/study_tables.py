@@ -7,13 +7,13 @@ from analysis.ellipsoid import EllipsoidResult
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
 from analysis.thresholds import Threshold
-from analysis.wording import NONE, count, number, p_value
+from analysis.wording import NONE, bounded, count, number, p_value
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
     table = analysis.table
     rows = [
-        (subject, *(_bounded(value, cut) for value, cut in zip(values, cuts, strict=True)))
+        (subject, *(bounded(value, cut) for value, cut in zip(values, cuts, strict=True)))
         for subject, values, cuts in zip(table.subjects, table.values, table.censored, strict=True)
     ]
     return Table(
@@ -110,7 +110,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("Session", lambda row: row.session),
         ("Run", lambda row: str(row.run)),
         ("Hz", lambda row: f"{row.frequency_hz:g}"),
-        ("N", lambda row: _bounded(row.threshold_n, row.censored)),
+        ("N", lambda row: bounded(row.threshold_n, row.censored)),
         ("dB re 1 N", lambda row: number(row.threshold_db)),
         ("m/s²", lambda row: number(row.threshold_mps2)),
         ("mm", lambda row: number(row.threshold_mm, 3)),
@@ -158,7 +158,3 @@ def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
             "over that of the fundamental.",
         ),
     )  # fmt: skip
-
-
-def _bounded(value: float | None, censored: bool) -> str:
-    return f"≥ {number(value)}" if censored and value is not None else number(value)

@@ -1,4 +1,5 @@
-"""`thresholds.csv`: one row per run, columns as the fields of `analysis.thresholds.Threshold`."""
+"""`thresholds.csv`, and `detection.csv` for detection runs: one row per run, columns as the fields of
+`analysis.thresholds.Threshold`."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,6 +10,8 @@ from study.store.file_errors import UnusableFileError
 from study.store.text_file import read_text, write_text
 
 THRESHOLDS_NAME = "thresholds.csv"
+DETECTION_NAME = "detection.csv"
+"""Written only where there are detection runs."""
 THRESHOLDS_HEADER = columns(Threshold)
 KIND = "table of thresholds"
 

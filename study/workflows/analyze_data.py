@@ -10,6 +10,7 @@ from analysis.figures.picture import Picture, picture_svg
 from analysis.figures.study_pictures import study_pictures
 from analysis.reports.study_report import render_study_report
 from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
+from analysis.threshold_table import ThresholdTable
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.devices.clock import RealClock
@@ -68,14 +69,20 @@ def analyze_data(
 
 def text_table(analysis: StudyAnalysis) -> list[str]:
     """Thresholds as lines: one per frequency, with mean and number of participants."""
-    if not any(row.complete for row in analysis.thresholds):
-        return ["No complete test run: there is no threshold yet."]
-    lines = [f"{'frequency':>10}  {'threshold':>10}  {'lower bounds':>12}  participants"]
-    for column, frequency_hz in enumerate(analysis.table.frequencies_hz):
-        values = [row[column] for row in analysis.table.values if row[column] is not None]
-        censored = sum(row[column] for row in analysis.table.censored)
-        mean = sum(v for v in values if v is not None) / len(values) if values else None
-        shown = f"{'≥ ' if censored else ''}{mean:.3f} N" if mean is not None else "-"
+    lines = ["No complete test run: there is no threshold yet."]
+    if any(row.complete for row in analysis.thresholds):
+        lines = _lines(analysis.table, "threshold")
+    if any(row.complete for row in analysis.detection):
+        lines += _lines(analysis.detection_table, "felt from")
+    return lines
+
+
+def _lines(table: ThresholdTable, heading: str) -> list[str]:
+    lines = [f"{'frequency':>10}  {heading:>10}  {'lower bounds':>12}  participants"]
+    for column, frequency_hz in enumerate(table.frequencies_hz):
+        values = [value for row in table.values if (value := row[column]) is not None]
+        censored = sum(row[column] for row in table.censored)
+        shown = f"{'≥ ' if censored else ''}{sum(values) / len(values):.3f} N" if values else "-"
         lines.append(f"{frequency_hz:7g} Hz  {shown:>10}  {censored:>12}  {len(values):>12}")
     return lines
 

@@ -26,7 +26,7 @@ def test_a_clean_study_has_no_warning(able, protocol):
 
 
 def test_no_trial_is_said(protocol):
-    assert warnings([], protocol) == ("No test trial is there, so there is nothing to analyse.",)
+    assert warnings([], protocol) == ("No test trial is there, so there is no threshold of direction.",)
 
 
 def test_a_run_that_was_broken_off_is_named(able, protocol):

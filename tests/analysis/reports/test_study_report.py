@@ -120,7 +120,7 @@ def test_nothing_usable_is_said(report):
     html = report([])
     parsed(html)
     assert "There is no run to analyse." in html
-    assert "No test trial is there, so there is nothing to analyse." in html
+    assert "No test trial is there, so there is no threshold of direction." in html
     assert "<table>" not in html
 
 

@@ -1,0 +1,108 @@
+"""The tables of what stands beside the thresholds of direction: detection, catch trials, practice."""
+
+from collections.abc import Iterator
+
+from analysis.reports.page import Table
+from analysis.study_analysis import StudyAnalysis
+from analysis.wording import NONE, bounded, number
+from protocols.staircase import to_db
+
+
+def detection_table(analysis: StudyAnalysis) -> Table:
+    """Detection beside direction, per participant and frequency."""
+    table = analysis.detection_table
+    rows = [
+        (subject, f"{frequency:g} Hz", *_beside_direction(analysis, subject, frequency, value, bound))
+        for subject, values, bounds in zip(table.subjects, table.values, table.censored, strict=True)
+        for frequency, value, bound in zip(table.frequencies_hz, values, bounds, strict=True)
+    ]
+    return Table(
+        caption="Thresholds of detection (N)",
+        header=("Participant", "Frequency", "Felt from", "Direction told from", "Direction above detection (dB)"),
+        rows=tuple(rows),
+        notes=(
+            "≥: a lower bound, cut by the cap. –: no completed run. The last column is given where both are "
+            "thresholds. Near 0 dB the vibration has a direction as soon as it is felt; far above, it is felt "
+            "long before its direction is.",
+        ),
+    )
+
+
+def detection_run_table(analysis: StudyAnalysis) -> Table:
+    return Table(
+        caption="All detection runs",
+        header=("Participant", "Session", "Run", "Hz", "N", "Reversals", "Trials", "% right", "d'", "Criterion"),
+        rows=tuple(
+            (
+                row.subject, row.session, str(row.run), f"{row.frequency_hz:g}",
+                bounded(row.threshold_n, row.censored), str(row.reversals), str(row.trials),
+                number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
+            )
+            for row in analysis.detection
+        ),
+        notes=("d' of two intervals; a positive criterion is a liking of the second one. Chance is 50 % right.",),
+        folded=True,
+    )  # fmt: skip
+
+
+def catch_table(analysis: StudyAnalysis) -> Table:
+    return Table(
+        caption="Catch trials",
+        header=("Participant", "Frequency", "Given", "Wrong", "Lapse rate", "95 % interval"),
+        rows=tuple(
+            (
+                tally.subject,
+                f"{tally.frequency_hz:g} Hz",
+                str(tally.given),
+                str(tally.wrong),
+                f"{100 * tally.lapse_rate:.0f} %",
+                f"{100 * tally.lower:.0f} to {100 * tally.upper:.0f} %",
+            )
+            for tally in analysis.catches
+        ),
+        notes=(
+            "Wilson's interval. At high frequencies even the full level may have no direction for a hand: a wrong "
+            "answer there is no proof of inattention.",
+        ),
+    )
+
+
+def practice_table(analysis: StudyAnalysis) -> Table:
+    settings = analysis.protocol.practice
+    return Table(
+        caption="Practice runs",
+        header=("Participant", "Session", "Frequency", "Trials", "Right", f"Right of the last {settings.of_last}", "Outcome"),
+        rows=tuple(
+            (
+                run.subject,
+                run.session,
+                f"{run.frequency_hz:g} Hz",
+                str(run.trials),
+                str(run.right),
+                str(run.right_of_last),
+                "passed" if run.passed else "not passed" if run.over else "broken off",
+            )
+            for run in analysis.practice
+        ),
+        notes=(f"At {settings.level_n:g} N; passed with {settings.right_needed} right.",),
+    )
+
+
+def _beside_direction(
+    analysis: StudyAnalysis, subject: str, frequency_hz: float, felt_n: float | None, felt_bound: bool
+) -> Iterator[str]:
+    told_n, told_bound = _direction(analysis, subject, frequency_hz)
+    yield bounded(felt_n, felt_bound)
+    yield bounded(told_n, told_bound)
+    if felt_n is None or told_n is None or felt_bound or told_bound:
+        yield NONE
+    else:
+        yield f"{to_db(told_n) - to_db(felt_n):+.1f}"
+
+
+def _direction(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+    table = analysis.table
+    if subject not in table.subjects or frequency_hz not in table.frequencies_hz:
+        return None, False
+    row, column = table.subjects.index(subject), table.frequencies_hz.index(frequency_hz)
+    return table.values[row][column], table.censored[row][column]
