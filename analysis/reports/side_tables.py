@@ -71,7 +71,15 @@ def practice_table(analysis: StudyAnalysis) -> Table:
     settings = analysis.protocol.practice
     return Table(
         caption="Practice runs",
-        header=("Participant", "Session", "Frequency", "Trials", "Right", f"Right of the last {settings.of_last}", "Outcome"),
+        header=(
+            "Participant",
+            "Session",
+            "Frequency",
+            "Trials",
+            "Right",
+            f"Right of the last {settings.of_last}",
+            "Outcome",
+        ),
         rows=tuple(
             (
                 run.subject,

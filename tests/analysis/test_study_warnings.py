@@ -125,7 +125,9 @@ def with_detection(full_protocol, simulate):
 
 def test_a_direction_below_the_detection_threshold_is_named(able, full_protocol, with_detection):
     (sentence,) = warnings(with_detection(able, 2.0), full_protocol)
-    assert sentence.startswith("The direction was told at a level below that at which the vibration was felt: s01 at 35")
+    assert sentence.startswith(
+        "The direction was told at a level below that at which the vibration was felt: s01 at 35"
+    )
     assert "differ by 2.4 dB" in sentence
 
 

@@ -44,6 +44,12 @@ def test_the_numbers_of_the_protocol_are_in_the_text(protocol):
         ("schedule", {"directions": "balanced"}, "equally often within every eight trials"),
         ("training", {"frequencies_hz": (5.0,)}, "Training came first (5 Hz) and enters no result."),
         ("rests", {"after_run_s": 0.0}, "in random order. "),
+        ("demo", {"level_n": 2.0}, "labelled, for 2 s each at 2 N."),
+        ("gate", {"radius_mm": 10.0}, "began with the handle within 10 mm of its place."),
+        ("practice", {"frequencies_hz": (15.0,)}, "2 N, with feedback, until 4 of the last 5 answers were right or 10"),
+        ("practice", {"frequencies_hz": (15.0,), "feedback": "none"}, "2 N, without feedback, until"),
+        ("catch", {"one_in": 20}, "One in 20 trials of a test run, at a place drawn by lot, was a catch trial at 3 N."),
+        ("detection", {"frequencies_hz": (35.0, 45.0)}, "35 and 45 Hz: one of two intervals of 1.5 s, 0.5 s apart,"),
     ],
 )
 def test_another_choice_gives_another_sentence(protocol, part, change, words):

@@ -8,8 +8,10 @@ import pytest
 
 from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.figures.study_pictures import study_pictures
+from analysis.reports.side_tables import detection_table, practice_table
 from analysis.reports.study_report import render_study_report
 from analysis.study_analysis import analyse_study
+from protocols.trial import Phase
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -62,7 +64,7 @@ def ellipsoid():
 
 @pytest.fixture
 def report(protocol):
-    def render(trials, ellipsoids=(), provenance=None) -> str:
+    def render(trials, ellipsoids=(), provenance=None, protocol=protocol) -> str:
         analysis = analyse_study(trials, protocol)
         pictures = study_pictures(analysis, ellipsoids)
         return render_study_report(
@@ -135,6 +137,44 @@ def test_one_participant_is_told_what_cannot_be_computed(report, simulate_study)
 def test_a_clean_study_says_that_nothing_stands_out(report, simulate_study):
     html = report(simulate_study(subjects=5, true_n=(0.4,) * 5, seed=2, felt=True))
     assert "Nothing stands out" in html
+
+
+SIDE_SECTIONS = (">Is the vibration felt at all?</h2>", ">Catch trials</h2>", ">Practice</h2>")
+
+
+def test_detection_catch_trials_and_practice_have_sections(report, everything, full_protocol):
+    html = report(everything, protocol=full_protocol)
+    parsed(html)
+    for words in (*SIDE_SECTIONS, "Felt from", "Direction above detection (dB)", "0 to 79 %", "<td>passed</td>"):
+        assert words in html
+    assert not re.search(r"\b(nan|inf|None)\b", html)
+
+
+def test_without_such_trials_there_is_no_such_section(report, simulate_study, full_protocol):
+    html = report(simulate_study(subjects=2), protocol=full_protocol)
+    assert not any(section in html for section in SIDE_SECTIONS)
+
+
+def test_detection_is_compared_with_direction_only_where_both_are_thresholds(everything, full_protocol):
+    table = detection_table(analyse_study(everything, full_protocol))
+    for _, _, felt, told, above in table.rows:
+        assert (above == "–") == ("≥" in felt + told)
+    assert {row[4][0] for row in table.rows} == {"+", "–"}
+
+
+def test_detection_alone_is_a_report_too(report, everything, full_protocol):
+    html = report([trial for trial in everything if trial.phase is Phase.DETECTION], protocol=full_protocol)
+    parsed(html)
+    assert "No test run; 3 detection runs." in html
+    assert SIDE_SECTIONS[0] in html
+
+
+@pytest.mark.parametrize(("answers", "outcome"), [(1, "broken off"), (10, "not passed")])
+def test_practice_says_how_it_ended(everything, full_protocol, answers, outcome):
+    template = next(t for t in everything if t.phase is Phase.TRAINING and t.run == 1)
+    trials = [replace(template, trial=number, correct=False) for number in range(answers)]
+    (row,) = practice_table(analyse_study(trials, full_protocol)).rows
+    assert row[-1] == outcome
 
 
 def test_lower_bounds_are_marked_in_the_table(report, simulate_study):
