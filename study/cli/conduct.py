@@ -15,6 +15,7 @@ from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, WrongUseError
 from study.store.archive import check_subject, find_session
 from study.store.protocol_files import read_study_protocol
+from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
 from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
@@ -22,6 +23,7 @@ from study.workflows.display import PersonsHand
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan, fresh_seed
 from study.workflows.participant_code import check_code, unfinished_sessions
+from study.workflows.requests_port import QueuedRequests
 from study.workflows.session_results import write_results
 from study.workflows.simulated_participant import simulated_participant
 
@@ -31,6 +33,7 @@ class Sitter:
     observer: str | None
     """Name of the simulated participant; None for a person."""
     subject: str | None
+    keys: AnswerKeys = DIGITS
 
 
 def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int | None, as_json: bool) -> None:
@@ -51,22 +54,22 @@ def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int
             f"Note: {unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it.", err=True
         )
     _say_wait(sitter.observer)
-    with _participant(sitter.observer, drawn) as participant:
+    with _participant(sitter.observer, drawn, sitter.keys) as participant:
         end = conduct_new(plan, device, participant)
     _finish(end, as_json)
 
 
-def go_on(session: str, device: str, data: Path, as_json: bool) -> None:
+def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
     folder = find_session(session, data)
     opened = fold_session(folder).state.opened
     _say_wait(opened.observer)
-    with _participant(opened.observer, opened.seed) as participant:
+    with _participant(opened.observer, opened.seed, keys) as participant:
         end = conduct_resumed(folder, device, participant)
     _finish(end, as_json)
 
 
 @contextmanager
-def _participant(observer: str | None, seed: int) -> Iterator[Participant]:
+def _participant(observer: str | None, seed: int, keys: AnswerKeys) -> Iterator[Participant]:
     clock: Clock = RealClock() if observer is None else VirtualClock()
     if observer is None and sys.stdin is None:
         raise WrongUseError(
@@ -75,8 +78,9 @@ def _participant(observer: str | None, seed: int) -> Iterator[Participant]:
             "Start hapteq in a terminal, or with answers from a pipe.",
         )
     if observer is None:
-        display = PlainDisplay(LineInput(), sys.stdout, clock)
-        yield Participant(display=display, hand=PersonsHand(), clock=clock)
+        requests = QueuedRequests()
+        display = PlainDisplay(LineInput(), sys.stdout, clock, keys, note=requests.send)
+        yield Participant(display=display, hand=PersonsHand(), clock=clock, requests=requests)
         return
     with answer_count(f"simulated participant '{observer}'") as show_question:
         yield simulated_participant(observer, seed, clock, on_question=show_question)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from study.errors import StudyError, WrongUseError
+from study.tui.answer_keys import parse_keys
 
 PASSES_OPTIONS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 """What serve does not know are options of `hapteq study`."""
@@ -64,6 +65,7 @@ def _study_options(context: typer.Context) -> list[str]:
     group: Any = context.parent.command if context.parent is not None else None
     options = list(context.args)
     values = group.commands["study"].make_context("study", list(options), parent=context.parent).params
+    parse_keys(values["keys"])
     for name in ("plain", "observer"):
         if values.get(name):
             raise WrongUseError(

@@ -7,9 +7,13 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.tui.answer_keys import parse_keys
 
 DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
 DeviceOption = Annotated[str, typer.Option("--device", help="The device: simulated.")]
+KeysOption = Annotated[
+    str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 beside the digits, such as f,j.")
+]
 
 
 def study(
@@ -26,6 +30,7 @@ def study(
     plain: Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")] = False,
     data: DataOption = Path("data"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws; drawn and logged if not given.")] = None,
+    keys: KeysOption = "1,2",
     as_json: JsonOption = False,
 ) -> None:
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
@@ -34,5 +39,5 @@ def study(
     if observer is None and not plain and (sys.stdin is None or not sys.stdin.isatty()):
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
-    sitter = Sitter(observer=observer, subject=subject)
+    sitter = Sitter(observer=observer, subject=subject, keys=parse_keys(keys))
     begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json)
