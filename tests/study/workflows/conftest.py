@@ -73,6 +73,12 @@ def sitter(tmp_path, small_protocol, small_text) -> Sitter:
     return Sitter(tmp_path / "data", small_protocol, small_text)
 
 
+@pytest.fixture(scope="session")
+def sitter_of() -> type[Sitter]:
+    """For a protocol of one's own, or for a session that a whole module shares."""
+    return Sitter
+
+
 @pytest.fixture
 def always_one():
     return lambda: Answered(1, 0.0)
