@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy import stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from protocols.exposure import CatchSettings, DetectionSettings
 from protocols.preparation import PracticeSettings
