@@ -1,6 +1,7 @@
 """A whole sitting, from opening the device to closing the log."""
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from equalizer.tracking.equalizer import Identity
@@ -27,6 +28,10 @@ from study.workflows.run_session import run_session
 from study.workflows.sitting import Sitting
 
 
+def _nobody_listens(folder: SessionFolder, device: Device) -> None:
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class Participant:
     """Who sits at the device, and the time that passes for them."""
@@ -36,6 +41,8 @@ class Participant:
     clock: Clock
     requests: Requests = field(default_factory=QueuedRequests)
     """What is asked for from within this program: notes typed at the display, a stop from its other screens."""
+    on_opened: Callable[[SessionFolder, Device], None] = _nobody_listens
+    """Hears once of the session, now locked, and of the device, which it may stop from any thread."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +81,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
 
 def _run(opened: OpenedSession, device: Device, participant: Participant) -> Conducted:
     folder, protocol = opened.folder, opened.state.protocol
+    participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
     inbox.clear()
