@@ -31,7 +31,7 @@ def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> fl
 
 def pause(notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None) -> AfterPause:
     talk.forget()
-    talk.say("", f"Pause: {notice.reason}. Nothing is played. {notice.answers} answers are on disk.")
+    talk.say("", f"Pause ({notice.reason}). Nothing is played. {notice.answers} answers are on disk.")
     talk.say(_choices(notes=note is not None))
     while True:
         talk.prompt("Enter goes on: ")

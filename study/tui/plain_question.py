@@ -108,7 +108,7 @@ def progress_sentence(progress: Progress) -> str:
 
 def practice_over(result: PracticeResult, talk: Conversation) -> None:
     talk.forget()
-    talk.say("", f"End of this practice: {result.right} of the last {result.of} answers were right.")
+    talk.say("", f"End of this practice. Right answers: {result.right} of the last {result.of}.")
     if result.passed:
         talk.say("That is enough to go on.")
     else:

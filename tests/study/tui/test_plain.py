@@ -152,7 +152,7 @@ def test_progress_is_told_once_in_a_run(typed):
 def test_the_end_of_a_practice_is_told_and_read(typed, passed, words):
     typed.type("")
     typed.display.practice_over(PracticeResult(passed, right=3, of=5))
-    assert "3 of the last 5 answers were right." in typed.said
+    assert "Right answers: 3 of the last 5." in typed.said
     assert words in typed.said
 
 
