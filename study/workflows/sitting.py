@@ -36,7 +36,8 @@ def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
-    """What was noted meanwhile, by whomever."""
+    """What was noted meanwhile, by whomever. Listens first: a note may have come since the last glance."""
+    sitting.attendant.listen()
     for note in sitting.attendant.take_notes():
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
         state = record(state, event, sitting)
