@@ -49,7 +49,10 @@ def _write_summary(folder: SessionFolder, state: SessionState) -> None:
         "equalizer": opened.equalizer,
         "begun_utc": opened.utc,
         "closed": state.closed,
-        "runs": [{"index": r.index, "phase": r.phase.value, "frequency_hz": r.frequency_hz} for r in state.runs],
+        "runs": [
+            {"index": r.index, "phase": r.phase.value, "frequency_hz": r.frequency_hz, "practice": r.practice}
+            for r in state.runs
+        ],
         "answers": state.answers,
         "presentations": len(state.trials),
     }

@@ -1,5 +1,6 @@
 """A session with practice, catch trials and a detection run: what of it is written, and that it is checked."""
 
+import json
 import shutil
 
 import pytest
@@ -45,6 +46,15 @@ def test_detection_has_a_table_of_its_own(session):
     assert row.threshold_n < 0.5
     assert sorted(r.frequency_hz for r in read_thresholds(session / "thresholds.csv")) == [25.0, 35.0]
     assert (session / "analysis" / "detection.csv").read_bytes() == (session / "detection.csv").read_bytes()
+
+
+def test_the_summary_tells_practice_from_training(session):
+    runs = json.loads((session / "session.json").read_text("utf-8"))["runs"]
+    assert [(run["phase"], run["practice"]) for run in runs][:3] == [
+        ("training", False),
+        ("training", True),
+        ("test", False),
+    ]
 
 
 def test_the_lines_of_results_say_from_where_it_is_felt(taken):
