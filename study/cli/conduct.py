@@ -26,6 +26,7 @@ from study.workflows.participant_code import check_code, unfinished_sessions
 from study.workflows.requests_port import QueuedRequests
 from study.workflows.session_results import write_results
 from study.workflows.simulated_participant import simulated_participant
+from study.workflows.withdraw_participant import plan_withdrawal, withdraw
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +119,14 @@ def _finish(end: Conducted, as_json: bool) -> None:
     if not end.left:
         show(write_results(end.folder), as_json)
         return
+    if end.withdrawn:
+        plan = plan_withdrawal(end.folder)
+        withdraw(end.folder.path.parent, plan, RealClock().utc())
+        raise LeftError(
+            "The participant withdrew",
+            f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
+            "Analyses written elsewhere and copies still hold the numbers: erase them too.",
+        )
     kind = LeftError if end.fault is Fault.NONE else DeviceError
     raise kind(
         "The session is not finished",
