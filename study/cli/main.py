@@ -16,7 +16,21 @@ from typing import Annotated, Any
 
 import typer
 
-from study.cli import analyze, doctor, noise, protocol, record, rehearse, resume, serve, study, validate, withdraw
+from study.cli import (
+    analyze,
+    doctor,
+    noise,
+    note,
+    protocol,
+    record,
+    rehearse,
+    resume,
+    serve,
+    study,
+    validate,
+    watch,
+    withdraw,
+)
 from study.errors import ExitCode, StudyError
 
 app = typer.Typer(
@@ -35,6 +49,8 @@ app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
+app.command("watch")(watch.watch)
+app.command("note")(note.note)
 app.command("withdraw")(withdraw.withdraw)
 app.command("validate")(validate.validate)
 app.command("doctor")(doctor.doctor)

@@ -94,7 +94,7 @@ def _clipped(now: Situation) -> Alarm | None:
     if now.live is None or not now.live.sensor_clipped:
         return None
     return Alarm(
-        "sensor", "The acceleration sensor is at the end of its range: what it says is too little.", now.now_utc
+        "sensor", "The acceleration sensor is clipped: it reads too little.", now.now_utc
     )
 
 

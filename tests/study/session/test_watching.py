@@ -336,7 +336,7 @@ def test_a_quiet_session_rings_nothing(story):
     ("changes", "kind", "sentence"),
     [
         ({"fault": "the device was lost"}, "device", "The device reported a fault: the device was lost."),
-        ({"sensor_clipped": True}, "sensor", "end of its range"),
+        ({"sensor_clipped": True}, "sensor", "it reads too little"),
         ({"activity": "waiting for the handle", "handle_ready": False, "since_s": 2.5}, "handle", "no trial starts"),
         ({"activity": "rest", "age_s": 3.5}, "silent", "it hangs, or was killed"),
     ],

@@ -1,0 +1,35 @@
+"""`hapteq note`: a note into a session's log, whether it runs or not."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from study.cli.study import DataOption
+
+if TYPE_CHECKING:
+    from study.store.archive import SessionFolder
+
+
+def note(
+    session: Annotated[str, typer.Argument(help="Session folder, or its name in the data folder.")],
+    text: Annotated[str, typer.Argument(help="What is to be noted; no names.")],
+    adverse: Annotated[
+        bool, typer.Option("--adverse", help="Something happened to the participant: pain, numbness, a fright.")
+    ] = False,
+    data: DataOption = Path("data"),
+) -> None:
+    """Write a note into a session's log. Nothing that is in the log is changed."""
+    from study.store.archive import find_session
+
+    write_note(find_session(session, data), text, adverse)
+
+
+def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
+    from study.devices.clock import RealClock
+    from study.session.requests import NoteAsked
+    from study.workflows.take_note import take_note
+
+    written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
+    waits = f"The session writes it into the log of {folder.name} as soon as it looks."
+    typer.echo(f"Noted in {folder.name}." if written else waits, err=True)

@@ -1,0 +1,134 @@
+"""`hapteq watch`: the experimenter's view of a running session, and what can be asked of it from beside."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from study.cli.study import DataOption
+
+if TYPE_CHECKING:
+    from study.session.requests import Request
+    from study.store.archive import SessionFolder
+
+LOG_NAME = "events.jsonl"
+"""As `study.store.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
+PLAIN_EVERY_S = 0.2
+
+
+def watch(
+    session: Annotated[
+        str, typer.Argument(help="Session folder, or its name in the data folder. Default: the one that changed last.")
+    ] = "",
+    data: DataOption = Path("data"),
+    plain: Annotated[bool, typer.Option("--plain", help="A line for whatever happens; alarms ring.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="How it stands now, and leave.")] = False,
+    stop: Annotated[bool, typer.Option("--stop", help="Force off at once; the sitting ends.")] = False,
+    pause: Annotated[bool, typer.Option("--pause", help="Hands free at once; the participant goes on.")] = False,
+    note: Annotated[str, typer.Option(metavar="TEXT", help="A note for the log.")] = "",
+    adverse: Annotated[str, typer.Option(metavar="TEXT", help="An adverse event for the log.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="With --once: one JSON document on stdout.")] = False,
+) -> None:
+    """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
+    folder = _folder(session or _last_changed(data), data)
+    if stop or pause or note or adverse:
+        _ask(folder, stop, pause, ((note, False), (adverse, True)))
+    elif once or as_json:
+        _once(folder, as_json)
+    elif plain or not (sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()):
+        _plain(folder)
+    else:
+        _screen(folder)
+
+
+def _folder(session: str, data: Path) -> Path:
+    for path in (Path(session), data / session):
+        if (path / LOG_NAME).is_file():
+            return path.resolve()
+    from study.store.archive import find_session
+
+    return find_session(session, data).path
+
+
+def _last_changed(data: Path) -> str:
+    logs = sorted(data.glob(f"*/{LOG_NAME}"), key=lambda log: log.stat().st_mtime)
+    if not logs:
+        from study.errors import WrongUseError
+
+        raise WrongUseError(
+            "There is no session to watch", f"No folder in {data} holds a session.", "Give a session, or --data."
+        )
+    return logs[-1].parent.name
+
+
+def _screen(folder: Path) -> None:
+    from study.store.request_inbox import RequestInbox
+    from study.tui.link.watch_feed import WatchFeed
+    from study.tui.watch_app import WatchApp
+
+    feed = WatchFeed(str(folder))
+    try:
+        # A stop goes straight to the session's folder: it must not depend on the process that reads.
+        WatchApp(feed, RequestInbox(folder).send).run()
+    finally:
+        feed.close()
+
+
+def _once(folder: Path, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from study.devices.clock import RealClock
+    from study.errors import StudyError
+    from study.tui.watch_lines import changes
+    from study.workflows.watch_session import follow
+
+    view = follow(folder).look(RealClock().utc())
+    if view is None:
+        raise StudyError("This session has not begun", f"{folder.name} has no line yet.", "Look again in a moment.")
+    if as_json:
+        typer.echo(json.dumps(asdict(view), indent=2))
+        return
+    for line in changes(None, view):
+        typer.echo(line)
+
+
+def _plain(folder: Path) -> None:
+    """Until the sitting is over."""
+    from study.devices.clock import RealClock
+    from study.session.watch_view import ON
+    from study.tui.watch_lines import changes
+    from study.workflows.watch_session import follow
+
+    clock, follower, before = RealClock(), follow(folder), None
+    while before is None or before.standing in ON:
+        view = follower.look(clock.utc())
+        if view is not None:
+            for line in changes(before, view):
+                typer.echo(line)
+            before = view
+        clock.sleep(PLAIN_EVERY_S)
+
+
+def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
+    from study.cli.note import write_note
+    from study.session.requests import PauseAsked, StopAsked
+    from study.store.archive import SessionFolder
+
+    session = SessionFolder(folder)
+    if stop:
+        _ask_for(session, StopAsked("experimenter"), f"The force is off and the sitting ends. Go on with: hapteq resume {folder}")
+    for text, adverse in notes:
+        if text:
+            write_note(session, text, adverse)
+    if pause:
+        _ask_for(session, PauseAsked("experimenter"), "Paused. The participant goes on at the own screen.")
+
+
+def _ask_for(session: "SessionFolder", request: "Request", said: str) -> None:
+    from study.devices.clock import RealClock
+    from study.workflows.ask_session import ask_session
+
+    ask_session(session, request, RealClock())
+    typer.echo(said, err=True)

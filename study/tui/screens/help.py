@@ -1,0 +1,33 @@
+"""Help in context, over the screen that it is about."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Footer, Markdown
+
+
+class HelpScreen(ModalScreen[None]):
+    CSS = """
+    HelpScreen { align: center middle; }
+    HelpScreen VerticalScroll {
+        max-width: 90; height: 90%; padding: 0 1; border: round $primary; background: $surface;
+    }
+    HelpScreen Markdown { background: $surface; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape,f1,q,question_mark", "leave", "Back", key_display="Esc")]
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        with VerticalScroll() as box:
+            box.border_title = "Help"
+            yield Markdown(self._text)
+        yield Footer()
+
+    def action_leave(self) -> None:
+        self.dismiss(None)

@@ -1,0 +1,53 @@
+"""One sentence for the log, typed while the session goes on behind it."""
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, Label
+
+MOST_CHARACTERS = 500
+
+
+class NotePrompt(ModalScreen[str | None]):
+    """Returns the text; None where nothing is to be noted."""
+
+    CSS = """
+    NotePrompt { align: center bottom; }
+    NotePrompt > Vertical {
+        height: auto; max-width: 100; margin: 1 2; padding: 0 1; border: round $primary; background: $surface;
+    }
+    NotePrompt Input { border: none; height: 1; background: $boost; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", "Leave"),
+        Binding("f8", "stop", "STOP", priority=True),
+    ]
+
+    def __init__(self, adverse: bool, stop: Callable[[], None]) -> None:
+        super().__init__()
+        self._adverse = adverse
+        self._stop = stop
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = "Adverse event" if self._adverse else "Note"
+            yield Label(
+                "What happened to the participant (pain, numbness, a fright)?"
+                if self._adverse
+                else "What is to be noted? No names: the log is kept with the data."
+            )
+            yield Input(max_length=MOST_CHARACTERS, placeholder="one sentence")
+            yield Label("Enter writes it into the log, Escape leaves, F8 stops the session.")
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        self.dismiss(event.value.strip() or None)
+
+    def action_stop(self) -> None:
+        self._stop()
+
+    def action_leave(self) -> None:
+        self.dismiss(None)

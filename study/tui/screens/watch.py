@@ -1,0 +1,279 @@
+"""The experimenter's view of a running session: everything but the direction of the open trial.
+
+It follows; all that it can do is to ask the session for a stop or a pause, and to note something.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import ClassVar, Protocol
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.message import Message
+from textual.reactive import reactive
+from textual.screen import Screen
+from textual.widgets import Footer, Static
+
+from study.errors import StudyError
+from study.session.requests import NoteAsked, PauseAsked, Request, StopAsked
+from study.session.watch_view import ON, Alarm, WatchView
+from study.tui.screens.note_prompt import NotePrompt
+from study.tui.watch_words import staircase_title
+from study.tui.widgets.alarm_book import AlarmBook
+from study.tui.widgets.level_history import LevelHistory
+from study.tui.widgets.watch_panels import alarm_lines, details, gauges, runs_lines, standing_line, trials_lines
+
+LOOK_EVERY_S = 0.1
+UNHEARD_AFTER_S = 2.0
+"""A session looks for requests twenty times a second."""
+NO_NEWS_AFTER_S = 3.0
+SAID_FOR_S = 8.0
+
+GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
+
+HELP = """\
+# Watching a session
+
+You follow a running session. Nothing here changes it, apart from four keys:
+
+* **S** (shift and s) or **F8**: stop. The force is off at once; nothing is asked. The session can be resumed.
+* **p**: pause. Hands free at once; the participant goes on at the own screen.
+* **n**: a note for the log. **e**: an adverse event (pain, numbness, a fright).
+
+The other keys: **a** says that you have seen the alarms, **d** shows forms, practice and notes, **q** leaves the view;
+the session goes on.
+
+## What you see
+
+* **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ turns of the level, ? the next level.
+* **Last trials**: the newest on top. *shown* and *said* are the numbers 1 and 2; *s* is the time to answer; *m/s²* is \
+what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial.
+* **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
+* **Catch**: trials at full force that anybody should get right; errors in them are lapses of attention.
+
+The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
+"""
+
+
+class WatchSource(Protocol):
+    """Where views come from; `study.tui.link.watch_feed.WatchFeed` is one."""
+
+    def latest(self) -> WatchView | None:
+        """At once, without any work: called ten times a second by the event loop."""
+        ...
+
+    @property
+    def problem(self) -> str:
+        """Why no views come any more, a sentence; empty while they come."""
+        ...
+
+
+class WatchMessage(Message):
+    """A new view; the screen shows whichever came last."""
+
+    def __init__(self, view: WatchView) -> None:
+        super().__init__()
+        self.view = view
+
+
+class WatchScreen(Screen[None]):
+    HELP = HELP
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as in the base class
+    CSS = """
+    WatchScreen #standing, WatchScreen #guide { height: 1; padding: 0 1; }
+    WatchScreen #guide { color: $text-muted; }
+    WatchScreen #guide.said { color: $text; text-style: bold; }
+    WatchScreen #alarms { height: auto; max-height: 7; padding: 0 1; border: heavy $error; display: none; }
+    WatchScreen #alarms.any { display: block; }
+    WatchScreen #alarms.seen { border: round $panel; }
+    WatchScreen .panel { border-top: solid $foreground 40%; border-title-color: $text; padding: 0 1; }
+    WatchScreen #left { width: 1fr; }
+    WatchScreen #right { width: 32; }
+    WatchScreen #levels { height: 1fr; min-height: 6; }
+    WatchScreen #trials { height: 8; }
+    WatchScreen #runs { height: 1fr; min-height: 3; }
+    WatchScreen #gauges { height: 8; }
+    WatchScreen #aside { width: 42; display: none; }
+    WatchScreen.details #aside { display: block; }
+    WatchScreen.-narrow.details #right { display: none; }
+    WatchScreen.-narrow.details #left { display: none; }
+    WatchScreen.-narrow.details #aside { width: 1fr; }
+    WatchScreen.-wide #aside { display: block; width: 38; }
+    WatchScreen.-wide #right { width: 34; }
+    WatchScreen.-wide #trials { height: 14; }
+    WatchScreen.-wide.details #aside { display: none; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("S,f8", "stop", "STOP", key_display="S"),
+        Binding("p", "pause", "Pause"),
+        Binding("n", "note(False)", "Note"),
+        Binding("e", "note(True)", "Adverse"),
+        Binding("a", "acknowledge", "Seen"),
+        Binding("d", "details", "Details"),
+        Binding("f1,question_mark", "help", "Help", key_display="F1"),
+        Binding("q", "leave", "Leave"),
+    ]
+    view: reactive[WatchView | None] = reactive(None)
+
+    class Left(Message):
+        """Whoever watched wants to leave; the session goes on."""
+
+    def __init__(self, source: WatchSource, ask: Callable[[Request], object]) -> None:
+        """ask: hands a request to the session. Raises StudyError where it cannot."""
+        super().__init__()
+        self._source = source
+        self._ask = ask
+        self._book = AlarmBook()
+        self._taken: WatchView | None = None
+        self._news_s = time.monotonic()
+        self._stop_sent_s: float | None = None
+        self._said_s = float("-inf")
+
+    def compose(self) -> ComposeResult:
+        yield Static(id="standing")
+        yield Static(GUIDE, id="guide")
+        yield Static(id="alarms")
+        with Horizontal():
+            with Vertical(id="left"):
+                with Vertical(id="levels", classes="panel"):
+                    yield LevelHistory(id="history")
+                yield Static(id="trials", classes="panel")
+            with Vertical(id="right"):
+                yield Static(id="runs", classes="panel")
+                yield Static(id="gauges", classes="panel")
+            with VerticalScroll(id="aside", classes="panel"):
+                yield Static(id="details")
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#standing", Static).update("Opening the session …")
+        titles = {"#trials": "Last trials", "#runs": "Runs", "#gauges": "Exposure and device", "#aside": "Details"}
+        for name, title in titles.items():
+            self.query_one(name).border_title = title
+        self.set_interval(LOOK_EVERY_S, self._look)
+        self._look()
+
+    def _look(self) -> None:
+        """Ten times a second: is there a new view, must the bell ring, was the stop heard?"""
+        view = self._source.latest()
+        if view is not None and view is not self._taken:
+            self._taken = view
+            self.post_message(WatchMessage(view))
+        elif self.is_mounted:
+            self._attend()
+
+    def on_watch_message(self, message: WatchMessage) -> None:
+        self._news_s = time.monotonic()
+        self.view = message.view
+
+    def watch_view(self, view: WatchView | None) -> None:
+        if view is None:
+            return
+        self._attend()
+        self.query_one("#standing", Static).update(standing_line(view))
+        self.query_one("#levels").border_title = staircase_title(view)
+        self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
+        self.query_one("#details", Static).update(details(view))
+        self.query_one("#gauges", Static).update(gauges(view))
+        # Alarms above may just have taken room from the tables.
+        self.call_after_refresh(self._fill_tables)
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._fill_tables)
+
+    def _fill_tables(self) -> None:
+        if self.view is None:
+            return
+        runs, trials = self.query_one("#runs", Static), self.query_one("#trials", Static)
+        runs.update(runs_lines(self.view, runs.content_size.height))
+        trials.update(trials_lines(self.view, trials.content_size.height, trials.content_size.width))
+
+    def _attend(self) -> None:
+        now_s = time.monotonic()
+        alarms = (*self._own_alarms(now_s), *(self.view.alarms if self.view is not None else ()))
+        if self._book.take(alarms, now_s):
+            self.app.bell()
+        self._show_alarms()
+        if now_s - self._said_s > SAID_FOR_S:
+            self._guide(GUIDE, said=False)
+
+    def _own_alarms(self, now_s: float) -> list[Alarm]:
+        """Of what the log cannot tell: that nobody reads it any more, that a stop was not heard."""
+        since = self.view.utc if self.view is not None else ""
+        alarms = []
+        if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:
+            self._stop_sent_s = None
+            self._say(f"The session has stopped: {self.view.reason}.")
+        if self._stop_sent_s is not None and now_s - self._stop_sent_s > UNHEARD_AFTER_S:
+            unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
+            alarms.append(Alarm("stop unheard", unheard, since))
+        if self._source.problem:
+            alarms.append(Alarm("no reader", f"This view is not fed any more: {self._source.problem}", since))
+        elif self.view is not None and now_s - self._news_s > NO_NEWS_AFTER_S:
+            alarms.append(Alarm("no news", "This view has stood still for seconds; look at the session itself.", since))
+        return alarms
+
+    def _show_alarms(self) -> None:
+        unseen, seen = self._book.unseen, self._book.seen
+        panel = self.query_one("#alarms", Static)
+        panel.set_class(bool(unseen or seen), "any")
+        panel.set_class(not unseen, "seen")
+        panel.border_title = "! ALARM: press a when you have seen it" if unseen else "Alarms that you have seen"
+        panel.update(alarm_lines(unseen, seen))
+
+    def action_stop(self) -> None:
+        self._stop_sent_s = time.monotonic()
+        self._send(StopAsked("experimenter"), "Stop sent: the force goes off at once.")
+
+    def action_pause(self) -> None:
+        if self.view is not None and self.view.standing == "paused":
+            self._say("It is paused already; the participant goes on at the own screen.")
+            return
+        self._send(PauseAsked("experimenter"), "Pause sent. The participant goes on at the own screen.")
+
+    def action_note(self, adverse: bool) -> None:
+        def write(text: str | None) -> None:
+            if text:
+                self._send(NoteAsked("experimenter", text, adverse), "Noted: it is written at the next pause or trial.")
+
+        self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
+
+    def action_acknowledge(self) -> None:
+        seen = self._book.acknowledge(time.monotonic())
+        self._say(f"{seen} alarm{'' if seen == 1 else 's'} seen." if seen else "There is no alarm to be seen.")
+        self._show_alarms()
+
+    def action_details(self) -> None:
+        self.toggle_class("details")
+        self.call_after_refresh(self._fill_tables)
+
+    def action_help(self) -> None:
+        from study.tui.screens.help import HelpScreen
+
+        self.app.push_screen(HelpScreen(HELP))
+
+    def action_leave(self) -> None:
+        self.post_message(self.Left())
+
+    def _send(self, request: Request, said: str) -> None:
+        try:
+            self._ask(request)
+        except StudyError as error:
+            self._say(f"NOT sent: {error.happened} {error.do_now}")
+            self.app.bell()
+            return
+        if self.view is not None and self.view.standing not in ON:
+            said = "Nothing runs here; it was sent all the same."
+        self._say(said)
+
+    def _say(self, sentence: str) -> None:
+        self._said_s = time.monotonic()
+        self._guide(sentence, said=True)
+
+    def _guide(self, sentence: str, said: bool) -> None:
+        guide = self.query_one("#guide", Static)
+        guide.set_class(said, "said")
+        guide.update(sentence)

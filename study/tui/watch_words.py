@@ -1,0 +1,111 @@
+"""What a watcher reads, in words: shared by the screen and by the lines of `hapteq watch --plain`."""
+
+from datetime import datetime
+
+from study.session.watch_view import ClosedTrial, Exposure, Standing, WatchedRun, WatchView
+
+SYMBOLS: dict[Standing, str] = {
+    "running": "●",
+    "paused": "‖",
+    "resting": "◌",
+    "stopped": "■",
+    "finished": "✓",
+    "not running": "!",
+}
+
+
+def local_time(utc: str) -> str:
+    """Hours, minutes and seconds on this computer's clock; empty where there is no time."""
+    return datetime.fromisoformat(utc).astimezone().strftime("%H:%M:%S") if utc else ""
+
+
+def duration(seconds: float) -> str:
+    """Rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
+    whole = int(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    minutes, seconds_left = divmod(whole, 60)
+    if minutes < 60:
+        return f"{minutes} min {seconds_left:02d} s"
+    return f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def what_goes_on(view: WatchView) -> str:
+    """Without the standing: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
+    if view.reason:
+        return view.reason
+    trial, run = view.open_trial, view.present_run
+    if trial is None or run is None:
+        return f"{view.activity}, {duration(view.activity_s)}"
+    again = f", attempt {trial.attempt + 1}" if trial.attempt else ""
+    catch = ", a catch trial" if trial.catch else ""
+    return (
+        f"trial {trial.trial + 1}{again} at {trial.level_n:.3g} N{catch}: {view.activity}, {duration(view.activity_s)}"
+    )
+
+
+def run_name(view: WatchView, run: WatchedRun) -> str:
+    """Numbered within its phase: "test 2"."""
+    return f"{run.phase} {1 + [r.run for r in view.runs if r.phase == run.phase].index(run.run)}"
+
+
+def turns(run: WatchedRun) -> str:
+    return f"{run.reversals}/{run.reversals_needed}" if run.reversals_needed else "–"
+
+
+def staircase_title(view: WatchView) -> str:
+    shown = next((run for run in view.runs if run.run == view.shown_run), None)
+    if shown is None:
+        return "Staircase: nothing answered yet"
+    level = f", now {view.next_level_n:.3g} N" if view.next_level_n is not None else ", run over"
+    reversals = f", {shown.reversals} of {shown.reversals_needed} reversals" if shown.reversals_needed else ""
+    return f"{run_name(view, shown)}, {shown.frequency_hz:g} Hz{reversals}{level}"
+
+
+def verdict(trial: ClosedTrial) -> str:
+    """Right, wrong or void; a catch trial answered wrongly is a lapse."""
+    if trial.status == "spoiled":
+        return "void"
+    if trial.correct:
+        return "right"
+    return "LAPSE" if trial.phase == "catch" else "wrong"
+
+
+def time_words(exposure: Exposure) -> str:
+    return f"{exposure.elapsed_min:.0f} of {exposure.limit_min:g} min"
+
+
+def dose_words(exposure: Exposure) -> str:
+    return f"{exposure.dose_a8_mps2:.2f} of {exposure.dose_limit_mps2:g} m/s²"
+
+
+def catch_words(view: WatchView) -> str:
+    lapses = f"{view.catch_lapses} {'lapse' if view.catch_lapses == 1 else 'lapses'}"
+    return f"{lapses} in {view.catch_given}" if view.catch_given else "none so far"
+
+
+def handle_words(view: WatchView) -> str:
+    live = view.live
+    if live is None or live.offset_mm is None:
+        return "no reading"
+    if not live.handle_ready:
+        return f"{live.offset_mm:.1f} mm: OUT of place"
+    allowed = f", {view.gate_radius_mm:g} allowed" if view.gate_radius_mm else ""
+    return f"{live.offset_mm:.1f} mm off{allowed}"
+
+
+def sensor_words(view: WatchView) -> str:
+    live = view.live
+    if live is None or live.acceleration_mps2 is None:
+        return "no reading"
+    clipped = " CLIPPED" if live.sensor_clipped else ""
+    late = f", {live.missed_ticks} late" if live.missed_ticks else ""
+    return f"{live.acceleration_mps2:.1f} m/s²{clipped}{late}"
+
+
+def device_words(view: WatchView) -> str:
+    if view.live is None:
+        return "no live state"
+    if view.live.fault:
+        return f"FAULT: {view.live.fault}"
+    return "simulated, nothing moves" if view.simulated else "no fault"

@@ -1,0 +1,52 @@
+"""Ask a running session for something, and make sure that it was heard."""
+
+from study.devices.clock import Clock
+from study.errors import StudyError
+from study.session.requests import NoteAsked, Request, StopAsked
+from study.store.archive import SessionFolder
+from study.store.log_writer import somebody_writes
+from study.store.request_inbox import RequestInbox
+
+HEARD_WITHIN_S = 3.0
+"""A session looks some twenty times a second, except while a form or a notice is read at its screen."""
+LOOK_EVERY_S = 0.02
+
+
+def ask_session(folder: SessionFolder, request: Request, clock: Clock) -> bool:
+    """Returns whether the session took it; a note that it did not take yet waits for it.
+
+    Raises StudyError where nothing runs, or where a stop or a pause was not heard.
+    """
+    if somebody_writes(folder.log) is False:
+        raise StudyError(
+            "This session is not running",
+            f"No program has {folder.name} open, so there is nothing to stop or to pause.",
+            "Look at it with: hapteq watch " + str(folder.path),
+        )
+    inbox = RequestInbox(folder.path)
+    name = inbox.send(request)
+    until_s = clock.now_s() + HEARD_WITHIN_S
+    while inbox.unread(name):
+        if clock.now_s() >= until_s:
+            return _unheard(folder, request, inbox, name)
+        clock.sleep(LOOK_EVERY_S)
+    return True
+
+
+def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name: str) -> bool:
+    if isinstance(request, NoteAsked):
+        return False
+    waits = f"{folder.name} took nothing within {HEARD_WITHIN_S:g} s: a form or a notice is being read, or it hangs."
+    if isinstance(request, StopAsked):
+        raise StudyError(
+            "The stop was not heard",
+            waits,
+            "If the handle moves: hand off, and switch the device off.",
+            saved="The stop waits for the session and is the first thing that it will hear.",
+        )
+    # A pause that comes minutes later would surprise everybody.
+    if not inbox.take_back(name):
+        return True
+    raise StudyError(
+        "The pause was not heard", waits, "Ask again when trials are running.", saved="Nothing is pending."
+    )
