@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
+from study.session.participant_codes import ALLOWED, is_code
 from study.store.atomic_write import sync_folder
 from study.store.event_log import LOG_NAME
 
-CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
 FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
 TOMBSTONE_NAME = "withdrawn.json"
 
@@ -45,10 +45,10 @@ class SessionFolder:
 
 def check_subject(code: str) -> str:
     """A participant appears by a code only: letters and digits, nothing that could be a name with an address."""
-    if not CODE.fullmatch(code):
+    if not is_code(code):
         raise WrongUseError(
             "This is no participant code",
-            f"'{code}' was given; a code has 1 to 16 letters and digits, at least one digit, such as P01.",
+            f"'{code}' was given; {ALLOWED}.",
             "Use the code from your list; names, initials with dots and e-mail addresses stay off this computer.",
         )
     return code

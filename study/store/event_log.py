@@ -94,6 +94,17 @@ def read_opening(path: Path) -> Event | None:
     return _event(path, 1, line) if line.endswith(b"\n") else None
 
 
+def readable_events(path: Path) -> tuple[Event, ...]:
+    """The events before the first damage, for whoever wants to look at a log that cannot be used. Raises nothing."""
+    events: list[Event] = []
+    try:
+        for line in path.read_bytes().split(b"\n")[:-1]:
+            events.append(parse_event(line))
+    except (OSError, ValueError):
+        pass  # here the damage begins; whoever reads this knows of it
+    return tuple(events)
+
+
 def mend(path: Path, contents: LogContents) -> None:
     """Cut off a torn last line, so that the next fact starts on a line of its own."""
     if not contents.torn_bytes:

@@ -1,0 +1,35 @@
+"""What a participant code looks like: a rule for screens, command line and store alike. Pure, and light to import."""
+
+import re
+
+ALLOWED = "a code has 1 to 16 letters and digits, at least one digit, such as P01"
+
+_CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
+_NUMBERED = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
+
+
+def is_code(text: str) -> bool:
+    """Letters and digits, nothing that could be a name with an address."""
+    return _CODE.fullmatch(text) is not None
+
+
+def code_problem(text: str) -> str:
+    """What is wrong with a code, as a sentence for whoever types it; empty where nothing is."""
+    if is_code(text):
+        return ""
+    if not text.strip():
+        return f"A code is needed: {ALLOWED.removeprefix('a code has ')}."
+    return f"'{text}' is no participant code; {ALLOWED}."
+
+
+def next_code(taken: tuple[str, ...]) -> str:
+    """A code that nobody has, in the manner of the latest of those taken (latest first); P01 where there is none."""
+    for code in taken:
+        match = _NUMBERED.fullmatch(code)
+        if match is None:
+            continue
+        letters, width = match["letters"], len(match["digits"])
+        numbers = [int(m["digits"]) for m in map(_NUMBERED.fullmatch, taken) if m and m["letters"] == letters]
+        proposed = f"{letters}{max(numbers) + 1:0{width}d}"
+        return proposed if is_code(proposed) else "P01"
+    return "P01"

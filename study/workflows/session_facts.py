@@ -1,0 +1,63 @@
+"""What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
+
+from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed
+from study.session.state import SessionState
+from study.workflows.fold_session import FoldedSession
+
+_HASH_DIGITS = 12
+
+
+def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
+    state, events = folded.state, folded.contents.events
+    opened = state.opened
+    who = f"simulated ({opened.observer})" if opened.observer else "a person"
+    lock = "locked" if opened.protocol_locked else "not locked"
+    facts = [
+        ("participant", f"{opened.subject}, {who}, number {opened.participant_number + 1} of this protocol"),
+        ("protocol", f"{state.protocol.name} ({opened.protocol_hash[:_HASH_DIGITS]}, {lock})"),
+        ("title", state.protocol.title),
+        ("device", _device(opened)),
+        ("equalizer", opened.equalizer),
+        ("begun", _when(opened.utc)),
+        ("finished" if state.closed else "last entry", _when(_last_utc(folded))),
+        ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
+        ("runs", f"{state.run} of {len(state.runs)}"),
+        ("answers", _answers(state)),
+        *_forms(folded),
+        ("seed", str(opened.seed)),
+        ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
+    ]
+    return tuple((what, value) for what, value in facts if value)
+
+
+def _device(opened: SessionOpened) -> str:
+    device = opened.device
+    moves = ", simulated: nothing moves" if device.simulated else ""
+    return f"{device.name}{moves}, {device.sample_rate_hz:g} Hz"
+
+
+def _answers(state: SessionState) -> str:
+    void = len(state.trials) - state.answers - (state.presented is not None and state.answered is None)
+    return f"{state.answers}{f', and {void} void presentations' if void else ''}"
+
+
+def _last_utc(folded: FoldedSession) -> str:
+    closed = next((event.utc for event in folded.contents.events if isinstance(event, SessionClosed)), "")
+    return closed or folded.contents.events[-1].utc
+
+
+def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
+    """What the participant chose when looking back; what was written in own words stays in the log file, because it
+    may be about health."""
+    questions = {question.key: question for question in folded.state.protocol.debrief if question.choices}
+    facts = []
+    for event in folded.contents.events:
+        if isinstance(event, FormFilled) and event.form == "consent":
+            facts.append(("consent", f"{'given' if event.passed else 'not given'}, version {event.version}"))
+        if isinstance(event, FormFilled) and event.form == "debrief":
+            facts += [("said", f"{q.question} {event.answers[k]}") for k, q in questions.items() if k in event.answers]
+    return tuple(facts)
+
+
+def _when(utc: str) -> str:
+    return f"{utc[:19].replace('T', ' ')} UTC"

@@ -1,0 +1,130 @@
+"""One line per session. Reads only.
+
+A list has to be there at once: a finished session is told by its last line and counted without being folded; whoever
+opens it gets the whole truth. Others are few, and folded.
+"""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import lru_cache
+
+from protocols.loading import ProtocolError, load_protocol
+from protocols.schedule import runs
+from protocols.study_protocol import StudyProtocol
+from study.errors import StudyError
+from study.session.archive_views import SessionLine
+from study.session.events import SessionOpened
+from study.session.state import SessionState
+from study.store.archive import SessionFolder
+from study.store.event_log import read_opening
+from study.store.json_document import read_json
+from study.store.log_writer import somebody_writes
+from study.workflows.fold_session import fold_session
+from study.workflows.participant_number import TOMBSTONE_FORMAT, TOMBSTONE_VERSION
+
+CLOSED = b'"event":"session_closed"}\n'
+MEASURED = b'"event":"trial_measured"}\n'
+
+
+def session_line(folder: SessionFolder) -> SessionLine:
+    """What cannot be read is a line with a remark. Raises nothing."""
+    try:
+        if folder.withdrawn:
+            return _withdrawn(folder)
+        stat = folder.log.stat()
+        line = _line(folder, stat.st_mtime_ns, stat.st_size)
+    except FileNotFoundError:
+        return unreadable(folder, "It has no log: the program died while it was made.")
+    except StudyError as problem:
+        return unreadable(folder, problem.happened)
+    except OSError as problem:
+        return unreadable(folder, f"The system refused: {problem.strerror or problem}.")
+    return with_writer(line, folder)
+
+
+def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
+    """`running` where somebody writes it right now; the lock is looked at for some microseconds."""
+    if line.standing == "unfinished" and somebody_writes(folder.log):
+        return replace(line, standing="running")
+    return line
+
+
+def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
+    opened = state.opened
+    return SessionLine(
+        name=folder.name,
+        path=str(folder.path),
+        subject=folder.subject,
+        protocol=state.protocol.name,
+        begun_utc=opened.utc,
+        observer=opened.observer,
+        answers=state.answers,
+        runs_done=state.run,
+        runs=len(state.runs),
+        standing="finished" if state.closed else "unfinished",
+    )
+
+
+def unreadable(folder: SessionFolder, why: str) -> SessionLine:
+    """Its begin is unknown: it stands where its folder was last changed."""
+    try:
+        changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
+    except OSError:
+        changed_utc = ""
+    return SessionLine(
+        folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", why
+    )
+
+
+def _withdrawn(folder: SessionFolder) -> SessionLine:
+    protocol, when = "", ""
+    try:
+        left = read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION)
+    except StudyError:
+        left = {}  # that there is a tombstone says enough
+    when = str(left.get("withdrawn_utc", ""))
+    begun = left.get("begun")
+    protocol = str(begun.get("protocol", "")) if isinstance(begun, dict) else ""
+    remark = "The participant withdrew; the data were erased."
+    return SessionLine(
+        folder.name, str(folder.path), folder.subject, protocol, when, None, 0, 0, 0, "withdrawn", remark
+    )
+
+
+@lru_cache(maxsize=4096)
+def _line(folder: SessionFolder, changed_ns: int, size: int) -> SessionLine:
+    """Depends on the log's content alone, for which its time and size stand. Raises StudyError, OSError."""
+    content = folder.log.read_bytes()
+    opened = read_opening(folder.log) if CLOSED in content and _looks_whole(content) else None
+    planned = _planned(opened.protocol_text) if isinstance(opened, SessionOpened) else None
+    if planned is None or not isinstance(opened, SessionOpened) or opened.session != folder.name:
+        return line_of(fold_session(folder).state, folder)
+    protocol, run_count = planned
+    return SessionLine(
+        name=folder.name,
+        path=str(folder.path),
+        subject=folder.subject,
+        protocol=protocol,
+        begun_utc=opened.utc,
+        observer=opened.observer,
+        answers=content.count(MEASURED),
+        runs_done=run_count,
+        runs=run_count,
+        standing="finished",
+    )
+
+
+def _looks_whole(content: bytes) -> bool:
+    """Whether every line could be an event of ours; whoever cannot be sure folds."""
+    return all(line.startswith(b'{"') and line.endswith(b'"}') for line in content.split(b"\n")[:-1])
+
+
+@lru_cache(maxsize=64)
+def _planned(protocol_text: str) -> tuple[str, int] | None:
+    """Name and number of runs; None for text that is no study protocol."""
+    try:
+        protocol = load_protocol(protocol_text, "the log")
+    except ProtocolError:
+        return None
+    # How many there are depends on neither seed nor participant: only their order does.
+    return (protocol.name, len(runs(protocol, 0, 0))) if isinstance(protocol, StudyProtocol) else None
