@@ -11,22 +11,18 @@ import typer
 from study.cli.progress import answer_count
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.devices.device import Fault
-from study.errors import DeviceError, LeftError, WrongUseError
+from study.errors import WrongUseError
 from study.store.archive import check_subject, find_session
-from study.store.protocol_files import read_study_protocol
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
-from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.display import PersonsHand
+from study.workflows.end_sitting import end_sitting
 from study.workflows.fold_session import fold_session
-from study.workflows.open_session import SessionPlan, fresh_seed
-from study.workflows.participant_code import check_code, unfinished_sessions
+from study.workflows.plan_sitting import plan_sitting
 from study.workflows.requests_port import QueuedRequests
-from study.workflows.session_results import write_results
 from study.workflows.simulated_participant import simulated_participant
-from study.workflows.withdraw_participant import plan_withdrawal, withdraw
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,26 +34,13 @@ class Sitter:
 
 
 def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int | None, as_json: bool) -> None:
-    source = read_study_protocol(protocol_name, data)
-    drawn = fresh_seed() if seed is None else seed
-    plan = SessionPlan(
-        protocol=source.protocol,
-        protocol_text=source.text,
-        protocol_locked=source.locked,
-        subject=check_subject(sitter.subject or _ask_subject(sitter)),
-        observer=sitter.observer,
-        seed=drawn,
-        data=data,
-    )
-    check_code(data, plan.subject, simulated=sitter.observer is not None)
-    for unfinished in unfinished_sessions(data, plan.subject, source.protocol.name):
-        typer.echo(
-            f"Note: {unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it.", err=True
-        )
+    plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data)
+    for note in plan.notes:
+        typer.echo(f"Note: {note}", err=True)
     _say_wait(sitter.observer)
-    with _participant(sitter.observer, drawn, sitter.keys) as participant:
-        end = conduct_new(plan, device, participant)
-    _finish(end, as_json)
+    with _participant(sitter.observer, plan.session.seed, sitter.keys) as participant:
+        end = conduct_new(plan.session, device, participant)
+    show(end_sitting(end, RealClock().utc()), as_json)
 
 
 def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
@@ -66,7 +49,7 @@ def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys
     _say_wait(opened.observer)
     with _participant(opened.observer, opened.seed, keys) as participant:
         end = conduct_resumed(folder, device, participant)
-    _finish(end, as_json)
+    show(end_sitting(end, RealClock().utc()), as_json)
 
 
 @contextmanager
@@ -112,25 +95,3 @@ def _ask_subject(sitter: Sitter) -> str:
             return check_subject(code)
         except WrongUseError as error:
             typer.echo(f"{error.happened} {error.do_now}", err=True)
-
-
-def _finish(end: Conducted, as_json: bool) -> None:
-    """Results of a finished session; otherwise how to go on, with the exit code that says why it ended."""
-    if not end.left:
-        show(write_results(end.folder), as_json)
-        return
-    if end.withdrawn:
-        plan = plan_withdrawal(end.folder)
-        withdraw(end.folder.path.parent, plan, RealClock().utc())
-        raise LeftError(
-            "The participant withdrew",
-            f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
-            "Analyses written elsewhere and copies still hold the numbers: erase them too.",
-        )
-    kind = LeftError if end.fault is Fault.NONE else DeviceError
-    raise kind(
-        "The session is not finished",
-        f"The sitting ended: {end.left}.",
-        f"Go on with: hapteq resume {end.folder.path}",
-        saved=f"{end.state.answers} answers are on disk.",
-    )

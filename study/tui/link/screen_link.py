@@ -1,0 +1,88 @@
+"""The engine's end of the pipe: a thread that hears the screen while the engine is busy with a session."""
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from queue import Empty, SimpleQueue
+
+from study.tui.link.messages import Command, FromEngine, Heartbeat, LetGo, Relay, Reply, ToEngine
+from study.workflows.requests_port import QueuedRequests
+
+LAST_RESORT_S = 5.0
+"""So long after the screen is gone the process ends by force. The device was stopped long before."""
+
+
+class ScreenLink:
+    """interrupt: raises KeyboardInterrupt in the main thread, if that is busy. Called from the reading thread."""
+
+    def __init__(self, connection: Connection, interrupt: Callable[[], None]) -> None:
+        self.commands: SimpleQueue[Command | None] = SimpleQueue()
+        """None: the screen is gone."""
+        self.requests = QueuedRequests()
+        self.stop_device: Callable[[], None] | None = None
+        """While a device is open: what takes its force away from any thread."""
+        self.ended = False
+        self._connection = connection
+        self._interrupt = interrupt
+        self._replies: SimpleQueue[Reply] = SimpleQueue()
+        self._sending = threading.Lock()
+        self._heard_s = time.monotonic()
+
+    def start(self) -> None:
+        threading.Thread(target=self._listen, name="screen-link", daemon=True).start()
+
+    def send(self, message: FromEngine) -> None:
+        """Raises KeyboardInterrupt where the screen is gone."""
+        try:
+            with self._sending:
+                self._connection.send(message)
+        except OSError:
+            self.ended = True
+            raise KeyboardInterrupt from None
+
+    def reply(self, patience_s: float) -> Reply | None:
+        """The next reply, whatever its number. Raises KeyboardInterrupt where the screen is gone."""
+        if self.ended:
+            raise KeyboardInterrupt
+        try:
+            return self._replies.get(timeout=patience_s)
+        except Empty:
+            return None
+
+    def silent_s(self) -> float:
+        """For how long the screen has given no sign of life."""
+        return time.monotonic() - self._heard_s
+
+    def _listen(self) -> None:
+        try:
+            while True:
+                self._take(self._connection.recv())
+        except (EOFError, OSError):
+            self.ended = True
+        self._let_go()
+        self.commands.put(None)
+        time.sleep(LAST_RESORT_S)
+        os._exit(1)
+
+    def _take(self, message: ToEngine) -> None:
+        # Whatever comes was sent by a living screen; only heartbeats come all the time.
+        self._heard_s = time.monotonic()
+        match message:
+            case Heartbeat():
+                return
+            case Reply():
+                self._replies.put(message)
+            case Relay(request=request):
+                self.requests.send(request)
+            case LetGo():
+                self._let_go()
+            case _:
+                self.commands.put(message)
+
+    def _let_go(self) -> None:
+        """The main thread takes the force away too, but it may be waiting for a disk or a driver."""
+        self._interrupt()
+        if (stop := self.stop_device) is not None:
+            stop()

@@ -1,0 +1,38 @@
+"""After a sitting, with the device closed: the results of a finished session, or why there are none."""
+
+from study.devices.device import Fault
+from study.errors import DeviceError, LeftError, StudyError
+from study.workflows.conduct_session import Conducted
+from study.workflows.session_results import write_results
+from study.workflows.withdraw_participant import plan_withdrawal, withdraw
+from study.workflows.written_analysis import WrittenAnalysis
+
+
+def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
+    """Raises StudyError for a session that is not finished: how to go on, and an exit code that says why it ended.
+    Erases first what a participant withdrew."""
+    if end.withdrawn:
+        raise _erased(end, utc)
+    if end.left:
+        raise _not_finished(end)
+    return write_results(end.folder)
+
+
+def _not_finished(end: Conducted) -> StudyError:
+    kind = LeftError if end.fault is Fault.NONE else DeviceError
+    return kind(
+        "The session is not finished",
+        f"The sitting ended: {end.left}.",
+        f"Go on with: hapteq resume {end.folder.path}",
+        saved=f"{end.state.answers} answers are on disk.",
+    )
+
+
+def _erased(end: Conducted, utc: str) -> StudyError:
+    plan = plan_withdrawal(end.folder)
+    withdraw(end.folder.path.parent, plan, utc)
+    return LeftError(
+        "The participant withdrew",
+        f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
+        "Analyses written elsewhere and copies still hold the numbers: erase them too.",
+    )
