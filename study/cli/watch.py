@@ -118,7 +118,8 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
 
     session = SessionFolder(folder)
     if stop:
-        _ask_for(session, StopAsked("experimenter"), f"The force is off and the sitting ends. Go on with: hapteq resume {folder}")
+        said = f"The force is off and the sitting ends. Go on with: hapteq resume {folder}"
+        _ask_for(session, StopAsked("experimenter"), said)
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)

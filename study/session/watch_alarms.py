@@ -38,6 +38,11 @@ class Situation:
     def trials(self) -> tuple[Trial, ...]:
         return self.watched.state.trials
 
+    @property
+    def fresh(self) -> bool:
+        """Whether the live state is of now."""
+        return self.live is not None and self.seconds_since(self.live.utc) <= SILENT_AFTER_S
+
     def seconds_since(self, utc: str) -> float:
         return 60.0 * minutes_between(utc, self.now_utc)
 
@@ -60,7 +65,7 @@ def alarms_of(now: Situation, before: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
 def _silent(now: Situation) -> Alarm | None:
     """The session should be alive, and nothing lives."""
     live, silence = now.live, "The session has been silent for seconds: it hangs, or was killed. Hands off the handle."
-    if live is None or now.seconds_since(live.utc) <= SILENT_AFTER_S:
+    if live is None or now.fresh:
         return None
     expected = live.activity in _LIVELY or (live.activity == "trial" and now.watched.state.presented is not None)
     return Alarm("silent", silence, live.utc) if expected else None
@@ -85,13 +90,13 @@ def _unreadable(now: Situation) -> Alarm | None:
 
 
 def _device(now: Situation) -> Alarm | None:
-    if now.live is None or not now.live.fault:
+    if now.live is None or not now.fresh or not now.live.fault:
         return None
     return Alarm("device", f"The device reported a fault: {now.live.fault}.", now.live.utc)
 
 
 def _clipped(now: Situation) -> Alarm | None:
-    if now.live is None or not now.live.sensor_clipped:
+    if now.live is None or not now.fresh or not now.live.sensor_clipped:
         return None
     return Alarm(
         "sensor", "The acceleration sensor is clipped: it reads too little.", now.now_utc
@@ -100,7 +105,7 @@ def _clipped(now: Situation) -> Alarm | None:
 
 def _handle(now: Situation) -> Alarm | None:
     live, radius = now.live, now.watched.state.protocol.gate.radius_mm
-    if live is None:
+    if live is None or not now.fresh:
         return None
     waiting = live.activity == "waiting for the handle"
     if waiting and not live.handle_ready and now.seconds_since(live.since_utc) > HANDLE_AWAY_S:

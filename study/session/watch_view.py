@@ -172,6 +172,7 @@ class WatchView:
     gate_radius_mm: float
     """0 where there is no gate."""
     live: Live | None
+    """None where nobody has told for some seconds."""
     alarms: tuple[Alarm, ...]
 
     @property

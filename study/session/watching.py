@@ -60,7 +60,7 @@ def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView
         forms=watched.forms,
         notes=watched.notes[::-1],
         gate_radius_mm=state.protocol.gate.radius_mm,
-        live=live if standing in ON else None,
+        live=live if standing in ON and situation.fresh else None,
         alarms=alarms_of(situation, before.alarms if before is not None else ()),
     )
 

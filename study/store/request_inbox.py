@@ -21,7 +21,7 @@ REQUESTS_NAME = "requests"
 REQUEST_FORMAT = "hapteq-request"
 REQUEST_VERSION = 1
 
-_KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
+KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
 _STOP = "stop"
 _WHO = get_args(Who)
 _LARGEST = 1 << 16
@@ -41,7 +41,7 @@ class RequestInbox:
 
     def send(self, request: Request) -> str:
         """Returns the request's name, for `unread` and `take_back`. Raises StudyError where it cannot be written."""
-        kind = next(word for word, known in _KINDS.items() if isinstance(request, known))
+        kind = next(word for word, known in KINDS.items() if isinstance(request, known))
         key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
         name = f"{kind}-{key}.json"
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
@@ -141,7 +141,7 @@ def _parsed(content: bytes) -> Request | None:
         return None
     if not isinstance(document, dict) or document.pop("format", None) != REQUEST_FORMAT:
         return None
-    kind = _KINDS.get(str(document.pop("request", None)))
+    kind = KINDS.get(str(document.pop("request", None)))
     if document.pop("version", None) != REQUEST_VERSION or kind is None or not _fits(kind, document):
         return None
     return kind(**document)

@@ -87,7 +87,7 @@ def catch_words(view: WatchView) -> str:
 def handle_words(view: WatchView) -> str:
     live = view.live
     if live is None or live.offset_mm is None:
-        return "no reading"
+        return "not read now"
     if not live.handle_ready:
         return f"{live.offset_mm:.1f} mm: OUT of place"
     allowed = f", {view.gate_radius_mm:g} allowed" if view.gate_radius_mm else ""
@@ -97,7 +97,7 @@ def handle_words(view: WatchView) -> str:
 def sensor_words(view: WatchView) -> str:
     live = view.live
     if live is None or live.acceleration_mps2 is None:
-        return "no reading"
+        return "not read now"
     clipped = " CLIPPED" if live.sensor_clipped else ""
     late = f", {live.missed_ticks} late" if live.missed_ticks else ""
     return f"{live.acceleration_mps2:.1f} m/s²{clipped}{late}"
@@ -105,7 +105,7 @@ def sensor_words(view: WatchView) -> str:
 
 def device_words(view: WatchView) -> str:
     if view.live is None:
-        return "no live state"
+        return "not read now"
     if view.live.fault:
         return f"FAULT: {view.live.fault}"
-    return "simulated, nothing moves" if view.simulated else "no fault"
+    return "simulated" if view.simulated else "no fault"

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from pydantic import TypeAdapter
+
 from analysis.diagnosis import document
 from analysis.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
@@ -18,9 +20,11 @@ from equalizer.tracking.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.schema import protocol_schema
 from protocols.trial import Trial
 from study.session.events import EVENTS
-from study.store import identified_model_file, mechanical_model_file, recording_layout
+from study.session.live import Live
+from study.store import identified_model_file, live_file, mechanical_model_file, recording_layout
 from study.store.csv_rows import columns, in_words
 from study.store.layout import Entry
+from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.store.text_file import write_text
 
 
@@ -43,6 +47,15 @@ def document_schema(payload: Mapping[str, Any], format_name: str, version: int) 
     }
 
 
+def request_schema() -> dict[str, Any]:
+    """One alternative for each thing that can be asked."""
+    schemas = {kind: TypeAdapter(asked).json_schema() for kind, asked in KINDS.items()}
+    for kind, schema in schemas.items():
+        schema["properties"]["request"] = {"const": kind}
+        schema["required"].append("request")
+    return {"oneOf": [document_schema(schema, REQUEST_FORMAT, REQUEST_VERSION) for schema in schemas.values()]}
+
+
 SCHEMAS: tuple[Schema, ...] = (
     Schema("study_protocol.json", "study protocols, read from TOML", lambda: protocol_schema("study")),
     Schema("session_event.json", "one line of `events.jsonl`", EVENTS.json_schema),
@@ -51,6 +64,17 @@ SCHEMAS: tuple[Schema, ...] = (
         "diagnosis.json",
         "`diagnosis.json`",
         lambda: document_schema(document.diagnosis_schema(), document.FORMAT, document.VERSION),
+    ),
+    Schema(
+        "live.json",
+        "`live.json`, how a running session is right now; replaced several times a second",
+        lambda: document_schema(TypeAdapter(Live).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION),
+    ),
+    Schema(
+        "request.json",
+        "one file in a session's `requests/`: what is asked of it from beside, removed when it is taken; a name that "
+        "begins with `stop` is a stop, whatever the file holds",
+        request_schema,
     ),
 )
 """A new JSON format adds its schema here."""

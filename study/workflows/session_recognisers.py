@@ -1,5 +1,6 @@
 """Recognisers of what a study leaves behind: session folders and logs, summaries, statistics, locks, tombstones."""
 
+from dataclasses import fields
 from pathlib import Path
 
 from analysis.detection import detection_thresholds
@@ -8,11 +9,14 @@ from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, TrialMeasured
+from study.session.live import Live
 from study.store.archive import SessionFolder
 from study.store.event_log import LOG_NAME
 from study.store.file_errors import UnusableFileError
 from study.store.json_document import read_json
+from study.store.live_file import LIVE_FORMAT
 from study.store.provenance import sha256_of
+from study.store.request_inbox import REQUEST_FORMAT
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.workflows.file_content import FileContent
@@ -25,6 +29,8 @@ KIND = "session"
 DOCUMENTS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
     "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
+    LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live))),
+    REQUEST_FORMAT: ("request to a running session", ("request", "who")),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
 """Format: what it is, and the keys it must have."""

@@ -130,6 +130,7 @@ class WatchScreen(Screen[None]):
         self._taken: WatchView | None = None
         self._news_s = time.monotonic()
         self._stop_sent_s: float | None = None
+        self._stopped_here = False
         self._said_s = float("-inf")
 
     def compose(self) -> ComposeResult:
@@ -167,6 +168,7 @@ class WatchScreen(Screen[None]):
 
     def on_watch_message(self, message: WatchMessage) -> None:
         self._news_s = time.monotonic()
+        self._stopped_here = self._stopped_here and message.view.standing not in ON
         self.view = message.view
 
     def watch_view(self, view: WatchView | None) -> None:
@@ -193,19 +195,24 @@ class WatchScreen(Screen[None]):
 
     def _attend(self) -> None:
         now_s = time.monotonic()
-        alarms = (*self._own_alarms(now_s), *(self.view.alarms if self.view is not None else ()))
+        alarms = (*self._own_alarms(now_s), *self._alarms_of_the_view())
         if self._book.take(alarms, now_s):
             self.app.bell()
         self._show_alarms()
         if now_s - self._said_s > SAID_FOR_S:
             self._guide(GUIDE, said=False)
 
+    def _alarms_of_the_view(self) -> tuple[Alarm, ...]:
+        """Nobody needs to be alarmed by the end that was asked for here."""
+        alarms = self.view.alarms if self.view is not None else ()
+        return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
+
     def _own_alarms(self, now_s: float) -> list[Alarm]:
         """Of what the log cannot tell: that nobody reads it any more, that a stop was not heard."""
         since = self.view.utc if self.view is not None else ""
         alarms = []
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:
-            self._stop_sent_s = None
+            self._stop_sent_s, self._stopped_here = None, True
             self._say(f"The session has stopped: {self.view.reason}.")
         if self._stop_sent_s is not None and now_s - self._stop_sent_s > UNHEARD_AFTER_S:
             unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
@@ -237,7 +244,7 @@ class WatchScreen(Screen[None]):
     def action_note(self, adverse: bool) -> None:
         def write(text: str | None) -> None:
             if text:
-                self._send(NoteAsked("experimenter", text, adverse), "Noted: it is written at the next pause or trial.")
+                self._send(NoteAsked("experimenter", text, adverse), "Sent: the session writes it into the log.")
 
         self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
 
