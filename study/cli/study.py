@@ -1,5 +1,6 @@
 """`hapteq study`: take the study, as a person or as a simulated participant."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -36,8 +37,13 @@ def study(
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
     from study.cli.conduct import Sitter, begin
 
-    if observer is None and not plain and (sys.stdin is None or not sys.stdin.isatty()):
+    if observer is None and not plain and not _in_a_browser() and (sys.stdin is None or not sys.stdin.isatty()):
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
     sitter = Sitter(observer=observer, subject=subject, keys=parse_keys(keys))
     begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json)
+
+
+def _in_a_browser() -> bool:
+    """Started by `hapteq serve`: there is no terminal, and the page is the screen."""
+    return "TEXTUAL_DRIVER" in os.environ
