@@ -1,9 +1,13 @@
 """A canvas of braille dots: 2 x 4 per character cell, nearly square, in any UTF-8 terminal."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 """Bit of the dot in row r, column c of a cell, in Unicode's order."""
+
+Point = tuple[float, float]
 
 
 @dataclass(slots=True)
@@ -25,12 +29,16 @@ class Canvas:
     def height(self) -> int:
         return 4 * self.rows
 
+    @property
+    def middle(self) -> Point:
+        return (self.width - 1) / 2, (self.height - 1) / 2
+
     def dot(self, x: int, y: int) -> None:
         """Dots outside the canvas are dropped."""
         if 0 <= x < self.width and 0 <= y < self.height:
             self._cells[(y // 4) * self.columns + x // 2] |= _DOTS[y % 4][x % 2]
 
-    def line(self, start: tuple[float, float], end: tuple[float, float], dashed: bool = False) -> None:
+    def line(self, start: Point, end: Point, dashed: bool = False) -> None:
         steps = max(1, round(max(abs(end[0] - start[0]), abs(end[1] - start[1]))))
         for i in range(steps + 1):
             if dashed and i % 8 >= 5:
@@ -39,9 +47,49 @@ class Canvas:
             x, y = start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
             self.dot(round(x), round(y))
 
+    def stroke(self, start: Point, end: Point, thickness: float) -> None:
+        """A straight bar with square ends."""
+        length = math.dist(start, end)
+        if length == 0:
+            return
+        across = (start[1] - end[1]) / length * thickness / 2, (end[0] - start[0]) / length * thickness / 2
+        self.fill(
+            (
+                (start[0] + across[0], start[1] + across[1]),
+                (end[0] + across[0], end[1] + across[1]),
+                (end[0] - across[0], end[1] - across[1]),
+                (start[0] - across[0], start[1] - across[1]),
+            )
+        )
+
+    def circle(self, centre: Point, radius: float) -> None:
+        steps = max(8, math.ceil(2 * math.pi * radius))
+        for i in range(steps):
+            turn = 2 * math.pi * i / steps
+            self.dot(round(centre[0] + radius * math.cos(turn)), round(centre[1] + radius * math.sin(turn)))
+
+    def disc(self, centre: Point, radius: float) -> None:
+        turns = [2 * math.pi * i / 24 for i in range(24)]
+        self.fill([(centre[0] + radius * math.cos(turn), centre[1] + radius * math.sin(turn)) for turn in turns])
+
+    def fill(self, corners: Sequence[Point]) -> None:
+        """A convex polygon, with its outline. Row by row: a large drawing must not hold up the keys."""
+        top = max(0, math.ceil(min(y for _, y in corners)))
+        bottom = min(self.height - 1, math.floor(max(y for _, y in corners)))
+        sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
+        for y in range(top, bottom + 1):
+            crossings = [_crossing(a, b, y) for a, b in sides if min(a[1], b[1]) <= y <= max(a[1], b[1])]
+            for x in range(math.ceil(min(crossings)), math.floor(max(crossings)) + 1):
+                self.dot(x, y)
+
     def lines(self) -> list[str]:
         cells = ["".join(chr(0x2800 + c) for c in self._row(r)) for r in range(self.rows)]
         return [row.replace("\u2800", " ") for row in cells]
 
     def _row(self, row: int) -> list[int]:
         return self._cells[row * self.columns : (row + 1) * self.columns]
+
+
+def _crossing(a: Point, b: Point, y: float) -> float:
+    """x at which the side from a to b passes the height y."""
+    return a[0] if a[1] == b[1] else a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])

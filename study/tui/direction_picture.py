@@ -1,6 +1,7 @@
 """The two directions as oriented segments, told apart by number, place and line style, and in words."""
 
 import math
+from functools import lru_cache
 
 from study.session.views import DirectionPicture
 from study.tui.braille import Canvas
@@ -28,6 +29,36 @@ def drawing(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list
     right = _one(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
     numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
     return [f"{a}    {b}".rstrip() for a, b in zip(left, right, strict=True)] + [numbers.rstrip()]
+
+
+@lru_cache(maxsize=64)
+def large_drawing(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
+    """One direction as large as fits: a thick segment with a head at both ends; 1 is solid, 2 is dashed."""
+    canvas = Canvas(columns, rows)
+    right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
+    x, y = canvas.middle
+    reach = min(x, y)
+    thick = max(2.5, reach / 8)
+    head = 2.6 * thick
+    shaft = reach - head
+
+    def at(along: float, across: float = 0.0) -> tuple[float, float]:
+        return x + along * right + across * up, y - along * up + across * right
+
+    for side in (-1, 1):
+        base = side * shaft
+        canvas.fill((at(side * reach), at(base, 1.5 * thick), at(base, -1.5 * thick)))
+    for begin, end in ((-shaft, shaft),) if number == 1 else _dashes(shaft, 2.2 * thick, 1.1 * thick):
+        canvas.stroke(at(begin), at(end), thick)
+    return tuple(canvas.lines())
+
+
+def _dashes(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
+    """Begin and end of each dash, spread evenly, with a gap at both ends."""
+    count = max(1, round((2 * half_length - gap) / (dash + gap)))
+    stretch = 2 * half_length / (count * dash + (count + 1) * gap)
+    begins = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]
+    return [(begin, begin + stretch * dash) for begin in begins]
 
 
 def _one(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:

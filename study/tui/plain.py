@@ -26,6 +26,7 @@ from study.tui import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.conversation import Conversation
 from study.tui.line_input import LineInput
+from study.tui.trial_words import progress_sentence, run_name
 from study.workflows.display import SignOfLife
 
 
@@ -68,9 +69,9 @@ class PlainDisplay:
         return plain_demo.await_handle(look, self._talk, sign_of_life)
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        run = (plain_question.run_name(question), question.run_number)
+        run = (run_name(question), question.run_number)
         if question.progress is not None and run != self._run_told:
-            self._talk.say("", plain_question.progress_sentence(question.progress))
+            self._talk.say("", progress_sentence(question.progress))
             self._run_told = run
         return plain_question.ask(question, self._talk, self._keys, sign_of_life)
 

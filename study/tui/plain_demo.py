@@ -6,7 +6,8 @@ from study.session.views import DemoChoice, DemoDone, DemoMenu, HandleView, Play
 from study.tui.answer_keys import AnswerKeys
 from study.tui.conversation import GLANCE_S, Conversation, WaitOver, shown
 from study.tui.direction_picture import sentence
-from study.tui.plain_question import LEFT, PAUSE
+from study.tui.plain_question import LEFT
+from study.tui.trial_replies import PAUSE
 from study.workflows.display import SignOfLife
 
 SAY_AGAIN_S = 1.0

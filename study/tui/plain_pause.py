@@ -5,7 +5,7 @@ from collections.abc import Callable
 from study.session.requests import NoteAsked
 from study.session.views import AfterPause, PauseNotice, RestNotice
 from study.tui.conversation import GLANCE_S, Conversation, Line, WaitOver, printable, shown
-from study.tui.plain_question import progress_sentence
+from study.tui.trial_words import progress_sentence, runs_left
 from study.workflows.display import SignOfLife
 
 WITHDRAW = "withdraw"
@@ -15,8 +15,8 @@ COUNT_EVERY_S = 10.0
 
 
 def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> float:
-    left = "1 run is" if notice.runs_left == 1 else f"{notice.runs_left} runs are"
-    talk.say("", f"Rest. Let go of the handle for at least {notice.seconds:.0f} s. {left} left.")
+    left = runs_left(notice.runs_left)
+    talk.say("", f"Rest. Let go of the handle for at least {notice.seconds:.0f} s. {left}")
     if notice.progress is not None:
         talk.say(progress_sentence(notice.progress))
     started_s = talk.clock.now_s()

@@ -1,11 +1,9 @@
 """Line mode: one trial, and what is said around it."""
 
-from protocols.trial import Phase
 from study.session.views import (
     Answered,
     DirectionPicture,
     PracticeResult,
-    Progress,
     Question,
     Reply,
     Task,
@@ -15,11 +13,11 @@ from study.session.views import (
 from study.tui.answer_keys import AnswerKeys
 from study.tui.conversation import Conversation, Line, WaitOver, shown
 from study.tui.direction_picture import drawing, sentence
+from study.tui.trial_replies import PAUSE, REPEAT
+from study.tui.trial_words import heading, plan
 from study.workflows.display import SignOfLife
 
 LEFT = Unanswered("the participant left", leave=True)
-PAUSE = Unanswered("asked for a pause", leave=False, asked=True, pause=True)
-REPEAT = Unanswered("asked to repeat", leave=False, asked=True)
 INTERVALS = "In one of the two intervals it shook, however weakly; in the other it did not. Type the number of the one."
 
 
@@ -46,7 +44,7 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
         *pictured(notice.picture),
         "",
         "Feel as long as you like, then type its number and Enter. When in doubt, guess.",
-        _plan(notice),
+        plan(notice),
         keys_sentence(keys),
     )
     if not notice.felt:
@@ -83,29 +81,6 @@ def understood(line: Line, keys: AnswerKeys) -> Reply | None:
     return {"q": LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
 
 
-def heading(question: Question) -> str:
-    """Where in the session this trial stands: by runs and counts, which say nothing about levels."""
-    again = ", once more" if question.repeated else ""
-    return (
-        f"{run_name(question)} {question.run_number} of {question.runs_in_phase}, trial {question.trial_number}{again}"
-    )
-
-
-def run_name(question: Question) -> str:
-    if question.practice:
-        return "Practice"
-    if question.task is Task.INTERVAL:
-        return "Interval run"
-    return "Training" if question.phase is Phase.TRAINING else "Run"
-
-
-def progress_sentence(progress: Progress) -> str:
-    left = ""
-    if progress.minutes_left is not None:
-        left = f", about {progress.minutes_left} minute{'s' if progress.minutes_left != 1 else ''} left"
-    return f"{progress.share_done:.0%} of the session is done{left}."
-
-
 def practice_over(result: PracticeResult, talk: Conversation) -> None:
     talk.forget()
     talk.say("", f"End of this practice. Right answers: {result.right} of the last {result.of}.")
@@ -115,10 +90,3 @@ def practice_over(result: PracticeResult, talk: Conversation) -> None:
         talk.say("Some vibrations are hard to tell, for anybody. The study goes on all the same.")
     talk.say("Press Enter to go on.")
     talk.answer_or_leave()
-
-
-def _plan(notice: Welcome) -> str:
-    runs = f"{notice.runs} run{'s' if notice.runs != 1 else ''}"
-    if notice.training_runs and notice.runs:
-        return f"There is some training first, then {runs} with rests between them."
-    return f"There {'are' if notice.runs != 1 else 'is'} {runs}." if notice.runs else "This is a training session."
