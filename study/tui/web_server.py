@@ -5,6 +5,7 @@ website drive the device. The connection's origin tells whose page it is.
 """
 
 import asyncio
+import logging
 import shlex
 from collections.abc import Callable, Sequence
 
@@ -27,6 +28,10 @@ class ScreenServer(Server):
         self._say = say
         self._origins = origins(host, port)
         self._seat = asyncio.Lock()
+
+    def initialize_logging(self) -> None:
+        """Each request in a line of its own would hide what must be read."""
+        logging.basicConfig(level=logging.WARNING, format="%(message)s")
 
     async def on_startup(self, app: web.Application) -> None:
         self._say(f"The study is at {self.public_url} for one window at a time. Ctrl-C ends it.")
