@@ -26,6 +26,8 @@ from study.cli import (
     rehearse,
     resume,
     serve,
+    sessions,
+    show,
     study,
     validate,
     watch,
@@ -51,6 +53,8 @@ app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
 app.command("watch")(watch.watch)
 app.command("note")(note.note)
+app.command("sessions")(sessions.sessions)
+app.command("show")(show.show)
 app.command("withdraw")(withdraw.withdraw)
 app.command("validate")(validate.validate)
 app.command("doctor")(doctor.doctor)

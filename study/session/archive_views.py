@@ -89,3 +89,7 @@ class DiagnosisView:
     fit: tuple[tuple[str, ...], ...]
     remainder: tuple[tuple[str, ...], ...]
     next_experiment: str
+    report: str = ""
+    """Path of the report.html beside it; empty where there is none."""
+    notes: tuple[str, ...] = ()
+    """Such as how errors were measured, and what was re-tuned."""

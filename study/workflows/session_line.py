@@ -71,9 +71,7 @@ def unreadable(folder: SessionFolder, why: str) -> SessionLine:
         changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:
         changed_utc = ""
-    return SessionLine(
-        folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", why
-    )
+    return SessionLine(folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", why)
 
 
 def _withdrawn(folder: SessionFolder) -> SessionLine:

@@ -1,0 +1,98 @@
+"""`hapteq show`: one session, or one diagnosis, as the screen shows it."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.study import DataOption
+
+if TYPE_CHECKING:
+    from study.session.archive_views import DiagnosisView, SessionView, Staircase
+
+PLOT_COLUMNS, PLOT_ROWS = 78, 12
+
+
+def show(
+    what: Annotated[str, typer.Argument(help="A session (its folder or name), or a diagnosis.json.", metavar="WHAT")],
+    data: DataOption = Path("data"),
+    log: Annotated[bool, typer.Option("--log", help="Also the log in words.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Facts, thresholds, warnings and staircases of a session; or verdict, effects and fit of a diagnosis."""
+    if Path(what).is_file():
+        from study.workflows.view_diagnosis import diagnosis_view
+
+        diagnosis = diagnosis_view(Path(what))
+        _say([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
+        return
+    from study.workflows.view_session import session_view
+
+    session = session_view(_folder(what, data))
+    _say([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
+
+
+def _folder(what: str, data: Path) -> Path:
+    """Also that of a session that was withdrawn or cannot be read: these are looked at too."""
+    from study.store.archive import find_session, session_folders
+
+    folder = Path(what) if Path(what).is_dir() else data / what
+    known = [known.path.resolve() for known in session_folders(folder.absolute().parent)]
+    return folder if folder.resolve() in known else find_session(what, data).path
+
+
+def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
+    from study.tui.staircase_drawing import LEGEND
+    from study.tui.standing_words import describe
+    from study.tui.text_rows import aligned
+
+    yield describe(view.line)
+    yield ""
+    yield from aligned(view.facts)
+    if view.thresholds:
+        yield from ("", *aligned(view.thresholds))
+    for warning in view.warnings:
+        yield f"\nNote: {warning}"
+    if view.staircases:
+        yield f"\n{LEGEND}"
+    for staircase in view.staircases:
+        yield from _plot(staircase)
+    if log:
+        yield from ("", *view.events)
+    if view.report:
+        yield f"\nReport: {view.report}"
+
+
+def _plot(staircase: "Staircase") -> Iterable[str]:
+    from study.tui.staircase_drawing import staircase_lines, summary
+
+    yield f"\n{staircase.title}"
+    yield from staircase_lines(staircase, PLOT_COLUMNS, PLOT_ROWS)
+    yield summary(staircase)
+
+
+def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
+    from study.tui.text_rows import aligned
+
+    yield view.verdict
+    for title, sentences in (("Effects", view.sentences), ("Rivals, and why not", view.rivals)):
+        if sentences:
+            yield from ("", title, *(f"  {sentence}" for sentence in sentences))
+    for title, rows in (("Fit", view.fit), ("Mismatch", view.mismatch), ("What remains", view.remainder)):
+        if rows:
+            yield from ("", title, *(f"  {row}" for row in aligned(rows)))
+    yield ""
+    yield from view.notes
+    if view.next_experiment:
+        yield from ("", "Next", *(f"  {line}" for line in view.next_experiment.splitlines()))
+    if view.report:
+        yield f"\nReport: {view.report}"
+
+
+def _say(lines: Iterable[str]) -> None:
+    for line in lines:
+        typer.echo(line)

@@ -1,0 +1,64 @@
+"""What the screens around a session ask for. The application hears these and lets the engine do it.
+
+Values: nobody changes one after posting it (Textual itself writes its own fields into a message, so they cannot be
+frozen).
+"""
+
+from dataclasses import dataclass
+
+from textual.message import Message
+
+
+@dataclass(eq=False)
+class BeginWanted(Message):
+    """A new session."""
+
+    subject: str
+    protocol: str
+    """Name or path."""
+    device: str
+
+
+@dataclass(eq=False)
+class ResumeWanted(Message):
+    path: str
+    """Of the session's folder, here and below."""
+
+
+@dataclass(eq=False)
+class SessionWanted(Message):
+    """Look at it."""
+
+    path: str
+
+
+@dataclass(eq=False)
+class AnalyzeWanted(Message):
+    """Write its tables, figures and report anew."""
+
+    path: str
+
+
+@dataclass(eq=False)
+class WithdrawWanted(Message):
+    """Erase the data of this session's participant. The code was typed to confirm it."""
+
+    path: str
+
+
+@dataclass(eq=False)
+class WatchWanted(Message):
+    """Follow it while it runs."""
+
+    path: str
+
+
+@dataclass(eq=False)
+class DiagnosisWanted(Message):
+    path: str
+    """Of a diagnosis.json."""
+
+
+@dataclass(eq=False)
+class HomeWanted(Message):
+    """Back to the start screen, with its list read anew."""

@@ -1,0 +1,102 @@
+"""Pick a session or a diagnosis from anywhere on the disk."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import DirectoryTree, Footer, Input, Static
+
+from study.tui.home_messages import DiagnosisWanted, SessionWanted
+from study.tui.screens.help import HelpScreen
+
+LOG, DIAGNOSIS = "events.jsonl", "diagnosis.json"
+
+HELP = """\
+# Open
+
+Choose **events.jsonl** to open the session it belongs to, or **diagnosis.json** to read a diagnosis. Arrow keys move,
+Enter opens a folder or a file. In the first line another folder, or the whole path of a file, can be typed. Esc goes
+back.
+
+In a terminal: `hapteq show PATH`.
+"""
+
+
+class OurFiles(DirectoryTree):
+    """Folders, and the two kinds of file that can be opened."""
+
+    def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
+        return [path for path in paths if not path.name.startswith(".") and (_is_ours(path) or path.is_dir())]
+
+
+def _is_ours(path: Path) -> bool:
+    return path.name == LOG or (path.suffix == ".json" and "diagnosis" in path.name)
+
+
+class BrowseScreen(ModalScreen[None]):
+    HELP = HELP
+    CSS = """
+    BrowseScreen { align: center middle; }
+    BrowseScreen > Vertical {
+        width: 90%; max-width: 100; height: 90%; border: round $primary; padding: 0 1; background: $surface;
+    }
+    BrowseScreen OurFiles { height: 1fr; background: $surface; }
+    BrowseScreen #said { height: 1; color: $text-muted; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", "Back", key_display="Esc"),
+        Binding("f1", "help", "Help"),  # the application's own keys do not reach through a modal screen
+    ]
+
+    def __init__(self, folder: str) -> None:
+        super().__init__()
+        self._folder = Path(folder) if Path(folder).is_dir() else Path()
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = "Open a session or a diagnosis"
+            yield Input(str(self._folder.absolute()), compact=True, id="path")
+            yield OurFiles(self._folder.absolute(), id="tree")
+            yield Static("", id="said", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self._say(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
+        self.query_one(OurFiles).focus()
+
+    @on(Input.Submitted, "#path")
+    def _go(self, typed: Input.Submitted) -> None:
+        path = Path(typed.value).expanduser()
+        if path.is_dir() and (path / LOG).exists():
+            self._open(path / LOG)
+        elif path.is_dir():
+            tree = self.query_one(OurFiles)
+            tree.path = path
+            tree.focus()
+        elif path.is_file():
+            self._open(path)
+        else:
+            self._say(f"There is nothing at {path}.")
+
+    @on(DirectoryTree.FileSelected)
+    def _picked(self, selected: DirectoryTree.FileSelected) -> None:
+        self._open(selected.path)
+
+    def action_help(self) -> None:
+        self.app.push_screen(HelpScreen(HELP))
+
+    def action_leave(self) -> None:
+        self.dismiss(None)
+
+    def _open(self, path: Path) -> None:
+        wanted = SessionWanted(str(path.parent)) if path.name == LOG else DiagnosisWanted(str(path))
+        self.app.post_message(wanted)
+        self.dismiss(None)
+
+    def _say(self, text: str) -> None:
+        self.query_one("#said", Static).update(text)

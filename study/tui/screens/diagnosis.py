@@ -1,0 +1,107 @@
+"""One diagnosis: the verdict, the physics named, the rivals passed over, and the numbers behind them."""
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container, Horizontal, VerticalScroll
+from textual.screen import Screen
+from textual.widgets import Footer, Static
+
+from study.session.archive_views import DiagnosisView
+from study.tui.home_messages import HomeWanted
+from study.tui.widgets.text_table import TextTable
+
+HELP = """\
+# A diagnosis
+
+Where a model and the device disagree, and why.
+
+* **Verdict**: whether there is a mismatch, and whether it is explained.
+* **Effects**: physics that the model lacks, with its numbers and their 95 % intervals.
+* **Rivals**: what else was considered, and why not.
+* **Fit**: errors of the given model, after re-tuning its own parameters, and with the effects. *repeats allow* is the
+  smallest error that can be reached. *test* is the record that no fit has seen: that line counts.
+* **Mismatch** and **What remains**: where the model is wrong, before and after.
+* **Next**: the recording that would tell rivals apart.
+
+Arrow keys, PageUp and PageDown scroll. **o** opens the report in the browser. **Esc** goes back.
+
+In a terminal: `hapteq show diagnosis.json`.
+"""
+
+
+class DiagnosisScreen(Screen[None]):
+    HELP = HELP
+    CSS = """
+    DiagnosisScreen #head { height: 1; padding: 0 1; background: $primary-muted; }
+    DiagnosisScreen #page { height: 1fr; padding: 0 1; }
+    DiagnosisScreen #halves { height: auto; }
+    DiagnosisScreen .half { height: auto; }
+    DiagnosisScreen.-wide #halves { layout: horizontal; }
+    DiagnosisScreen.-wide .half { width: 1fr; padding-right: 2; }
+    DiagnosisScreen .title { text-style: bold; color: $text-primary; margin-top: 1; }
+    DiagnosisScreen #verdict { text-style: bold; margin-top: 1; }
+    DiagnosisScreen .table { height: auto; overflow-x: auto; }
+    DiagnosisScreen .muted { color: $foreground 65%; }
+    """
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (120, "-wide")]  # noqa: RUF012  # no ClassVar in the base class
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "back", "Back", key_display="Esc"),
+        Binding("o", "open_report", "Open report"),
+    ]
+
+    def __init__(self, view: DiagnosisView) -> None:
+        super().__init__()
+        self._view = view
+
+    def compose(self) -> ComposeResult:
+        view = self._view
+        yield Static(f"Diagnosis   {view.path}", id="head", markup=False)
+        with VerticalScroll(id="page"):
+            yield Static(view.verdict, id="verdict", markup=False)
+            with Container(id="halves"):
+                with Container(classes="half"):
+                    yield from _said("Effects", view.sentences, "No effect is named.")
+                    yield from _said("Rivals, and why not", view.rivals, "No other effect came near.")
+                    yield from _said(
+                        "Next", tuple(view.next_experiment.splitlines()), "No further recording is asked for."
+                    )
+                with Container(classes="half"):
+                    yield from _table("Fit (errors; smaller is better)", view.fit, "No fit is reported.")
+                    yield Static("\n".join(view.notes), classes="muted", markup=False)
+                    yield from _table("Mismatch", view.mismatch, "None beyond what repeats allow.")
+                    yield from _table("What remains", view.remainder, "Nothing beyond what repeats allow.")
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#page").focus()
+
+    def action_back(self) -> None:
+        self.post_message(HomeWanted())
+
+    def action_open_report(self) -> None:
+        self.app.open_url(Path(self._view.report).absolute().as_uri())
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        return action != "open_report" or bool(self._view.report)
+
+
+def _said(title: str, sentences: tuple[str, ...], none: str) -> ComposeResult:
+    yield Static(title, classes="title", markup=False)
+    bullets = Table.grid(padding=(0, 1, 0, 0))
+    for sentence in sentences or (none,):
+        bullets.add_row("•" if sentences else "", Text(sentence))
+    yield Static(bullets)
+
+
+def _table(title: str, rows: tuple[tuple[str, ...], ...], none: str) -> ComposeResult:
+    yield Static(title, classes="title", markup=False)
+    if len(rows) < 2:
+        yield Static(none, markup=False)
+        return
+    with Horizontal(classes="table"):
+        yield TextTable(rows)

@@ -1,0 +1,165 @@
+"""The start: a new session, and the sessions so far. Shown before the list is there."""
+
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container, Vertical, VerticalScroll
+from textual.screen import Screen
+from textual.widgets import Footer, Input, Static
+
+from study.session.archive_views import HomeView
+from study.tui.home_messages import HomeWanted
+from study.tui.screens.browse import BrowseScreen
+from study.tui.standing_words import describe
+from study.tui.widgets.new_session_form import NewSessionForm
+from study.tui.widgets.session_table import SessionTable
+
+LOOKING = "Looking for sessions…"
+
+EMPTY = """\
+No sessions here yet. To begin with:
+
+  1  Try it as a participant would: type the code P00 and press F5. With the simulated device nothing moves.
+  2  See a whole study: [b]hapteq rehearse[/b] in a terminal lets ten simulated participants take it, with a report.
+  3  Read the protocol: [b]hapteq protocol show direction_threshold[/b] gives each value, and the reason for it.
+  4  Before the first real participant: [b]hapteq protocol lock direction_threshold[/b] keeps it as it is.
+
+F1 explains this screen.\
+"""
+
+GUIDE = """\
+[b]A study day[/b]
+
+1  Is the device fit? [b]hapteq doctor[/b]
+2  Type the participant's code, press F5. Consent,
+   instructions and practice follow.
+3  In a second terminal: [b]hapteq watch SESSION[/b]
+4  Afterwards: F3 and Enter for the results.
+
+[b]Standing[/b]
+
+✓  finished: all runs are done
+◐  unfinished: every answer is safe; r resumes
+▶  running now; w watches
+✕  withdrawn: the data were erased
+!  unreadable: Enter says why
+"""
+
+HELP = """\
+# The start
+
+**New session** (F2). Type the participant's code, choose protocol and device, and press F5. A code has 1 to 16 letters
+and digits, with at least one digit, such as P01. Names stay off this computer.
+
+**Sessions** (F3), latest first. The arrow keys move, and:
+
+* **Enter** opens a session: thresholds, staircases, log, report, withdrawal.
+* **r** resumes one that is not finished: ◐.
+* **w** watches one that is running: ▶.
+
+| | |
+|---|---|
+| ✓ finished | all runs are done |
+| ◐ unfinished | it can be resumed; every answer is on disk |
+| ▶ running | another program writes it right now |
+| ✕ withdrawn | the participant withdrew; the data were erased |
+| ! unreadable | its log cannot be used; opening it says why |
+
+**F4** opens a diagnosis or a session from anywhere. **F6** looks again. **Tab** goes from field to field.
+
+In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SESSION`, `hapteq resume SESSION`.
+"""
+
+
+class HomeScreen(Screen[None]):
+    HELP = HELP
+    CSS = """
+    HomeScreen #name { height: 1; padding: 0 1; background: $primary-muted; color: $foreground; }
+    HomeScreen #body { layout: vertical; height: 1fr; }
+    HomeScreen #past { height: 1fr; border: round $primary; padding: 0 1; }
+    HomeScreen #past:focus-within { border: round $accent; }
+    HomeScreen SessionTable {
+        height: 1fr; display: none; background: $background; scrollbar-size-horizontal: 0;
+    }
+    HomeScreen #detail { height: 2; color: $text-muted; }
+    HomeScreen #empty { height: 1fr; display: none; }
+    HomeScreen.-wide #body { layout: horizontal; }
+    HomeScreen #left { height: auto; }
+    HomeScreen #guide { display: none; height: 1fr; border: round $panel; padding: 0 1; color: $foreground 80%; }
+    HomeScreen.-wide #left { width: 52; height: 1fr; }
+    HomeScreen.-wide #guide { display: block; }
+    HomeScreen.-wide NewSessionForm #about { height: 4; margin-top: 1; }
+    """
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (120, "-wide")]  # noqa: RUF012  # no ClassVar in the base class
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f2", "new", "New"),
+        Binding("f3", "past", "Sessions"),
+        Binding("f4", "browse", "File"),
+        Binding("f6", "look_again", "Refresh", show=False),
+    ]
+
+    def __init__(self, home: HomeView | None = None) -> None:
+        super().__init__()
+        self._home = home
+
+    def compose(self) -> ComposeResult:
+        yield Static("hapteq", id="name", markup=False)
+        with Container(id="body"):
+            with Vertical(id="left"):
+                yield NewSessionForm(id="new")
+                yield Static(GUIDE, id="guide")
+            with Vertical(id="past") as past:
+                past.border_title = "Sessions"
+                yield SessionTable(id="sessions")
+                with VerticalScroll(id="empty"):
+                    yield Static(EMPTY)
+                yield Static(LOOKING, id="detail", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#code", Input).focus()
+        if self._home is not None:
+            self._show(self._home)
+
+    def show(self, home: HomeView) -> None:
+        """Also later, with a newer view: what is typed and chosen stays."""
+        self._home = home
+        if self.query("#name"):
+            self._show(home)
+
+    def _show(self, home: HomeView) -> None:
+        self.query_one("#name", Static).update(f"hapteq   force-direction studies   data: {home.data}")
+        self.query_one(NewSessionForm).show(home)
+        some = bool(home.sessions)
+        self.query_one("#past", Vertical).border_title = f"Sessions ({len(home.sessions)})" if some else "Sessions"
+        table = self.query_one(SessionTable)
+        table.display = some
+        self.query_one("#empty").display = not some
+        self.query_one("#detail", Static).update("")
+        self.query_one("#detail").display = some
+        table.show(home.sessions)
+
+    @on(SessionTable.Looked)
+    def _describe(self, looked: SessionTable.Looked) -> None:
+        self.query_one("#detail", Static).update(describe(looked.line))
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """The footer names the way to the half of the screen where the cursor is not."""
+        here = {"new": "#new", "past": "#past"}.get(action)
+        return here is None or not self.query_one(here).has_focus_within
+
+    def action_new(self) -> None:
+        self.query_one("#code", Input).focus()
+
+    def action_past(self) -> None:
+        some = self._home is not None and self._home.sessions
+        self.query_one("#sessions" if some else "#empty").focus()
+
+    def action_browse(self) -> None:
+        self.app.push_screen(BrowseScreen(self._home.data if self._home else "."))
+
+    def action_look_again(self) -> None:
+        self.query_one("#detail", Static).update(LOOKING)
+        self.post_message(HomeWanted())

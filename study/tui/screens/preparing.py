@@ -1,0 +1,59 @@
+"""While the device is being prepared: what is going on, and for how long. No bar, because nobody knows the end."""
+
+import time
+
+from textual.app import ComposeResult
+from textual.containers import Vertical
+from textual.screen import Screen
+from textual.widgets import Footer, Static
+
+TICK_S = 0.5
+
+HELP = """\
+# Preparing
+
+The program gets the device ready. Nothing moves, and nobody needs to do anything. The first time on a computer this
+takes longer, because the simulated device is compiled.
+
+**Ctrl+Q** leaves; a session that was begun can be resumed.
+"""
+
+
+class PreparingScreen(Screen[None]):
+    HELP = HELP
+    CSS = """
+    PreparingScreen { align: center middle; }
+    PreparingScreen > Vertical {
+        width: 70; max-width: 95%; height: auto; border: round $primary; padding: 1 2; background: $surface;
+    }
+    PreparingScreen #elapsed { margin-top: 1; color: $foreground 65%; }
+    """
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__()
+        self._sentence = sentence
+        self._began_s = time.monotonic()
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = "One moment"
+            yield Static(self._sentence, id="sentence", markup=False)
+            yield Static(elapsed(0.0), id="elapsed", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.set_interval(TICK_S, self._tick)
+
+    def say(self, sentence: str) -> None:
+        """What is going on now; the time goes on."""
+        self._sentence = sentence
+        if self.query("#sentence"):
+            self.query_one("#sentence", Static).update(sentence)
+
+    def _tick(self) -> None:
+        self.query_one("#elapsed", Static).update(elapsed(time.monotonic() - self._began_s))
+
+
+def elapsed(seconds: float) -> str:
+    whole = int(seconds)
+    return f"{whole} s so far" if whole < 60 else f"{whole // 60} min {whole % 60} s so far"

@@ -1,0 +1,226 @@
+"""One past session: what it was, what came out, and what can be done with it."""
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import ItemGrid, VerticalScroll
+from textual.content import Content
+from textual.screen import Screen
+from textual.widgets import Footer, Static, TabbedContent, TabPane
+
+from study.session.archive_views import SessionView
+from study.tui.home_messages import AnalyzeWanted, HomeWanted, ResumeWanted, WatchWanted, WithdrawWanted
+from study.tui.screens.withdraw_prompt import WithdrawPrompt
+from study.tui.staircase_drawing import LEGEND
+from study.tui.standing_words import STYLES, describe, standing_words
+from study.tui.widgets.long_text import LongText
+from study.tui.widgets.staircase_plot import StaircasePlot
+from study.tui.widgets.text_table import TextTable
+
+TABS = ("overview", "thresholds", "staircases", "log", "report")
+
+HELP = """\
+# A session
+
+**1** to **5** choose a page; the arrow keys, PageUp and PageDown scroll it.
+
+* **1 Overview**: who, what, when, and what to know about it.
+* **2 Thresholds**: one row per run. ≥ marks a lower bound: the strongest force allowed was not enough.
+* **3 Staircases**: force over trials. ○ right, × wrong, ▼ a peak, ▲ a valley, ┄ the cap, ··· the threshold.
+* **4 Log**: everything that happened, in words.
+* **5 Report**: where report and figures lie. **o** opens the report in the browser.
+
+**r** resumes an unfinished session. **a** writes tables, figures and report anew. **w** watches a running one.
+**x** withdraws the participant: all data of this code are erased, after you typed the code. **Esc** goes back.
+
+In a terminal: `hapteq show SESSION`, `hapteq resume SESSION`, `hapteq analyze SESSION`, `hapteq withdraw SESSION`.
+"""
+
+
+class SessionScreen(Screen[None]):
+    HELP = HELP
+    CSS = """
+    SessionScreen #head { height: 1; padding: 0 1; background: $primary-muted; }
+    SessionScreen TabbedContent { height: 1fr; }
+    SessionScreen TabPane { padding: 0 1; height: 1fr; }
+    SessionScreen TabPane > VerticalScroll { height: 1fr; }
+    SessionScreen .part { height: auto; margin-top: 1; }
+    SessionScreen #staircase-list { grid-rows: 14; grid-gutter: 1 3; height: auto; }
+    SessionScreen #legend { height: 1; color: $foreground 65%; }
+    SessionScreen #wide-table { overflow-x: auto; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "back", "Back", key_display="Esc"),
+        Binding("r", "resume", "Resume"),
+        Binding("w", "watch", "Watch"),
+        Binding("a", "analyze", "Analyze"),
+        Binding("o", "open_report", "Open report"),
+        Binding("x", "withdraw", "Withdraw"),
+        *(Binding(str(n), f"page('{tab}')", tab, show=False) for n, tab in enumerate(TABS, start=1)),
+    ]
+
+    def __init__(self, view: SessionView) -> None:
+        super().__init__()
+        self._view = view
+
+    def show(self, view: SessionView) -> None:
+        """A newer view of it, such as after an analysis; the page stays."""
+        page = self.query_one(TabbedContent).active
+        self._view = view
+
+        async def again() -> None:
+            await self.recompose()
+            self.query_one(TabbedContent).active = page
+            self.refresh_bindings()
+
+        self.call_later(again)
+
+    def compose(self) -> ComposeResult:
+        view = self._view
+        yield Static(_head(view), id="head")
+        with TabbedContent(initial="overview"):
+            with TabPane("1 Overview", id="overview"), VerticalScroll():
+                yield Static(describe(view.line), markup=False)
+                yield Static(_facts(view.facts), classes="part")
+                yield Static("[b]To know[/b]", classes="part")
+                yield Static(_bullets(view.warnings))
+            with TabPane("2 Thresholds", id="thresholds"), VerticalScroll(id="wide-table"):
+                yield from _thresholds(view)
+            with TabPane("3 Staircases", id="staircases"):
+                yield Static(LEGEND if view.staircases else "No run has an answer yet.", id="legend", markup=False)
+                with VerticalScroll(), ItemGrid(min_column_width=56, id="staircase-list"):
+                    for staircase in view.staircases:
+                        yield StaircasePlot(staircase)
+            with TabPane("4 Log", id="log"):
+                yield LongText(view.events or ("Nothing can be read.",))
+            with TabPane("5 Report", id="report"), VerticalScroll():
+                yield Static(_report(view), markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_tabbed_content_tab_activated(self) -> None:
+        """Arrow keys scroll the page at once."""
+        self._focus_page()
+
+    def action_page(self, tab: str) -> None:
+        self.query_one(TabbedContent).active = tab
+        self._focus_page()
+
+    def _focus_page(self) -> None:
+        pane = self.query_one(TabbedContent).active_pane
+        if pane is not None:
+            for scrolled in pane.query("VerticalScroll, LongText"):
+                scrolled.focus()
+
+    def action_back(self) -> None:
+        self.post_message(HomeWanted())
+
+    def action_resume(self) -> None:
+        self.post_message(ResumeWanted(self._view.line.path))
+
+    def action_watch(self) -> None:
+        self.post_message(WatchWanted(self._view.line.path))
+
+    def action_analyze(self) -> None:
+        self.notify("Analyzing. The report is refreshed when it is done.")
+        self.post_message(AnalyzeWanted(self._view.line.path))
+
+    def action_open_report(self) -> None:
+        self.app.open_url(file_url(self._view.report))
+
+    def action_withdraw(self) -> None:
+        def decided(erase: bool | None) -> None:
+            if erase:
+                self.post_message(WithdrawWanted(self._view.line.path))
+
+        self.app.push_screen(WithdrawPrompt(self._view.line.subject), decided)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """What this session does not allow is not in the footer."""
+        line = self._view.line
+        match action:
+            case "resume":
+                return line.standing == "unfinished"
+            case "watch":
+                return line.standing == "running"
+            case "analyze":
+                return line.standing in ("finished", "unfinished") and line.answers > 0
+            case "open_report":
+                return bool(self._view.report)
+            case "withdraw":
+                return line.standing not in ("withdrawn", "running")
+        return True
+
+
+def file_url(path: str) -> str:
+    """For a browser on this machine."""
+    return Path(path).absolute().as_uri()
+
+
+def _head(view: SessionView) -> Content:
+    line = view.line
+    parts: list[Content | str | tuple[str, str]] = [
+        (line.name, "bold"),
+        "   ",
+        (standing_words(line.standing), STYLES[line.standing]),
+        f"   {line.protocol}",
+    ]
+    return Content.assemble(*parts)
+
+
+def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
+    """A table that breaks long values below themselves."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column()
+    for what, value in facts:
+        table.add_row(Text(what), Text(value))
+    return table
+
+
+def _bullets(sentences: tuple[str, ...]) -> Table:
+    table = Table.grid(padding=(0, 1, 0, 0))
+    for sentence in sentences or ("Nothing stands out.",):
+        table.add_row("•", Text(sentence))
+    return table
+
+
+def _thresholds(view: SessionView) -> ComposeResult:
+    if not view.thresholds:
+        yield Static("No test run is complete, so there is no threshold yet.", markup=False)
+        return
+    yield TextTable(view.thresholds)
+    yield Static(
+        Content.styled(
+            "Thresholds: mean of the last peaks and valleys. Delivered: what the handle did along the direction there. "
+            "≥ marks a lower bound.",
+            "$foreground 65%",
+        ),
+        classes="part",
+    )
+
+
+def _report(view: SessionView) -> str:
+    if not view.report:
+        lines = ["No report was written yet."]
+        if view.line.standing in ("finished", "unfinished") and view.line.answers:
+            lines.append("a analyzes the session: tables, figures and a report.")
+        return "\n".join(lines)
+    figures = [f"  {Path(path).name:28} {path}" for path in view.figures] or ["  none"]
+    warnings = [f"  • {warning}" for warning in view.warnings] or ["  none"]
+    return "\n".join(
+        [
+            view.report,
+            "",
+            "o opens it in the browser, a writes it anew.",
+            "",
+            "Warnings",
+            *warnings,
+            "",
+            "Figures",
+            *figures,
+        ]
+    )

@@ -1,0 +1,72 @@
+"""Withdrawal, asked for with the code itself: nobody erases a participant by one wrong key."""
+
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Footer, Input, Static
+
+from study.tui.screens.help import HelpScreen
+
+HELP = """\
+# Withdrawal
+
+A participant takes the consent back. All sessions of this code in this data folder are erased for good: answers,
+recordings, tables and figures, and the analysis of the folder, which was made from them too. A tombstone with the
+session's name stays, so that nobody gets the code again.
+
+Type the code and press Enter to erase. **Esc** leaves everything as it is.
+
+In a terminal: `hapteq withdraw SESSION`.
+"""
+
+
+class WithdrawPrompt(ModalScreen[bool]):
+    """Returns true where the code was typed."""
+
+    HELP = HELP
+    CSS = """
+    WithdrawPrompt { align: center middle; }
+    WithdrawPrompt > Vertical {
+        width: 70; max-width: 95%; height: auto; border: round $error; padding: 1 2; background: $surface;
+    }
+    WithdrawPrompt Input { margin-top: 1; }
+    WithdrawPrompt #said { height: 1; color: $text-error; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", "Keep everything", key_display="Esc"),
+        Binding("f1", "help", "Help"),  # the application's own keys do not reach through a modal screen
+    ]
+
+    def __init__(self, subject: str) -> None:
+        super().__init__()
+        self._subject = subject
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = f"{self._subject} withdraws"
+            yield Static(
+                f"All sessions of {self._subject} in this data folder are erased for good: answers, recordings, tables "
+                f"and figures, and the folder's analysis, which was made from them too.\n\n"
+                f"To erase, type the code {self._subject} and press Enter.",
+                markup=False,
+            )
+            yield Input(compact=True, id="code")
+            yield Static("", id="said", markup=False)
+        yield Footer(show_command_palette=False)
+
+    @on(Input.Submitted)
+    def _judge(self, typed: Input.Submitted) -> None:
+        if typed.value.strip() == self._subject:
+            self.dismiss(True)
+        else:
+            self.query_one("#said", Static).update(f"That is not {self._subject}. Nothing was erased.")
+
+    def action_help(self) -> None:
+        self.app.push_screen(HelpScreen(HELP))
+
+    def action_leave(self) -> None:
+        self.dismiss(False)

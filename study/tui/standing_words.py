@@ -1,0 +1,56 @@
+"""How a session stands, as a symbol and a word: neither is told by colour alone."""
+
+from study.session.archive_views import SessionLine, Standing
+
+SYMBOLS: dict[Standing, str] = {
+    "finished": "✓",
+    "unfinished": "◐",
+    "running": "▶",
+    "withdrawn": "✕",
+    "unreadable": "!",
+}
+
+STYLES: dict[Standing, str] = {
+    "finished": "$text-success",
+    "unfinished": "$text-warning",
+    "running": "bold $text-accent",
+    "withdrawn": "$foreground 65%",
+    "unreadable": "$text-error",
+}
+
+
+def standing_words(standing: Standing) -> str:
+    return f"{SYMBOLS[standing]} {standing}"
+
+
+def describe(line: SessionLine) -> str:
+    """One sentence or two about a session in a list, and what can be done with it."""
+    match line.standing:
+        case "finished":
+            return f"{_who(line)} finished all {_runs(line.runs)} with {_answers(line)}."
+        case "unfinished":
+            done = f"{line.runs_done} of {_runs(line.runs)} done, {_answers(line)}"
+            return f"{_who(line)} is not finished: {done}. It can be resumed."
+        case "running":
+            return f"{_who(line)} is running now in another program. You can watch it."
+        case "withdrawn":
+            return f"{line.subject}: {line.remark or 'the participant withdrew; the data were erased.'}"
+        case "unreadable":
+            return f"{line.name} cannot be read. {line.remark}".rstrip()
+
+
+def when(utc: str) -> str:
+    """To the minute."""
+    return utc[:16].replace("T", " ")
+
+
+def _who(line: SessionLine) -> str:
+    return f"{line.name}{f' (simulated: {line.observer})' if line.observer else ''}"
+
+
+def _answers(line: SessionLine) -> str:
+    return f"{line.answers} answer{'' if line.answers == 1 else 's'}"
+
+
+def _runs(runs: int) -> str:
+    return f"{runs} run{'' if runs == 1 else 's'}"

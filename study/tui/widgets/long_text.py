@@ -1,0 +1,51 @@
+"""Many lines of text to scroll through: only those in sight are drawn, and long ones break between words."""
+
+import re
+import textwrap
+
+from rich.segment import Segment
+from textual.geometry import Size
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+
+_LEAD = re.compile(r".{1,16}?\s{2,}")
+"""A time or a name before the text: what is broken off stands below the text, not below its lead."""
+
+
+class LongText(ScrollView, can_focus=True):
+    DEFAULT_CSS = "LongText { background: $background; }"
+
+    def __init__(self, lines: tuple[str, ...], *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._lines = lines
+        self._broken: list[str] = []
+        self._width = 0
+
+    def show(self, lines: tuple[str, ...]) -> None:
+        self._lines, self._width = lines, 0
+        self._break(self.scrollable_content_region.width)
+
+    def on_resize(self) -> None:
+        self._break(self.scrollable_content_region.width)
+
+    def render_line(self, y: int) -> Strip:
+        place = y + self.scroll_offset.y
+        text = self._broken[place] if place < len(self._broken) else ""
+        width = self.scrollable_content_region.width
+        return Strip([Segment(text, self.rich_style)]).adjust_cell_length(width, self.rich_style)
+
+    def _break(self, width: int) -> None:
+        if width <= 0 or width == self._width:
+            return
+        self._width = width
+        self._broken = [part for line in self._lines for part in _parts(line, width)]
+        self.virtual_size = Size(width, len(self._broken))
+        self.refresh()
+
+
+def _parts(line: str, width: int) -> list[str]:
+    if len(line) <= width:
+        return [line]
+    lead = _LEAD.match(line)
+    indent = " " * lead.end() if lead and lead.end() < width // 2 else ""
+    return textwrap.wrap(line, width, subsequent_indent=indent) or [""]

@@ -1,0 +1,145 @@
+"""Who, what, on which device: the form that begins a session. What is wrong is said beside it while it is typed."""
+
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.widgets import Button, Input, Label, Select, Static
+
+from study.session.archive_views import HomeView, SessionLine
+from study.session.participant_codes import code_problem, is_code, next_code
+from study.tui.home_messages import BeginWanted
+
+SIMULATED = "simulated"
+
+
+class NewSessionForm(Vertical):
+    DEFAULT_CSS = """
+    NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
+    NewSessionForm:focus-within { border: round $accent; }
+    NewSessionForm .field { height: auto; }
+    NewSessionForm Label { width: 12; }
+    NewSessionForm Input, NewSessionForm Select { width: 1fr; }
+    NewSessionForm #about { height: 2; color: $text-muted; }
+    NewSessionForm #about.-problem { color: $text-error; }
+    NewSessionForm #about.-notice { color: $text-warning; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("f5", "begin", "Begin")]
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self.border_title = "New session"
+        self._home: HomeView | None = None
+
+    def compose(self) -> ComposeResult:
+        with Horizontal(classes="field"):
+            yield Label("Participant")
+            yield Input(placeholder="code, such as P01", compact=True, id="code", max_length=64)
+        with Horizontal(classes="field"):
+            yield Label("Protocol")
+            yield Select[str]((), prompt="…", compact=True, id="protocol", disabled=True)
+        with Horizontal(classes="field"):
+            yield Label("Device")
+            yield Select[str]((), prompt="…", compact=True, id="device", disabled=True)
+        yield Static("", id="about", markup=False)
+        yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
+
+    def show(self, home: HomeView) -> None:
+        """Choices that were made stay made, as far as they are still there."""
+        self._home = home
+        self._offer("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
+        self._offer("#device", [(_device_prompt(name), name) for name in home.devices])
+        proposed = next_code(tuple(line.subject for line in home.sessions if line.observer is None))
+        self.query_one("#code", Input).placeholder = f"code, such as {proposed}"
+        self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
+        self._say()
+
+    def action_begin(self) -> None:
+        self._begin()
+
+    @on(Input.Submitted, "#code")
+    @on(Button.Pressed, "#begin")
+    def _begin(self) -> None:
+        if self._home is None or self.query_one("#begin", Button).disabled:
+            return
+        code = self._code
+        problem = code_problem(code) or self._standing_problem(code)
+        if problem:
+            self._about(problem, "-problem")
+            self.query_one("#code", Input).focus()
+            return
+        self.post_message(BeginWanted(code, self._chosen("#protocol"), self._chosen("#device")))
+
+    @on(Input.Changed, "#code")
+    @on(Select.Changed)
+    def _say(self) -> None:
+        if self._home is None:
+            return
+        code = self._code
+        if code and not is_code(code):
+            self._about(code_problem(code), "-problem")
+        elif problem := self._standing_problem(code):
+            self._about(problem, "-problem")
+        elif notice := self._notice(code):
+            self._about(notice, "-notice")
+        else:
+            protocol = self._chosen("#protocol")
+            self._about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
+
+    @property
+    def _code(self) -> str:
+        return self.query_one("#code", Input).value.strip()
+
+    def _standing_problem(self, code: str) -> str:
+        """What the list already knows against a code; the program that begins a session checks again."""
+        return next((f"{code} withdrew: nobody gets this code again." for line in self._sessions(code)
+                     if line.standing == "withdrawn"), "")  # fmt: skip
+
+    def _notice(self, code: str) -> str:
+        lines, protocol = self._sessions(code), self._chosen("#protocol")
+        for line in lines:
+            if line.standing == "unfinished" and line.protocol == _name(protocol, self._home):
+                return (
+                    f"{line.name} of this protocol is not finished. Beginning makes another one; r in the list resumes."
+                )
+        if lines:
+            count = "a session" if len(lines) == 1 else f"{len(lines)} sessions"
+            return f"{code} has {count} here already. Is it the same person?"
+        return ""
+
+    def _sessions(self, code: str) -> list[SessionLine]:
+        return [line for line in self._home.sessions if line.subject == code] if self._home and code else []
+
+    def _chosen(self, which: str) -> str:
+        value = self.query_one(which, Select).value
+        return value if isinstance(value, str) else ""
+
+    def _offer(self, which: str, options: list[tuple[str, str]]) -> None:
+        select: Select[str] = self.query_one(which, Select)
+        before = select.value
+        values = [value for _, value in options]
+        select.set_options(options)
+        select.disabled = not options
+        if options:
+            select.value = before if before in values else values[0]
+
+    def _about(self, text: str, kind: str) -> None:
+        about = self.query_one("#about", Static)
+        about.set_class(kind == "-problem", "-problem")
+        about.set_class(kind == "-notice", "-notice")
+        about.update(f"! {text}" if kind else text)
+
+
+def _protocol_prompt(name: str, locked: bool) -> str:
+    return f"{name} (locked)" if locked else name
+
+
+def _device_prompt(name: str) -> str:
+    return f"{name} (nothing moves)" if name == SIMULATED else name
+
+
+def _name(protocol: str, home: HomeView | None) -> str:
+    """A file is named after its protocol as a rule; where it is not, the notice does not come."""
+    return protocol.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")

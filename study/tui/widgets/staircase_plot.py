@@ -1,0 +1,36 @@
+"""One staircase: its title, its picture in whatever room there is, and the run in a sentence."""
+
+from textual.content import Content
+from textual.widget import Widget
+
+from study.session.archive_views import Staircase
+from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
+
+_STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}
+_BESIDES = 2
+"""Lines for title and sentence."""
+
+
+class StaircasePlot(Widget):
+    DEFAULT_CSS = "StaircasePlot { height: 14; }"
+
+    def __init__(self, staircase: Staircase, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._staircase = staircase
+
+    def render(self) -> Content:
+        width, height = self.content_size.width, self.content_size.height
+        drawn = staircase_lines(self._staircase, width, height - _BESIDES)
+        return Content("\n").join(
+            [
+                Content.styled(self._staircase.title, "bold"),
+                *map(_styled, drawn),
+                Content.styled(summary(self._staircase), "$text-muted"),
+            ]
+        )
+
+
+def _styled(line: str) -> Content:
+    parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], "$text-muted")]
+    parts += [(c, _STYLES[c]) if c in _STYLES else c for c in line[LABEL_COLUMNS:]]
+    return Content.assemble(*parts)

@@ -1,0 +1,14 @@
+"""A table that is only read: its header in bold, as wide as it needs, so put it where it can be scrolled."""
+
+from textual.content import Content
+from textual.widgets import Static
+
+from study.tui.text_rows import Rows, aligned
+
+
+class TextTable(Static):
+    DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
+
+    def __init__(self, rows: Rows, *, id: str | None = None) -> None:
+        header, *body = aligned(rows) or ("",)
+        super().__init__(Content("\n").join([Content.styled(header, "bold"), *map(Content, body)]), id=id)
