@@ -72,7 +72,7 @@ class ClosedTrial:
     delivered_mps2: float | None
     off_axis_mps2: float | None
     status: str
-    """ok, flagged, unmeasured (also while it is being measured) or spoiled."""
+    """ok, flagged, unmeasured, spoiled; or measuring, while what the device did is not in the log."""
     remark: str
     """Flags, or why it is void."""
 

@@ -96,7 +96,7 @@ def _closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial
         response_time_s=trial.response_time_s,
         delivered_mps2=trial.delivered_mps2,
         off_axis_mps2=trial.off_axis_mps2,
-        status=trial.status.value,
+        status="measuring" if _is_open(state, trial) else trial.status.value,
         remark=remark,
     )
 

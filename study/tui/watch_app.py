@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
 from textual.app import App
+from textual.binding import Binding, BindingType
 
 from study.session.requests import Request
 from study.tui.screens.watch import WatchScreen, WatchSource
+from study.tui.themes import DARK, NEXT, register_themes
 
 
 class WatchApp(App[None]):
     TITLE = "hapteq watch"
-    ENABLE_COMMAND_PALETTE = True
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]
 
-    def __init__(self, source: WatchSource, ask: Callable[[Request], object]) -> None:
+    def __init__(self, source: WatchSource, ask: Callable[[Request], object], theme: str = DARK.name) -> None:
+        """ask: hands a request to the session; raises StudyError where it cannot."""
         super().__init__()
         self._source = source
         self._ask = ask
         self.animation_level = "none"
+        register_themes(self, theme)
 
     def on_mount(self) -> None:
         self.push_screen(WatchScreen(self._source, self._ask))
 
     def on_watch_screen_left(self) -> None:
         self.exit()
+
+    def action_next_theme(self) -> None:
+        self.theme = NEXT[self.theme]

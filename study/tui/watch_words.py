@@ -99,8 +99,7 @@ def sensor_words(view: WatchView) -> str:
     if live is None or live.acceleration_mps2 is None:
         return "not read now"
     clipped = " CLIPPED" if live.sensor_clipped else ""
-    late = f", {live.missed_ticks} late" if live.missed_ticks else ""
-    return f"{live.acceleration_mps2:.1f} m/s²{clipped}{late}"
+    return f"{live.acceleration_mps2:.1f} m/s²{clipped}"
 
 
 def device_words(view: WatchView) -> str:
@@ -108,4 +107,5 @@ def device_words(view: WatchView) -> str:
         return "not read now"
     if view.live.fault:
         return f"FAULT: {view.live.fault}"
-    return "simulated" if view.simulated else "no fault"
+    late = f", {view.live.missed_ticks} late ticks" if view.live.missed_ticks else ""
+    return ("simulated" if view.simulated else "no fault") + late

@@ -43,14 +43,15 @@ You follow a running session. Nothing here changes it, apart from four keys:
 * **p**: pause. Hands free at once; the participant goes on at the own screen.
 * **n**: a note for the log. **e**: an adverse event (pain, numbness, a fright).
 
-The other keys: **a** says that you have seen the alarms, **d** shows forms, practice and notes, **q** leaves the view;
-the session goes on.
+The other keys: **a** says that you have seen the alarms, **d** shows forms, practice and notes, **t** goes through
+light, dark and high contrast, **q** leaves the view; the session goes on.
 
 ## What you see
 
 * **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ turns of the level, ? the next level.
 * **Last trials**: the newest on top. *shown* and *said* are the numbers 1 and 2; *s* is the time to answer; *m/s²* is \
-what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial.
+what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial, ! a remark \
+(shown in a wider window).
 * **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
 * **Catch**: trials at full force that anybody should get right; errors in them are lapses of attention.
 

@@ -131,7 +131,8 @@ def _trial_line(trial: ClosedTrial, columns: int) -> Content:
     remark = trial.remark or ("" if trial.status in ("ok", "spoiled") else trial.status)
     if trial.phase == "catch":
         remark = f"catch {remark}".rstrip()
-    tail = f"  {remark[:room]}" if room >= 8 else " !" if remark else ""
+    shortened = remark if len(remark) <= room else f"{remark[: room - 1]}…"
+    tail = f"  {shortened}" if room >= 8 else " !" if remark else ""
     return Content.assemble(left, (f"{word:<5}", _VERDICT_STYLES[word]), f"{turned} {right}", (tail, MUTED))
 
 

@@ -184,7 +184,7 @@ def test_the_direction_appears_with_the_answer(story):
     assert story.view().last == ()
     story.tell(AnswerGiven(at(12), **place(action), answer=3 - action.label, response_time_s=2.0))
     seen = story.view().last[0]
-    assert (seen.shown, seen.answer, seen.correct, seen.status) == (action.label, 3 - action.label, False, "unmeasured")
+    assert (seen.shown, seen.answer, seen.correct, seen.status) == (action.label, 3 - action.label, False, "measuring")
     assert story.view().open_trial is None
     assert story.view().activity == "measuring"
 

@@ -1,0 +1,129 @@
+"""`hapteq watch` and `hapteq note` from the command line, on a session that this test runs or does not run."""
+
+import json
+import threading
+import time
+
+import pytest
+
+from study.cli import watch
+from study.cli.main import main
+from study.session.requests import PauseAsked, StopAsked
+from study.store.event_log import LOG_NAME, EventLog, read_log
+from study.store.request_inbox import RequestInbox
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cli")
+    protocol = folder / "small.toml"
+    protocol.write_text(
+        'name = "small"\nkind = "study"\ntitle = "A small study"\n[stimulus]\nfrequencies_hz = [25.0]\n'
+        "[staircase]\nstart_n = 1.0\ncap_n = 3.0\nup_after_wrong = 1\ndown_after_right = 3\n"
+        "steps = [{ step_db = 4.0, reversals = 3 }]\nreversals = 3\naveraged_reversals = 2\n[directions]\n"
+        "[safety]\nstimulus_cap_n = 3.0\ntotal_cap_n = 4.5\n"
+    )
+    made = folder / "data"
+    begin = ["study", "--protocol", str(protocol), "--observer", "scripted", "--subject", "S1", "--seed", "3"]
+    assert main([*begin, "--data", str(made)]) == 0
+    return made
+
+
+@pytest.fixture
+def running(data):
+    """Somebody holds the log and takes what is asked."""
+    log, over, heard = EventLog.reopen(data / "S1_001" / LOG_NAME), threading.Event(), []
+
+    def take() -> None:
+        while not over.is_set():
+            heard.extend(RequestInbox(data / "S1_001").take())
+            time.sleep(0.01)
+
+    thread = threading.Thread(target=take)
+    thread.start()
+    yield heard
+    over.set()
+    thread.join()
+    log.close()
+
+
+def run(capsys, data, *arguments: str) -> tuple[int, str, str]:
+    code = main([*arguments, "--data", str(data)])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_the_light_name_of_the_log_is_the_logs():
+    assert watch.LOG_NAME == LOG_NAME
+
+
+def test_once_tells_how_it_stands(capsys, data):
+    code, out, _err = run(capsys, data, "watch", "S1_001", "--once")
+    assert code == 0
+    assert "✓ FINISHED S1_001: all runs are done" in out
+
+
+def test_once_as_json_is_the_view_without_the_seed(capsys, data):
+    code, out, _err = run(capsys, data, "watch", "S1_001", "--once", "--json")
+    view = json.loads(out)
+    assert (code, view["session"], view["standing"]) == (0, "S1_001", "finished")
+    assert "seed" not in out
+
+
+def test_without_a_name_the_session_that_changed_last_is_watched(capsys, data):
+    code, out, _err = run(capsys, data, "watch", "--once")
+    assert (code, "S1_001" in out) == (0, True)
+
+
+def test_plain_lines_end_with_the_sitting(capsys, data):
+    code, out, _err = run(capsys, data, "watch", "S1_001", "--plain")
+    assert (code, "FINISHED" in out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("option", "asked", "said"),
+    [
+        ("--stop", StopAsked("experimenter"), "The force is off and the sitting ends. Go on with: hapteq resume"),
+        ("--pause", PauseAsked("experimenter"), "Paused."),
+    ],
+)
+def test_a_running_session_is_stopped_or_paused(capsys, data, running, option, asked, said):
+    code, _out, err = run(capsys, data, "watch", "S1_001", option)
+    assert (code, said in " ".join(err.split())) == (0, True)
+    assert running == [asked]
+
+
+def test_notes_reach_a_running_session(capsys, data, running):
+    code, _out, err = run(capsys, data, "watch", "S1_001", "--note", "lower chair", "--adverse", "numb thumb")
+    assert (code, err.count("Noted in S1_001.")) == (0, 2)
+    assert [(note.text, note.adverse) for note in running] == [("lower chair", False), ("numb thumb", True)]
+
+
+def test_nothing_can_be_stopped_where_nothing_runs(capsys, data):
+    code, _out, err = run(capsys, data, "watch", "S1_001", "--stop")
+    assert (code, "This session is not running" in err) == (1, True)
+
+
+def test_a_note_on_a_finished_session_is_in_its_log(capsys, data):
+    code, _out, err = run(capsys, data, "note", "S1_001", "the grip was changed at 10:30", "--adverse")
+    assert (code, "Noted in S1_001." in err) == (0, True)
+    last = read_log(data / "S1_001" / LOG_NAME).events[-1]
+    assert (last.event, last.text, last.adverse) == ("note_taken", "the grip was changed at 10:30", True)
+
+
+@pytest.mark.parametrize("command", [["watch", "P99_001", "--once"], ["note", "P99_001", "text"]])
+def test_an_unknown_session_is_wrong_use(capsys, data, command):
+    code, _out, err = run(capsys, data, *command)
+    assert (code, "There is no such session" in err) == (2, True)
+
+
+def test_an_empty_data_folder_has_nothing_to_watch(capsys, tmp_path):
+    code, _out, err = run(capsys, tmp_path, "watch", "--once")
+    assert (code, "There is no session to watch" in err) == (2, True)
+
+
+def test_a_session_without_a_line_has_not_begun(capsys, tmp_path):
+    (tmp_path / "P01_001").mkdir()
+    (tmp_path / "P01_001" / LOG_NAME).write_bytes(b"")
+    code, _out, err = run(capsys, tmp_path, "watch", "P01_001", "--once")
+    assert (code, "This session has not begun" in err) == (1, True)

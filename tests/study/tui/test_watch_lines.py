@@ -1,0 +1,84 @@
+"""A followed session as lines of text."""
+
+from datetime import UTC, datetime
+
+import pytest
+
+from study.store.event_log import LOG_NAME
+from study.tui.watch_lines import changes, status
+from study.tui.watch_words import duration
+from study.workflows.watch_session import follow
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory):
+    """After each line of a whole session."""
+    from protocols.loading import load_protocol
+    from study.devices.clock import VirtualClock
+    from study.workflows.conduct_session import conduct_new
+    from study.workflows.open_session import SessionPlan
+    from study.workflows.simulated_participant import simulated_participant
+
+    data = tmp_path_factory.mktemp("data")
+    text = (
+        'name = "small"\nkind = "study"\ntitle = "A small study"\n[stimulus]\nfrequencies_hz = [25.0]\n'
+        "[staircase]\nstart_n = 1.0\ncap_n = 3.0\nup_after_wrong = 1\ndown_after_right = 3\n"
+        "steps = [{ step_db = 4.0, reversals = 3 }]\nreversals = 3\naveraged_reversals = 2\n[directions]\n"
+        "[safety]\nstimulus_cap_n = 3.0\ntotal_cap_n = 4.5\n"
+    )
+    plan = SessionPlan(load_protocol(text, "small"), text, False, "S1", "scripted", 3, data)
+    whole = conduct_new(plan, "simulated", simulated_participant("scripted", 3, VirtualClock())).folder
+    growing = data / "copy" / whole.name
+    growing.mkdir(parents=True)
+    follower, seen = follow(growing), []
+    for line in whole.log.read_bytes().splitlines(keepends=True):
+        with (growing / LOG_NAME).open("ab") as file:
+            file.write(line)
+        seen.append(follower.look(datetime.now(UTC).isoformat(timespec="milliseconds")))
+    return seen
+
+
+def told(views) -> list[str]:
+    return [line for before, now in zip([None, *views], views, strict=False) for line in changes(before, now)]
+
+
+def test_each_trial_is_told_once_when_it_is_closed(views):
+    lines = [line for line in told(views[:-1]) if line.startswith("trial ") and "shown" in line]
+    assert len(lines) == views[-1].answers
+    assert lines[0].startswith("trial 1 at 25 Hz, 1 N: ")
+    assert sum(", reversal" in line for line in lines) == 3
+
+
+def test_nothing_is_told_twice(views):
+    assert changes(views[-1], views[-1]) == []
+
+
+def test_the_end_is_told(views):
+    assert told(views)[-1] == "FINISHED: all runs are done"
+
+
+def test_an_alarm_comes_first_with_a_bell(views):
+    lines = changes(None, views[0])
+    assert lines[0].startswith("\aALARM The program that ran the session is gone.")
+    assert lines[0] not in changes(views[0], views[1])
+
+
+def test_the_status_names_all_that_matters(views):
+    text = "\n".join(status(views[-1]))
+    for part in (
+        "✓ FINISHED S1_001",
+        "3/3 reversals",
+        "Time",
+        "Dose A(8)",
+        "Catch      none so far",
+        "Handle",
+        "Sensor",
+    ):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(4.9, "4 s"), (65.0, "1 min 05 s"), (3720.0, "1 h 02 min"), (0.0, "0 s")]
+)
+def test_durations_are_rounded_down(seconds, words):
+    assert duration(seconds) == words
