@@ -1,0 +1,133 @@
+"""What the engine does for the screen: lists, views, whole sittings, analyses, withdrawals. One after the other."""
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from study.devices.clock import RealClock
+from study.devices.device import Device
+from study.errors import WrongUseError
+from study.store.archive import SessionFolder, find_session
+from study.tui.link.messages import (
+    Analyze,
+    Begin,
+    Command,
+    Diagnosis,
+    Ended,
+    Home,
+    Opened,
+    Preparing,
+    Results,
+    Resume,
+    Session,
+    SessionOrder,
+    ShowDiagnosis,
+    ShowHome,
+    ShowSession,
+    Trouble,
+    Withdraw,
+)
+from study.tui.link.remote_display import RemoteDisplay
+from study.tui.link.screen_link import ScreenLink
+from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.display import PersonsHand
+from study.workflows.end_sitting import end_sitting
+from study.workflows.fold_session import fold_session
+from study.workflows.list_sessions import home_view
+from study.workflows.plan_sitting import plan_sitting
+from study.workflows.session_results import write_results
+from study.workflows.view_diagnosis import diagnosis_view
+from study.workflows.view_session import session_view
+from study.workflows.withdraw_participant import plan_withdrawal, withdraw
+from study.workflows.written_analysis import WrittenAnalysis
+
+OPENING = "Preparing the device: some ten seconds the first time."
+
+
+class Desk:
+    """`opened`: the session that the present command opened and has not finished: what can be gone on with."""
+
+    def __init__(self, link: ScreenLink) -> None:
+        self._link = link
+        self._clock = RealClock()
+        self.opened: SessionFolder | None = None
+
+    def perform(self, command: Command) -> None:
+        """Raises StudyError where it cannot be done, KeyboardInterrupt where somebody let go."""
+        self.opened = None
+        match command:
+            case ShowHome(data=data):
+                self._link.send(Home(home_view(Path(data))))
+            case ShowSession(path=path):
+                self._link.send(Session(session_view(Path(path))))
+            case ShowDiagnosis(path=path):
+                self._link.send(Diagnosis(diagnosis_view(Path(path))))
+            case Begin(order=order):
+                self._begin(order)
+            case Resume():
+                self._resume(command)
+            case Analyze(session=session):
+                self._link.send(Preparing("Making the tables and the report."))
+                write_results(SessionFolder(Path(session)))
+                self._link.send(Session(session_view(Path(session))))
+            case Withdraw(session=session):
+                self._withdraw(SessionFolder(Path(session)))
+
+    def _begin(self, order: SessionOrder) -> None:
+        plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data))
+        for note in plan.notes:
+            self._link.send(Trouble(note))
+        self._sit(lambda participant: conduct_new(plan.session, order.device, participant))
+
+    def _resume(self, command: Resume) -> None:
+        folder = find_session(command.session, Path(command.data))
+        observer = fold_session(folder).state.opened.observer
+        if observer is not None:
+            raise WrongUseError(
+                "This session belongs to a simulated participant",
+                f"'{observer}' began {folder.name}; a person's answers must not be added to it.",
+                f"It goes on by itself with: hapteq resume {folder.path}",
+                saved="Nothing was changed.",
+            )
+        self._sit(lambda participant: conduct_resumed(folder, command.device, participant))
+
+    def _sit(self, conduct: Callable[[Participant], Conducted]) -> None:
+        self._link.send(Preparing(OPENING))
+        with self._participant() as participant:
+            end = conduct(participant)
+        if not end.left:
+            self.opened = None  # there is nothing left to go on with
+            self._link.send(Preparing("Making the tables and the report."))
+        written = end_sitting(end, self._clock.utc())
+        ended = Ended("finished", str(end.folder.path), end.state.answers, _results(written))
+        self._link.send(ended)
+
+    @contextlib.contextmanager
+    def _participant(self) -> Iterator[Participant]:
+        self._link.requests.take()  # what was asked of an earlier session
+        display = RemoteDisplay(self._link, self._clock)
+        try:
+            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._hear)
+        finally:
+            self._link.stop_device = None
+
+    def _hear(self, folder: SessionFolder, device: Device) -> None:
+        self.opened = folder
+        self._link.stop_device = device.stop
+        self._link.send(Opened(folder.name, str(folder.path)))
+
+    def _withdraw(self, folder: SessionFolder) -> None:
+        plan = plan_withdrawal(folder)
+        withdraw(folder.path.parent, plan, self._clock.utc())
+        self._link.send(Ended("withdrawn", str(folder.path), 0, erased=plan.sessions))
+
+
+def _results(written: WrittenAnalysis) -> Results:
+    document = {
+        "thresholds": [asdict(threshold) for threshold in written.thresholds],
+        "warnings": list(written.warnings),
+        "report": str(written.report),
+    }
+    return Results(written.table, written.warnings, str(written.report), json.dumps(document, indent=2))
