@@ -172,7 +172,7 @@ def _event(path: Path, number: int, line: bytes) -> Event:
 def _is_newer(line: bytes) -> bool:
     try:
         opening = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     known = isinstance(opening, dict) and opening.get("format") == SESSION_FORMAT
     return known and opening.get("version") != SESSION_VERSION

@@ -46,7 +46,7 @@ class BrowseScreen(ModalScreen[None]):
         width: 90%; max-width: 100; height: 90%; border: round $primary; padding: 0 1; background: $surface;
     }
     BrowseScreen OurFiles { height: 1fr; background: $surface; }
-    BrowseScreen #said { height: 1; color: $text-muted; }
+    BrowseScreen #said { height: 1; color: $foreground 65%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),

@@ -33,7 +33,7 @@ GUIDE = """\
 [b]A study day[/b]
 
 1  Is the device fit? [b]hapteq doctor[/b]
-2  Type the participant's code, press F5. Consent,
+2  Type the code, press F5. Consent,
    instructions and practice follow.
 3  In a second terminal: [b]hapteq watch SESSION[/b]
 4  Afterwards: F3 and Enter for the results.
@@ -83,12 +83,12 @@ class HomeScreen(Screen[None]):
     HomeScreen SessionTable {
         height: 1fr; display: none; background: $background; scrollbar-size-horizontal: 0;
     }
-    HomeScreen #detail { height: 2; color: $text-muted; }
+    HomeScreen #detail { height: 2; color: $foreground 65%; }
     HomeScreen #empty { height: 1fr; display: none; }
     HomeScreen.-wide #body { layout: horizontal; }
     HomeScreen #left { height: auto; }
     HomeScreen #guide { display: none; height: 1fr; border: round $panel; padding: 0 1; color: $foreground 80%; }
-    HomeScreen.-wide #left { width: 52; height: 1fr; }
+    HomeScreen.-wide #left { width: 50; height: 1fr; }
     HomeScreen.-wide #guide { display: block; }
     HomeScreen.-wide NewSessionForm #about { height: 4; margin-top: 1; }
     """

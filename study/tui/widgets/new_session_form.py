@@ -20,9 +20,9 @@ class NewSessionForm(Vertical):
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
     NewSessionForm:focus-within { border: round $accent; }
     NewSessionForm .field { height: auto; }
-    NewSessionForm Label { width: 12; }
+    NewSessionForm Label { width: 13; }
     NewSessionForm Input, NewSessionForm Select { width: 1fr; }
-    NewSessionForm #about { height: 2; color: $text-muted; }
+    NewSessionForm #about { height: 2; color: $foreground 65%; }
     NewSessionForm #about.-problem { color: $text-error; }
     NewSessionForm #about.-notice { color: $text-warning; }
     """

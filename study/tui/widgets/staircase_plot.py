@@ -7,6 +7,7 @@ from study.session.archive_views import Staircase
 from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}
+MUTED = "$foreground 65%"
 _BESIDES = 2
 """Lines for title and sentence."""
 
@@ -25,12 +26,12 @@ class StaircasePlot(Widget):
             [
                 Content.styled(self._staircase.title, "bold"),
                 *map(_styled, drawn),
-                Content.styled(summary(self._staircase), "$text-muted"),
+                Content.styled(summary(self._staircase), MUTED),
             ]
         )
 
 
 def _styled(line: str) -> Content:
-    parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], "$text-muted")]
+    parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED)]
     parts += [(c, _STYLES[c]) if c in _STYLES else c for c in line[LABEL_COLUMNS:]]
     return Content.assemble(*parts)
