@@ -37,7 +37,7 @@ def large_drawing(picture: DirectionPicture, number: int, columns: int, rows: in
     canvas = Canvas(columns, rows)
     right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
     x, y = canvas.middle
-    reach = min(x, y)
+    reach = _reach(picture, x, y)
     thick = max(2.5, reach / 8)
     head = 2.6 * thick
     shaft = reach - head
@@ -51,6 +51,13 @@ def large_drawing(picture: DirectionPicture, number: int, columns: int, rows: in
     for begin, end in ((-shaft, shaft),) if number == 1 else _dashes(shaft, 2.2 * thick, 1.1 * thick):
         canvas.stroke(at(begin), at(end), thick)
     return tuple(canvas.lines())
+
+
+def _reach(picture: DirectionPicture, x: float, y: float) -> float:
+    """Half a segment, the same for both: neither may look stronger than the other."""
+    sides = [_on_screen(picture.plane, angle) for angle in picture.angle_deg]
+    fits = min(min(x / max(abs(right), 1e-9), y / max(abs(up), 1e-9)) for right, up in sides)
+    return min(fits, 1.25 * min(x, y))
 
 
 def _dashes(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:

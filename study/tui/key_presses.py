@@ -1,0 +1,33 @@
+"""Which key events are presses of their own. A terminal tells no releases: a held key is a row of equal events."""
+
+import time
+
+from textual.events import Key
+
+QUIET_S = 0.2
+"""Held keys repeat every 25 to 100 ms."""
+FIRST_REPEAT_S = 0.7
+"""Before the first repetition keyboards wait longer: 0.25 to 0.66 s."""
+
+
+class KeyPresses:
+    """Of the keys that answer; several keys of one answer count as one."""
+
+    def __init__(self) -> None:
+        self._last_s: dict[int, float] = {}
+
+    def is_press(self, answer: int, at_s: float, armed_s: float) -> bool:
+        """False: the key may still be held since before `armed_s`, or a row of answers comes faster than a person
+        means them. Every event must be told, also those while nothing is asked."""
+        last_s = max(self._last_s.values(), default=float("-inf"))
+        same_s = self._last_s.get(answer, float("-inf"))
+        self._last_s[answer] = at_s
+        held = same_s < armed_s and at_s - same_s < FIRST_REPEAT_S
+        return at_s - last_s >= QUIET_S and not held
+
+
+def arrival_s(event: Key) -> float:
+    """When the key was read, on the clock of `time.monotonic`: Textual stamps it in the thread that reads keys."""
+    now_s = time.monotonic()
+    # On Windows the stamp is another clock's.
+    return event.time if 0.0 <= now_s - event.time < 1.0 else now_s

@@ -1,0 +1,226 @@
+"""The trial: two directions, two keys. Nothing on it depends on level, frequency or correctness."""
+
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.events import Key, Paste
+from textual.message import Message
+from textual.screen import Screen
+from textual.timer import Timer
+from textual.widgets import Footer, Static
+
+from study.session.views import Answered, Question, Reply, Task, Unanswered
+from study.tui.answer_keys import DIGITS, AnswerKeys
+from study.tui.key_presses import KeyPresses, arrival_s
+from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
+from study.tui.trial_words import heading
+from study.tui.widgets.direction_panel import DirectionPanel, Mark
+from study.tui.widgets.session_bar import SessionBar
+
+ASKED = {
+    Task.DIRECTION: "Along which of the two directions does it shake?",
+    Task.INTERVAL: "In which of the two intervals did it shake, however weakly?",
+}
+WAIT = "Wait for the next vibration."
+REPLIES = {"pause": PAUSE, "leave": LEAVING, "repeat": REPEAT}
+AFTER = {
+    PAUSE: "Pause. Let go of the handle.",
+    LEAVING: "Pause. Let go of the handle.",
+    REPEAT: "A new trial comes.",
+    TIME_OVER: "The time for this answer is over. A new trial comes.",
+}
+WANTED_FOR_S = 3.0
+"""A pause asked for between two trials begins with the next; much later it would be forgotten."""
+NUM_LOCK = {"end", "down", "kp_begin"}
+"""What a number pad's 1 and 2 send while Num Lock is off."""
+
+
+class TrialScreen(Screen[None]):
+    """One for a sitting: armed for each question, and dead in between."""
+
+    HELP = """\
+- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes.
+- If you cannot tell, guess. Many trials are meant to be hard, and no answer can do harm.
+- p pauses: the handle stops at once, and this trial is drawn again later.
+- r skips this trial and plays a new one, for instance when you were disturbed.
+- q pauses too, and offers to leave. What you have answered is kept.
+- Ctrl-C takes the force off at once and leaves.
+"""
+    DEFAULT_CSS = """
+    TrialScreen { layout: vertical; }
+    TrialScreen #asked { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
+    TrialScreen #answers { height: 1fr; margin: 0 1; }
+    TrialScreen #said { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    TrialScreen #trouble { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
+    """
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("1", "heard(1)", "Answer 1"),
+        Binding("2", "heard(2)", "Answer 2"),
+        Binding("p", "reply('pause')", "Pause"),
+        Binding("r", "reply('repeat')", "New trial"),
+        Binding("q", "reply('leave')", "Leave"),
+    ]
+
+    @dataclass
+    class Replied(Message):
+        """Once for each arming."""
+
+        reply: Reply
+
+    def __init__(self, keys: AnswerKeys = DIGITS) -> None:
+        super().__init__()
+        self._keys = keys
+        self._presses = KeyPresses()
+        self._question: Question | None = None
+        self._armed_s: float | None = None
+        self._taken = 0
+        self._limit: Timer | None = None
+        self._trouble = ""
+        self._trouble_is_old = False
+        self._wanted: tuple[Unanswered, float] | None = None
+
+    def compose(self) -> ComposeResult:
+        yield SessionBar()
+        yield Static(id="asked", markup=False)
+        with Horizontal(id="answers"):
+            yield DirectionPanel(1)
+            yield DirectionPanel(2)
+        yield Static(id="said", markup=False)
+        yield Static(id="trouble", markup=False)
+        yield Footer()
+
+    def on_mount(self) -> None:
+        self._show()
+
+    def arm(self, question: Question) -> None:
+        """From now on one reply counts."""
+        self._drop_limit()
+        self._question, self._taken = question, 0
+        if self._trouble_is_old:
+            self.show_trouble("")
+        self._trouble_is_old = True
+        if question.time_limit_s > 0:
+            self._limit = self.set_timer(question.time_limit_s, self._time_over)
+        self._show()
+        self._armed_s = time.monotonic()
+        if self._wanted is not None and self._armed_s - self._wanted[1] < WANTED_FOR_S:
+            self._reply(self._wanted[0])
+        self._wanted = None
+
+    def disarm(self) -> None:
+        """Nobody waits for a reply any more."""
+        self._armed_s = None
+        self._drop_limit()
+        if not self._taken:
+            self._say(WAIT)
+
+    def saved(self) -> None:
+        """The answer is on the disk."""
+        if self._taken:
+            self._mark("saved")
+            self._say(f"{self._taken} saved. {WAIT}")
+
+    def show_feedback(self, correct: bool) -> None:
+        self._say("Right." if correct else "Wrong.")
+
+    def show_trouble(self, sentence: str) -> None:
+        """Stays until the next trial is over: between two trials nobody could read it."""
+        self._trouble = sentence
+        self._trouble_is_old = False
+        if self.is_mounted:
+            self.query_one("#trouble", Static).update(sentence)
+
+    def on_key(self, event: Key) -> None:
+        at_s = arrival_s(event)
+        answer = self._keys.answer(event.character or event.key)
+        if answer is not None:
+            event.stop()
+            self._take(answer, at_s)
+        elif self._armed_s is not None and event.key not in self.active_bindings:
+            self._refuse(event)
+
+    def on_paste(self, event: Paste) -> None:
+        event.stop()
+        if self._armed_s is not None:
+            self._say(f"Pasted text is no answer. {self._press()}")
+
+    def action_reply(self, name: str) -> None:
+        reply = REPLIES[name]
+        if self._armed_s is not None:
+            self._reply(reply)
+        elif reply.pause:
+            self._wanted = reply, time.monotonic()
+            self._say("A moment: the pause comes next.")
+
+    def action_heard(self, answer: int) -> None:
+        """The answers are heard in `on_key`; their bindings are there for the footer."""
+
+    def _take(self, answer: int, at_s: float) -> None:
+        armed_s = self._armed_s
+        is_press = self._presses.is_press(answer, at_s, float("inf") if armed_s is None else armed_s)
+        if armed_s is None or at_s < armed_s:
+            return
+        if not is_press:
+            self._say(f"Let go of the key first. {self._press()}")
+            return
+        self._armed_s = None
+        self.post_message(self.Replied(Answered(answer, at_s)))
+        self._drop_limit()
+        self._taken = answer
+        self._mark("taken")
+        self._say(f"{answer} taken.")
+
+    def _reply(self, reply: Unanswered) -> None:
+        self._armed_s = None
+        self.post_message(self.Replied(reply))
+        self._drop_limit()
+        self._say(AFTER[reply])
+
+    def _time_over(self) -> None:
+        if self._armed_s is not None:
+            self._reply(TIME_OVER)
+
+    def _drop_limit(self) -> None:
+        if self._limit is not None:
+            self._limit.stop()
+            self._limit = None
+
+    def _refuse(self, event: Key) -> None:
+        if event.key in NUM_LOCK:
+            self._say("That was no answer. On a number pad, switch Num Lock on.")
+        elif event.is_printable or event.key == "enter":
+            name = {"enter": "Enter", "space": "The space bar"}.get(event.key, f"'{event.character}'")
+            self._say(f"{name} is no answer. {self._press()}")
+
+    def _show(self) -> None:
+        """Everything anew, so that no trial leaves a trace in the next."""
+        if not self.is_mounted:
+            return
+        self.query_one("#trouble", Static).update(self._trouble)
+        question = self._question
+        if question is None:
+            self._say(WAIT)
+            return
+        bar = self.query_one(SessionBar)
+        bar.heading, bar.progress = heading(question), question.progress
+        self.query_one("#asked", Static).update(ASKED[question.task])
+        for panel in self.query(DirectionPanel):
+            panel.picture = question.picture if question.task is Task.DIRECTION else None
+            panel.mark = ""
+        self._say(f"{self._press()} If you cannot tell, guess.")
+
+    def _mark(self, mark: Mark) -> None:
+        for panel in self.query(DirectionPanel):
+            panel.mark = mark if panel.number == self._taken else ""
+
+    def _press(self) -> str:
+        return f"Press {self._keys.choice}."
+
+    def _say(self, sentence: str) -> None:
+        if self.is_mounted:
+            self.query_one("#said", Static).update(sentence)

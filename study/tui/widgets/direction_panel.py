@@ -1,0 +1,85 @@
+"""One of the two answers: its number, its direction as a large segment, and the same in words."""
+
+from typing import Literal
+
+from rich.segment import Segment
+from rich.style import Style
+from textual.geometry import Size
+from textual.reactive import reactive
+from textual.strip import Strip
+from textual.widget import Widget
+
+from study.session.views import DirectionPicture
+from study.tui.direction_picture import large_drawing, sentence
+from study.tui.number_picture import large_number
+
+NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
+BESIDE = 5
+"""Columns to the left of the drawing that the number needs; as many stay free to its right."""
+
+Mark = Literal["", "taken", "saved", "now", "felt"]
+
+
+class DirectionPanel(Widget):
+    """picture None: an interval, which has no direction. The mark is a word in the frame, and a heavier frame."""
+
+    DEFAULT_CSS = """
+    DirectionPanel {
+        width: 1fr; height: 1fr; min-height: 7; border: round $foreground 40%; border-subtitle-align: center;
+        border-subtitle-style: bold;
+    }
+    DirectionPanel.-taken, DirectionPanel.-saved, DirectionPanel.-now { border: heavy $foreground; }
+    DirectionPanel > .direction-panel--one { color: #56B4E9; text-style: bold; }
+    DirectionPanel > .direction-panel--two { color: #E69F00; text-style: bold; }
+    DirectionPanel:light > .direction-panel--one { color: #0072B2; }
+    DirectionPanel:light > .direction-panel--two { color: #A84A00; }
+    """
+    COMPONENT_CLASSES = {"direction-panel--one", "direction-panel--two"}  # noqa: RUF012  Textual's own type
+
+    picture: reactive[DirectionPicture | None] = reactive(None)
+    mark: reactive[Mark] = reactive[Mark]("")
+
+    def __init__(self, number: int, picture: DirectionPicture | None = None) -> None:
+        super().__init__()
+        self.number = number
+        self.set_reactive(DirectionPanel.picture, picture)
+
+    def watch_mark(self, before: Mark, after: Mark) -> None:
+        self.remove_class(f"-{before}")
+        self.set_class(bool(after), f"-{after}")
+        self.border_subtitle = f"{self.number} {after}" if after else ""
+
+    def render_line(self, y: int) -> Strip:
+        width, height = self.size
+        plain = self.rich_style
+        coloured = plain + self.get_component_rich_style(
+            "direction-panel--one" if self.number == 1 else "direction-panel--two", partial=True
+        )
+        if y == height - 1:
+            return Strip([Segment(self._words().center(width)[:width], plain + Style(bold=True))], width)
+        drawing, beside = self._drawing()
+        row = y - (height - 1 - len(drawing)) // 2
+        drawn = drawing[row] if 0 <= row < len(drawing) else ""
+        number = NUMBERS[self.number][y] if y < 3 and self.picture is not None else ""
+        text = f" {number}".ljust(beside) + drawn
+        return Strip([Segment(text.ljust(width)[:width], coloured)], width)
+
+    def _drawing(self) -> tuple[tuple[str, ...], int]:
+        """The rows, and how many columns are free to their left."""
+        room = _room(self.size)
+        if self.picture is None:
+            drawing = large_number(self.number, room.width, room.height)
+        else:
+            drawing = large_drawing(self.picture, self.number, room.width, room.height)
+        return drawing, (self.size.width - room.width) // 2
+
+    def _words(self) -> str:
+        if self.picture is None:
+            return f"{self.number}: the {'first' if self.number == 1 else 'second'} interval"
+        return sentence(self.picture, self.number)
+
+
+def _room(size: Size) -> Size:
+    """A square in the eye: cells are twice as high as wide."""
+    rows = max(1, min(size.height - 1, (size.width - 2 * BESIDE) // 2))
+    return Size(2 * rows, rows)

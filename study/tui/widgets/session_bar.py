@@ -1,0 +1,36 @@
+"""One line above a trial: where in the session it stands, and how much of it is left."""
+
+from rich.segment import Segment
+from rich.style import Style
+from textual.reactive import reactive
+from textual.strip import Strip
+from textual.widget import Widget
+
+from study.session.views import Progress
+
+DONE, LEFT = "━", "─"
+
+
+class SessionBar(Widget):
+    DEFAULT_CSS = """
+    SessionBar { height: 1; padding: 0 1; background: $panel; color: $foreground; }
+    """
+
+    heading: reactive[str] = reactive("")
+    progress: reactive[Progress | None] = reactive[Progress | None](None)
+
+    def render_line(self, y: int) -> Strip:
+        width = self.size.width
+        right = self._told(max(8, min(40, width // 4)))
+        left = self.heading[: max(0, width - len(right) - 1)]
+        gap = " " * (width - len(left) - len(right))
+        style = self.rich_style
+        return Strip([Segment(left, style + Style(bold=True)), Segment(gap + right, style)], width).crop(0, width)
+
+    def _told(self, bar: int) -> str:
+        if self.progress is None:
+            return ""
+        done = min(bar, round(self.progress.share_done * bar))
+        minutes = self.progress.minutes_left
+        left = "" if minutes is None else f"  about {minutes} min left"
+        return f"{DONE * done}{LEFT * (bar - done)} {self.progress.share_done:4.0%}{left}"
