@@ -5,11 +5,8 @@ from collections.abc import Callable
 from study.session.requests import NoteAsked
 from study.session.views import AfterPause, PauseNotice, RestNotice
 from study.tui.conversation import GLANCE_S, Conversation, Line, WaitOver, printable, shown
-from study.tui.trial_words import progress_sentence, runs_left
+from study.tui.trial_words import WITHDRAW, progress_sentence, runs_left
 from study.workflows.display import SignOfLife
-
-WITHDRAW = "withdraw"
-"""To be typed as a whole: one key must not erase a session."""
 
 COUNT_EVERY_S = 10.0
 

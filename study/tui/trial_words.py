@@ -4,6 +4,9 @@ levels."""
 from protocols.trial import Phase
 from study.session.views import Progress, Question, Task, Welcome
 
+WITHDRAW = "withdraw"
+"""To be typed as a whole: one key must not erase a session."""
+
 
 def heading(question: Question) -> str:
     again = ", once more" if question.repeated else ""

@@ -1,0 +1,37 @@
+"""After a void trial: nothing is played until somebody says that he is there."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+from textual.widgets import Footer
+
+from study.tui.widgets.card import Card
+from study.tui.widgets.said import Said
+
+
+class AwaitReturnScreen(Screen[None]):
+    HELP = """\
+# A trial that did not count
+
+- The last trial was cut short and does not count. It is drawn again, so nothing is lost.
+- Nothing is played until you press **Enter**.
+- **Ctrl+C** leaves; the session can be resumed.
+"""
+    DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on")]
+
+    def __init__(self, reason: str) -> None:
+        super().__init__()
+        self._reason = reason
+
+    def compose(self) -> ComposeResult:
+        with Card("The last trial does not count"):
+            yield Said(f"It is void: {self._reason}.")
+            yield Said("All answers before it are saved, and it will be drawn again.", classes="gap")
+            yield Said("Take hold of the handle and press Enter when you are ready.", classes="gap strong")
+        yield Footer(show_command_palette=False)
+
+    def action_go_on(self) -> None:
+        self.dismiss(None)

@@ -1,0 +1,57 @@
+"""The consent taken back during a sitting, asked for with a word: nobody erases a session by one wrong key."""
+
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import ModalScreen
+from textual.widgets import Footer, Input
+
+from study.tui.screens.help import HelpScreen
+from study.tui.trial_words import WITHDRAW
+from study.tui.widgets.card import Card
+from study.tui.widgets.said import Said
+
+
+class ConfirmWithdrawal(ModalScreen[bool]):
+    """True where the word was typed."""
+
+    HELP = """\
+# Taking the consent back
+
+- A participant may take the consent back at any time, without giving a reason.
+- Everything recorded of this participant is then erased, and cannot be brought back.
+- Type the word and press **Enter** to erase. **Esc** keeps everything.
+"""
+    DEFAULT_CSS = """
+    ConfirmWithdrawal { align: center middle; }
+    ConfirmWithdrawal Card { border: round $error; }
+    ConfirmWithdrawal Input { margin-top: 1; }
+    ConfirmWithdrawal #said { height: 1; color: $text-error; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", "Keep everything", key_display="Esc"),
+        Binding("f1", "help", "Help"),
+    ]
+
+    def compose(self) -> ComposeResult:
+        with Card("Take the consent back"):
+            yield Said("Everything recorded of this participant will be erased, and cannot be brought back.")
+            yield Said(f"To erase it, type {WITHDRAW} and press Enter. Esc keeps everything.", classes="gap strong")
+            yield Input(compact=True)
+            yield Said(id="said")
+        yield Footer(show_command_palette=False)
+
+    @on(Input.Submitted)
+    def _judge(self, typed: Input.Submitted) -> None:
+        if typed.value.strip().casefold() == WITHDRAW:
+            self.dismiss(True)
+        else:
+            self.query_one("#said", Said).update(f"That is not the word {WITHDRAW}. Nothing is erased.")
+
+    def action_help(self) -> None:
+        self.app.push_screen(HelpScreen(self.HELP))
+
+    def action_leave(self) -> None:
+        self.dismiss(False)

@@ -1,0 +1,108 @@
+"""The labelled demonstration: both directions at each vibration, as often as wanted."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.events import Key
+from textual.message import Message
+from textual.screen import Screen
+from textual.widgets import Footer
+
+from study.session.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
+from study.tui.answer_keys import DIGITS, AnswerKeys
+from study.tui.widgets.direction_panel import DirectionPanel
+from study.tui.widgets.said import Said
+
+
+class DemoScreen(Screen[DemoChoice]):
+    HELP = """\
+# Demonstration
+
+- **1** and **2** play that direction, as often as you like. Nothing is asked, nothing is recorded as an answer.
+- **Left** and **Right** (or **b** and **n**) change the vibration: 1 is the slowest.
+- What you have felt already is marked with a tick.
+- **Enter** ends the demonstration.
+"""
+    DEFAULT_CSS = """
+    DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
+    DemoScreen #steps { height: 1; margin: 0 1; text-align: center; }
+    DemoScreen #answers { height: 1fr; margin: 0 1; }
+    DemoScreen #said { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    DemoScreen #note { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
+    """
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("1", "heard(1)", "Feel 1"),
+        Binding("2", "heard(2)", "Feel 2"),
+        Binding("left,b", "turn(-1)", "Slower", key_display="←"),
+        Binding("right,n", "turn(1)", "Faster", key_display="→"),
+        Binding("p", "pause", "Pause"),
+        Binding("enter", "done", "Done"),
+    ]
+
+    class PauseWanted(Message):
+        """The demonstration's reply has no word for it."""
+
+    def __init__(self, menu: DemoMenu, keys: AnswerKeys = DIGITS) -> None:
+        super().__init__()
+        self._menu = menu
+        self._keys = keys
+        self._vibration = menu.vibration
+
+    def compose(self) -> ComposeResult:
+        yield Said(id="title")
+        yield Said(id="steps")
+        with Horizontal(id="answers"):
+            yield DirectionPanel(1, self._menu.picture)
+            yield DirectionPanel(2, self._menu.picture)
+        yield Said(id="said")
+        yield Said("" if self._menu.handle_moves else "The device is a simulation: nothing moves.", id="note")
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self._show(f"Press {self._keys.choice} to feel it, Enter when you have felt enough.")
+
+    def on_key(self, event: Key) -> None:
+        answer = self._keys.answer(event.character or event.key)
+        if answer is not None:
+            event.stop()
+            self.dismiss(PlayDemo(self._vibration, answer))
+
+    def action_heard(self, answer: int) -> None:
+        """The answers are heard in `on_key`; their bindings are there for the footer."""
+
+    def action_turn(self, step: int) -> None:
+        turned = self._vibration + step
+        if turned < 1:
+            self._show("This is the slowest vibration.")
+        elif turned > self._menu.vibrations:
+            self._show("This is the fastest vibration.")
+        else:
+            self._vibration = turned
+            self._show(self._so_far())
+
+    def action_pause(self) -> None:
+        self.post_message(self.PauseWanted())
+
+    def action_done(self) -> None:
+        self.dismiss(DemoDone())
+
+    def _show(self, sentence: str) -> None:
+        menu = self._menu
+        self.query_one("#title", Said).update(
+            f"Demonstration: vibration {self._vibration} of {menu.vibrations}. Feel both directions."
+        )
+        self.query_one("#steps", Said).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
+        for panel in self.query(DirectionPanel):
+            panel.mark = "felt" if (self._vibration, panel.number) in menu.felt else ""
+        self.query_one("#said", Said).update(sentence)
+
+    def _step(self, vibration: int) -> str:
+        ticks = "".join("✓" if (vibration, number) in self._menu.felt else "·" for number in (1, 2))
+        return f"[{vibration} {ticks}]" if vibration == self._vibration else f" {vibration} {ticks} "
+
+    def _so_far(self) -> str:
+        felt = [str(number) for number in (1, 2) if (self._vibration, number) in self._menu.felt]
+        return f"Felt so far: {' and '.join(felt)}." if felt else "Nothing of it was felt yet."

@@ -1,0 +1,75 @@
+"""What the device check found, and what to do about it."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+from textual.widgets import Footer
+
+from study.session.views import DeviceFinding, DeviceReport
+from study.tui.widgets.card import Sheet
+from study.tui.widgets.said import Said
+
+
+class DeviceCheckScreen(Screen[bool]):
+    """True: go on. False: check again."""
+
+    HELP = """\
+# Device check
+
+- Each line is one finding: **ok**, or **LOOK** with what to do about it.
+- **c** checks again, after something was plugged in or mended.
+- **Enter** goes on where all is well; **g** goes on although something needs a look.
+- The findings are kept with the data.
+"""
+    DEFAULT_CSS = """
+    DeviceCheckScreen { align: center top; }
+    DeviceCheckScreen .advice { margin-left: 6; color: $text-warning; }
+    DeviceCheckScreen .look { text-style: bold; color: $text-warning; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "go_on", "Go on"),
+        Binding("g", "go_on_anyway", "Go on all the same"),
+        Binding("c", "check_again", "Check again"),
+    ]
+
+    def __init__(self, report: DeviceReport) -> None:
+        super().__init__()
+        self._report = report
+
+    def compose(self) -> ComposeResult:
+        report = self._report
+        names = max((len(finding.name) for finding in report.findings), default=0)
+        with Sheet():
+            yield Said(f"Device check: {report.device}", classes="title")
+            if report.simulated:
+                yield Said("The device is a simulation: nothing moves.")
+            yield Said(classes="gap")
+            for finding in report.findings:
+                yield Said(_line(finding, names), classes="fine" if finding.fine else "look")
+                if finding.advice and not finding.fine:
+                    yield Said(finding.advice, classes="advice")
+            if report.fine:
+                yield Said("The device is ready. Press Enter to go on.", classes="gap strong")
+            else:
+                yield Said(
+                    "Something needs a look. Press c to check again, or g to go on all the same.", classes="gap strong"
+                )
+        yield Footer(show_command_palette=False)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        return {"go_on": self._report.fine, "go_on_anyway": not self._report.fine}.get(action, True)
+
+    def action_go_on(self) -> None:
+        self.dismiss(True)
+
+    def action_go_on_anyway(self) -> None:
+        self.dismiss(True)
+
+    def action_check_again(self) -> None:
+        self.dismiss(False)
+
+
+def _line(finding: DeviceFinding, names: int) -> str:
+    return f"{'ok' if finding.fine else 'LOOK':<4}  {finding.name:<{names}}  {finding.value}"

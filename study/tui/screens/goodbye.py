@@ -1,0 +1,52 @@
+"""The end of a sitting, finished or not."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+from textual.widgets import Footer
+
+from study.session.views import Goodbye
+from study.tui.widgets.card import Card
+from study.tui.widgets.said import Said
+
+
+class GoodbyeScreen(Screen[None]):
+    HELP = """\
+# The end
+
+- The device is still, and every answer is on the disk.
+- A session that is not finished can be resumed another day, at the trial where it stopped.
+- **Enter** closes this page.
+"""
+    DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "close_page", "Close")]
+
+    def __init__(self, notice: Goodbye) -> None:
+        super().__init__()
+        self._notice = notice
+
+    def compose(self) -> ComposeResult:
+        notice = self._notice
+        with Card("Finished" if notice.finished else "The end of this sitting"):
+            if notice.finished:
+                yield Said("Thank you! This was the last trial.", classes="strong")
+            else:
+                yield Said(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
+            yield Said(f"{_answers(notice.answers)} on the disk.", classes="gap")
+            if not notice.finished:
+                yield Said("It can be resumed at the trial where it stopped.", classes="gap")
+            yield Said("You may let go of the handle. Press Enter to close this page.", classes="gap")
+        yield Footer(show_command_palette=False)
+
+    def action_close_page(self) -> None:
+        self.dismiss(None)
+
+
+def _because(reason: str) -> str:
+    return f": {reason}" if reason else ""
+
+
+def _answers(answers: int) -> str:
+    return "1 answer is" if answers == 1 else f"{answers} answers are"

@@ -1,0 +1,61 @@
+"""Before a trial: the handle is brought to its place."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+from textual.widgets import Footer
+
+from study.session.views import HandleView, Unanswered
+from study.tui.trial_replies import LEAVING, PAUSE
+from study.tui.widgets.handle_target import HandleTarget
+from study.tui.widgets.said import Said
+
+
+class HandleScreen(Screen[Unanswered | None]):
+    """The application closes it when the handle is there."""
+
+    HELP = """\
+# The handle's place
+
+- The ring is where a trial may start; the spot is your handle.
+- Move it into the ring and hold it there loosely. The trial then begins by itself.
+- **p** pauses, **q** pauses and offers to leave.
+- If the spot never moves, tell the experimenter: the device may have lost its handle.
+"""
+    DEFAULT_CSS = """
+    HandleScreen #title { height: 1; margin: 1 1 1 1; text-align: center; text-style: bold; }
+    HandleScreen HandleTarget { margin: 0 1; }
+    HandleScreen #sentence { height: 2; margin: 1 1 0 1; text-align: center; text-style: bold; }
+    """
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("p", "pause", "Pause"),
+        Binding("q", "leave", "Leave"),
+    ]
+
+    def __init__(self, view: HandleView) -> None:
+        super().__init__()
+        self._view = view
+
+    def compose(self) -> ComposeResult:
+        yield Said("Bring the handle into the ring. The trial then begins by itself.", id="title")
+        yield HandleTarget()
+        yield Said(id="sentence")
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.update_view(self._view)
+
+    def update_view(self, view: HandleView) -> None:
+        self._view = view
+        if self.is_mounted:
+            self.query_one(HandleTarget).view = view
+            self.query_one("#sentence", Said).update(view.sentence)
+
+    def action_pause(self) -> None:
+        self.dismiss(PAUSE)
+
+    def action_leave(self) -> None:
+        self.dismiss(LEAVING)

@@ -1,0 +1,58 @@
+"""While something of a fixed length plays, to which nothing is answered yet."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.screen import Screen
+from textual.widgets import Footer
+
+from study.session.views import PlayingNotice, Unanswered
+from study.tui.trial_replies import LEAVING, PAUSE
+from study.tui.widgets.direction_panel import DirectionPanel
+from study.tui.widgets.said import Said
+
+
+class PlayingScreen(Screen[Unanswered | None]):
+    """The application closes it when the time is over."""
+
+    HELP = """\
+# Only feel
+
+- What you feel now is the one that is framed. It ends by itself.
+- No answer is needed yet: it is asked for afterwards.
+- **p** pauses at once; **q** pauses and offers to leave.
+"""
+    DEFAULT_CSS = """
+    PlayingScreen #title { height: 1; margin: 2 1 0 1; text-align: center; text-style: bold; }
+    PlayingScreen #answers { height: 1fr; margin: 0 1; }
+    PlayingScreen #said { height: 3; margin: 0 1; text-align: center; }
+    """
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("p", "pause", "Pause"),
+        Binding("q", "leave", "Leave"),
+    ]
+
+    def __init__(self, notice: PlayingNotice) -> None:
+        super().__init__()
+        self._notice = notice
+
+    def compose(self) -> ComposeResult:
+        notice = self._notice
+        yield Said(notice.title, id="title")
+        with Horizontal(id="answers"):
+            for number in (1, 2):
+                panel = DirectionPanel(number, notice.picture)
+                # Between two intervals there is nothing to feel, and no title.
+                panel.mark = "now" if notice.title and number == notice.number else ""
+                yield panel
+        yield Said("Only feel. No key is needed yet." if notice.title else "A moment.", id="said")
+        yield Footer(show_command_palette=False)
+
+    def action_pause(self) -> None:
+        self.dismiss(PAUSE)
+
+    def action_leave(self) -> None:
+        self.dismiss(LEAVING)

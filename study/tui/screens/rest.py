@@ -1,0 +1,81 @@
+"""An enforced rest: how long it still takes, and what is left to do."""
+
+import math
+import time
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import Screen
+from textual.widgets import Digits, Footer
+
+from study.session.views import RestNotice
+from study.tui.trial_words import progress_sentence, runs_left
+from study.tui.widgets.card import Card
+from study.tui.widgets.said import Said
+
+TICK_S = 0.2
+RESTING = "There is no hurry."
+READY = "When you are ready, press Enter."
+
+
+class RestScreen(Screen[float]):
+    """Returns the seconds rested, never fewer than asked for."""
+
+    HELP = """\
+# Rest
+
+- Let go of the handle and relax your hand. Nothing is played.
+- The rest is part of the study: a tired hand feels less. It cannot be shortened.
+- When it is over, take as long as you like, and press **Enter** to go on.
+- **Ctrl+C** leaves; the session can be resumed.
+"""
+    DEFAULT_CSS = """
+    RestScreen { align: center middle; }
+    RestScreen Digits { width: 100%; text-align: center; margin-top: 1; }
+    RestScreen Card Said { text-align: center; width: 100%; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on")]
+
+    def __init__(self, notice: RestNotice) -> None:
+        super().__init__()
+        self._notice = notice
+        self._began_s = time.monotonic()
+
+    def compose(self) -> ComposeResult:
+        notice = self._notice
+        with Card("Rest"):
+            yield Said("Let go of the handle and relax your hand.", classes="strong")
+            yield Digits()
+            yield Said(id="said", classes="gap strong")
+            yield Said(runs_left(notice.runs_left), classes="gap")
+            if notice.progress is not None:
+                yield Said(progress_sentence(notice.progress))
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self._began_s = time.monotonic()
+        self._ticking = self.set_interval(TICK_S, self._tick)
+        self._tick()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        # None: greyed out in the footer until the rest is over.
+        return True if action != "go_on" or self._over() else None
+
+    def action_go_on(self) -> None:
+        if self._over():
+            self.dismiss(self._rested_s())
+
+    def _tick(self) -> None:
+        left_s = max(0, math.ceil(self._notice.seconds - self._rested_s()))
+        self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
+        self.query_one("#said", Said).update(READY if self._over() else RESTING)
+        if self._over():
+            self._ticking.stop()
+            self.refresh_bindings()
+
+    def _rested_s(self) -> float:
+        return time.monotonic() - self._began_s
+
+    def _over(self) -> bool:
+        return self._rested_s() >= self._notice.seconds

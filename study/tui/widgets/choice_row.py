@@ -1,0 +1,137 @@
+"""Exactly one of a few choices, side by side where they fit, else one below the other."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rich.text import Text
+from textual.binding import Binding, BindingType
+from textual.events import Click, Key
+from textual.geometry import Size
+from textual.message import Message
+from textual.reactive import reactive
+from textual.widget import Widget
+
+GAP = 3
+
+
+class ChoiceRow(Widget, can_focus=True):
+    """Nothing is chosen beforehand, and moving over a choice does not choose it: an agreement must be meant."""
+
+    DEFAULT_CSS = """
+    ChoiceRow { height: auto; width: 1fr; }
+    ChoiceRow > .choice-row--cursor { background: $block-cursor-background; color: $block-cursor-foreground; }
+    ChoiceRow > .choice-row--chosen { text-style: bold; }
+    """
+    COMPONENT_CLASSES = {"choice-row--cursor", "choice-row--chosen"}  # noqa: RUF012  Textual's own type
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("left", "move(-1)", "Choose", key_display="←→", show=False),
+        Binding("right", "move(1)", "Choose", show=False),
+        Binding("space", "choose", "Choose", key_display="Space"),
+        Binding("enter", "choose_and_leave", "Choose, next", key_display="Enter"),
+    ]
+
+    cursor: reactive[int | None] = reactive[int | None](None)
+    chosen: reactive[int | None] = reactive[int | None](None)
+
+    @dataclass
+    class Chosen(Message):
+        row: "ChoiceRow"
+
+    @dataclass
+    class Left(Message):
+        """Enter was pressed on a choice."""
+
+        row: "ChoiceRow"
+
+    def __init__(self, choices: tuple[str, ...], chosen: int | None = None, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._choices = choices
+        # Where the choices are numbers themselves, a digit means the choice of that name.
+        self._numbered = not any(choice.isdigit() for choice in choices)
+        self.set_reactive(ChoiceRow.chosen, chosen)
+        self.set_reactive(ChoiceRow.cursor, chosen)
+
+    @property
+    def answer(self) -> str:
+        """Empty where nothing is chosen."""
+        return "" if self.chosen is None else self._choices[self.chosen]
+
+    def on_key(self, event: Key) -> None:
+        if event.key in ("up", "down") and self._moved_within(1 if event.key == "down" else -1):
+            event.stop()
+        elif event.character and (named := self._named(event.character)) is not None:
+            event.stop()
+            self._choose(named)
+
+    def on_click(self, event: Click) -> None:
+        places = self._places(self.size.width)
+        for index, (x, y) in enumerate(places):
+            if y == event.y and x <= event.x < x + len(self._label(index)):
+                self._choose(index)
+
+    def action_move(self, step: int) -> None:
+        last = len(self._choices) - 1
+        self.cursor = (0 if step > 0 else last) if self.cursor is None else min(max(self.cursor + step, 0), last)
+
+    def action_choose(self) -> None:
+        if self.cursor is not None:
+            self._choose(self.cursor)
+
+    def action_choose_and_leave(self) -> None:
+        self.action_choose()
+        if self.chosen is not None:
+            self.post_message(self.Left(self))
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        return max((y for _, y in self._places(width)), default=0) + 1
+
+    def render(self) -> Text:
+        text = Text(no_wrap=True)
+        x = y = 0
+        for index, place in enumerate(self._places(self.size.width)):
+            if place[1] > y:
+                text.append("\n")
+                x, y = 0, place[1]
+            text.append(" " * (place[0] - x))
+            text.append(self._label(index), self._style(index))
+            x = place[0] + len(self._label(index))
+        return text
+
+    def _style(self, index: int) -> str:
+        if self.has_focus and index == self.cursor:
+            return str(self.get_component_rich_style("choice-row--cursor"))
+        return "bold" if index == self.chosen else ""
+
+    def _label(self, index: int) -> str:
+        number = f"{index + 1} " if self._numbered else ""
+        return f" {number}{'●' if index == self.chosen else '○'} {self._choices[index]} "
+
+    def _places(self, width: int) -> list[tuple[int, int]]:
+        """Column and row of each choice."""
+        lengths = [len(self._label(index)) for index in range(len(self._choices))]
+        if sum(lengths) + GAP * (len(lengths) - 1) > width:
+            return [(0, index) for index in range(len(lengths))]
+        return [(sum(lengths[:index]) + GAP * index, 0) for index in range(len(lengths))]
+
+    def _moved_within(self, step: int) -> bool:
+        """Up and down go through choices that lie below each other, and at their ends to the next question."""
+        if len({y for _, y in self._places(self.size.width)}) < 2:
+            return False
+        at = -1 if self.cursor is None else self.cursor
+        if not 0 <= at + step < len(self._choices):
+            return False
+        self.action_move(step)
+        return True
+
+    def _named(self, key: str) -> int | None:
+        """By its number, or by a first letter that no other has."""
+        if key.isdecimal():
+            if self._numbered:
+                return int(key) - 1 if 0 < int(key) <= len(self._choices) else None
+            return self._choices.index(key) if key in self._choices else None
+        same = [index for index, choice in enumerate(self._choices) if choice.casefold().startswith(key.casefold())]
+        return same[0] if len(same) == 1 else None
+
+    def _choose(self, index: int) -> None:
+        self.cursor = self.chosen = index
+        self.post_message(self.Chosen(self))

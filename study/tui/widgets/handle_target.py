@@ -1,0 +1,49 @@
+"""Where the handle is, and the ring in which a trial may start."""
+
+import math
+
+from rich.segment import Segment
+from rich.style import Style
+from textual.reactive import reactive
+from textual.strip import Strip
+from textual.widget import Widget
+
+from study.session.views import HandleView
+from study.tui.braille import Canvas
+
+
+class HandleTarget(Widget):
+    """Right and up are right and up in the picture. A handle far away is drawn at the edge."""
+
+    DEFAULT_CSS = """
+    HandleTarget { height: 1fr; min-height: 5; }
+    """
+
+    view: reactive[HandleView | None] = reactive[HandleView | None](None)
+
+    def render_line(self, y: int) -> Strip:
+        width, height = self.size
+        rows = max(1, min(height, width // 2))
+        drawing = _drawn(self.view, 2 * rows, rows) if self.view is not None else []
+        row = y - (height - rows) // 2
+        text = drawing[row] if 0 <= row < len(drawing) else ""
+        return Strip([Segment((" " * ((width - 2 * rows) // 2) + text).ljust(width), self.rich_style + BOLD)], width)
+
+
+BOLD = Style(bold=True)
+
+
+def _drawn(view: HandleView, columns: int, rows: int) -> list[str]:
+    canvas = Canvas(columns, rows)
+    x, y = canvas.middle
+    edge = min(x, y)
+    dots_per_mm = 0.4 * edge / max(view.radius_mm, 1e-9)
+    canvas.circle((x, y), dots_per_mm * view.radius_mm)
+    canvas.line((x - 3, y), (x + 3, y))
+    canvas.line((x, y - 3), (x, y + 3))
+    right, up = view.offset_mm
+    size = max(2.0, edge / 14)
+    away = dots_per_mm * math.hypot(right, up)
+    shrink = min(1.0, (edge - size) / away) if away > 0 else 1.0
+    canvas.disc((x + shrink * dots_per_mm * right, y - shrink * dots_per_mm * up), size)
+    return canvas.lines()
