@@ -1,23 +1,48 @@
 """`hapteq resume`: go on with a session after a crash or a pause."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.study import DataOption, DeviceOption, KeysOption
+from study.cli.study import DataOption, DeviceOption, KeysOption, PlainOption
 from study.tui.answer_keys import parse_keys
+
+LOG_NAME = "events.jsonl"
+"""As `study.store.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
 
 
 def resume(
     session: Annotated[str, typer.Argument(help="Session folder, or its name in the data folder.")],
     device: DeviceOption = "simulated",
+    plain: PlainOption = False,
     data: DataOption = Path("data"),
     keys: KeysOption = "1,2",
     as_json: JsonOption = False,
 ) -> None:
     """Go on with a session where it stopped. No answer is lost; a trial without an answer is drawn again."""
+    from study.cli.screen import has_screen, open_screen
+
+    answer_keys = parse_keys(keys)
+    if not plain and has_screen() and not _simulated(session, data):
+        from study.tui.app_start import AppStart
+        from study.tui.link.messages import Resume
+
+        open_screen(AppStart(str(data), device, answer_keys, Resume(session, device, str(data))), as_json)
+        return
     from study.cli.conduct import go_on
 
-    go_on(session, device=device, data=data, as_json=as_json, keys=parse_keys(keys))
+    go_on(session, device=device, data=data, as_json=as_json, keys=answer_keys)
+
+
+def _simulated(session: str, data: Path) -> bool:
+    """Whether its first line says that a simulated participant takes it: that one needs no screen."""
+    for folder in (Path(session), data / session):
+        try:
+            with (folder / LOG_NAME).open("rb") as log:
+                return json.loads(log.readline()).get("observer") is not None
+        except (OSError, ValueError, AttributeError, RecursionError):
+            continue
+    return False

@@ -1,7 +1,5 @@
 """`hapteq study`: take the study, as a person or as a simulated participant."""
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +14,8 @@ KeysOption = Annotated[
     str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 beside the digits, such as f,j.")
 ]
 
+PlainOption = Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")]
+
 
 def study(
     protocol: Annotated[str, typer.Option(help="A shipped protocol's name, or a file.")] = "direction_threshold",
@@ -28,22 +28,27 @@ def study(
             "always_2, vibration_only, intensity_cue, drifting, scripted, or person (one of a simulated population)."
         ),
     ] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")] = False,
+    plain: PlainOption = False,
     data: DataOption = Path("data"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws; drawn and logged if not given.")] = None,
     keys: KeysOption = "1,2",
     as_json: JsonOption = False,
 ) -> None:
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
+    from study.cli.screen import has_screen, open_screen
+
+    answer_keys = parse_keys(keys)
+    if observer is None and not plain and has_screen():
+        from study.tui.app_start import AppStart
+        from study.tui.link.messages import Begin, SessionOrder
+
+        first = None if subject is None else Begin(SessionOrder(protocol, device, subject, str(data), seed))
+        open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed), as_json)
+        return
     from study.cli.conduct import Sitter, begin
 
-    if observer is None and not plain and not _in_a_browser() and (sys.stdin is None or not sys.stdin.isatty()):
+    if observer is None and not plain:
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
-    sitter = Sitter(observer=observer, subject=subject, keys=parse_keys(keys))
+    sitter = Sitter(observer=observer, subject=subject, keys=answer_keys)
     begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json)
-
-
-def _in_a_browser() -> bool:
-    """Started by `hapteq serve`: there is no terminal, and the page is the screen."""
-    return "TEXTUAL_DRIVER" in os.environ

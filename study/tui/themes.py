@@ -3,6 +3,8 @@
 Source: M. Okabe, K. Ito, Color Universal Design (2008), in shades that are dark or light enough on each ground.
 """
 
+from typing import Any
+
 from textual.app import App
 from textual.theme import Theme
 
@@ -56,7 +58,7 @@ NEXT = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapte
 """For a key that goes through them."""
 
 
-def register_themes(app: App[object], chosen: str = DARK.name) -> None:
+def register_themes(app: App[Any], chosen: str = DARK.name) -> None:
     for theme in THEMES:
         app.register_theme(theme)
     app.theme = chosen

@@ -13,7 +13,7 @@ def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
     """The shipped ones first, then files in the data folder and beside it."""
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
-    lines = (_line(name, data) for name in (*shipped_protocols(), *found))
+    lines = (protocol_line(name, data) for name in (*shipped_protocols(), *found))
     return tuple(line for line in lines if line is not None)
 
 
@@ -31,7 +31,7 @@ def _says_study(path: Path) -> bool:
         return False
 
 
-def _line(name: str, data: Path) -> ProtocolLine | None:
+def protocol_line(name: str, data: Path) -> ProtocolLine | None:
     """None for a protocol of another kind. A bad one is offered with its problem, so that nobody misses it."""
     try:
         file = read_protocol(name, data)

@@ -33,6 +33,8 @@ class EngineClient:
         self._connection: Connection | None = None
         self._closing = False
         self._opened: Opened | None = None
+        self.dead = False
+        """The engine ended by itself; a new client can be started."""
         self._thread = threading.Thread(target=self._live, name="engine-client", daemon=True)
 
     @property
@@ -65,6 +67,7 @@ class EngineClient:
             try:
                 connection, process = _started(said)
             except OSError as problem:
+                self.dead = True
                 self._deliver(_not_started(problem))
                 return
             self._connection, self._process = connection, process
@@ -76,6 +79,7 @@ class EngineClient:
             writer.join()
             connection.close()
             if not self._closing:
+                self.dead = True
                 self._deliver(_death(code, _last_words(said), self._opened))
 
     def _read(self, connection: Connection) -> None:

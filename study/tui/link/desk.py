@@ -3,19 +3,21 @@
 import contextlib
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from study.devices.clock import RealClock
 from study.devices.device import Device
 from study.errors import WrongUseError
+from study.session.archive_views import HomeView
 from study.store.archive import SessionFolder, find_session
 from study.tui.link.messages import (
     Analyze,
+    AskBeside,
     Begin,
     Command,
     Diagnosis,
-    Ended,
+    Finished,
     Home,
     Opened,
     Preparing,
@@ -28,13 +30,16 @@ from study.tui.link.messages import (
     ShowSession,
     Trouble,
     Withdraw,
+    Withdrawn,
 )
 from study.tui.link.remote_display import RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
+from study.workflows.ask_session import ask_session
 from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.display import PersonsHand
 from study.workflows.end_sitting import end_sitting
 from study.workflows.fold_session import fold_session
+from study.workflows.list_protocols import protocol_line
 from study.workflows.list_sessions import home_view
 from study.workflows.plan_sitting import plan_sitting
 from study.workflows.session_results import write_results
@@ -58,8 +63,8 @@ class Desk:
         """Raises StudyError where it cannot be done, KeyboardInterrupt where somebody let go."""
         self.opened = None
         match command:
-            case ShowHome(data=data):
-                self._link.send(Home(home_view(Path(data))))
+            case ShowHome():
+                self._link.send(Home(_offered(command)))
             case ShowSession(path=path):
                 self._link.send(Session(session_view(Path(path))))
             case ShowDiagnosis(path=path):
@@ -74,6 +79,8 @@ class Desk:
                 self._link.send(Session(session_view(Path(session))))
             case Withdraw(session=session):
                 self._withdraw(SessionFolder(Path(session)))
+            case AskBeside(session=session, request=request):
+                ask_session(SessionFolder(Path(session)), request, self._clock)
 
     def _begin(self, order: SessionOrder) -> None:
         plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data))
@@ -101,8 +108,7 @@ class Desk:
             self.opened = None  # there is nothing left to go on with
             self._link.send(Preparing("Making the tables and the report."))
         written = end_sitting(end, self._clock.utc())
-        ended = Ended("finished", str(end.folder.path), end.state.answers, _results(written))
-        self._link.send(ended)
+        self._link.send(Finished(str(end.folder.path), end.state.answers, _results(written)))
 
     @contextlib.contextmanager
     def _participant(self) -> Iterator[Participant]:
@@ -121,7 +127,16 @@ class Desk:
     def _withdraw(self, folder: SessionFolder) -> None:
         plan = plan_withdrawal(folder)
         withdraw(folder.path.parent, plan, self._clock.utc())
-        self._link.send(Ended("withdrawn", str(folder.path), 0, erased=plan.sessions))
+        self._link.send(Withdrawn(plan.sessions))
+
+
+def _offered(wanted: ShowHome) -> HomeView:
+    """The start screen, with what the command line named in the first place."""
+    view = home_view(Path(wanted.data))
+    line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None
+    protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols
+    devices = tuple(sorted(view.devices, key=lambda name: name != wanted.device))
+    return replace(view, protocols=protocols, devices=devices)
 
 
 def _results(written: WrittenAnalysis) -> Results:

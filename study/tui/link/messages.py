@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Any
 
 from study.session.archive_views import DiagnosisView, HomeView, SessionView
 from study.session.requests import Request
@@ -28,6 +28,9 @@ class SessionOrder:
 @dataclass(frozen=True, slots=True)
 class ShowHome:
     data: str
+    protocol: str = ""
+    """What is offered first; so is the device."""
+    device: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,14 @@ class Withdraw:
 
 
 @dataclass(frozen=True, slots=True)
+class AskBeside:
+    """Ask a session that runs in another program."""
+
+    session: str
+    request: Request
+
+
+@dataclass(frozen=True, slots=True)
 class Relay:
     """To the running session, as a second terminal could ask for it: a note, a pause, a stop."""
 
@@ -92,7 +103,7 @@ class Reply:
     value: Any
 
 
-Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw
+Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | AskBeside
 """What the engine works through, one after the other."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply
@@ -208,25 +219,26 @@ class Results:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
-    """A sitting is over, or a withdrawal is done, and the device is closed."""
+class Finished:
+    """All runs of a session are done, the device is closed, and the report is written."""
 
-    outcome: Literal["finished", "left", "withdrawn"]
     path: str
-    """Of the session; it can be resumed where the outcome is `left`."""
     answers: int
-    """On disk; 0 after a withdrawal."""
-    results: Results | None = None
-    """Of a finished session."""
-    left: ErrorText | None = None
-    """Why it is not finished."""
-    erased: tuple[str, ...] = ()
-    """Names of the sessions that a withdrawal erased."""
+    """On disk."""
+    results: Results
+
+
+@dataclass(frozen=True, slots=True)
+class Withdrawn:
+    """A withdrawal that was asked for from the list of sessions is done."""
+
+    sessions: tuple[str, ...]
+    """Names of those that were erased."""
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """What was asked for could not be done."""
+    """What was asked for could not be done, or not to its end: also of a sitting that somebody left."""
 
     error: ErrorText
     path: str = ""
@@ -244,6 +256,7 @@ FromEngine = (
     | Diagnosis
     | Preparing
     | Opened
-    | Ended
+    | Finished
+    | Withdrawn
     | Failed
 )  # fmt: skip

@@ -1,0 +1,64 @@
+"""The screen of `study` and `resume`: started from here, and what it ends with is said here."""
+
+import sys
+from typing import TYPE_CHECKING
+
+import typer
+
+from study.errors import DeviceError, ExitCode, LeftError, StudyError, WrongUseError
+
+if TYPE_CHECKING:
+    from study.tui.app_start import AppStart
+    from study.tui.link.messages import Failed, Finished
+
+KINDS: dict[int, type[StudyError]] = {
+    ExitCode.WRONG_USE: WrongUseError,
+    ExitCode.DEVICE: DeviceError,
+    ExitCode.INTERRUPTED: LeftError,
+}
+
+
+def has_screen() -> bool:
+    """Whether there is a terminal, or a browser of `hapteq serve`, to draw on. Results may go to a file."""
+    if in_a_browser():
+        return True
+    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+
+
+def in_a_browser() -> bool:
+    """Started by `hapteq serve`: there is no terminal, and the page is the screen."""
+    import os
+
+    return "TEXTUAL_DRIVER" in os.environ
+
+
+def open_screen(start: "AppStart", as_json: bool) -> None:
+    """Raises StudyError for a sitting that was not finished."""
+    from study.tui.app import HapteqApp
+
+    app = HapteqApp(start)
+    try:
+        app.run()
+    finally:
+        app.close_engine()
+    _say(app.outcome, as_json)
+    if app.return_code:
+        raise typer.Exit(app.return_code)
+
+
+def _say(outcome: "Finished | Failed | None", as_json: bool) -> None:
+    from study.tui.link.messages import Failed
+
+    if outcome is None:
+        return
+    if isinstance(outcome, Failed):
+        error = outcome.error
+        kind = KINDS.get(error.exit_code, StudyError)
+        raise kind(error.title, error.happened, error.do_now, error.saved)
+    results = outcome.results
+    for line in (results.document,) if as_json else results.table:
+        typer.echo(line)
+    if not as_json:
+        for warning in results.warnings:
+            typer.echo(f"Note: {warning}", err=True)
+        typer.echo(f"Report: {results.report}", err=True)

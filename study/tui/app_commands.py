@@ -1,0 +1,56 @@
+"""The command palette: every action of the screen, each with the key and with its twin on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from textual.app import App, SystemCommand
+from textual.screen import Screen
+
+TWINS = {
+    "begin": "hapteq study --subject CODE",
+    "resume": "hapteq resume SESSION",
+    "decide('resume')": "hapteq resume SESSION",
+    "analyze": "hapteq analyze SESSION",
+    "withdraw": "hapteq withdraw SESSION",
+    "watch": "hapteq watch SESSION",
+    "past": "hapteq sessions",
+    "decide('home')": "hapteq sessions",
+    "app.start_screen": "hapteq sessions",
+    "browse": "hapteq show PATH",
+    "stop": "hapteq watch SESSION --stop",
+    "let_go": "hapteq watch SESSION --stop",
+    "pause": "hapteq watch SESSION --pause",
+    "reply('pause')": "hapteq watch SESSION --pause",
+    "note(False)": "hapteq note SESSION TEXT",
+    "note(True)": "hapteq note --adverse SESSION TEXT",
+    "quit": "Ctrl-C in line mode",
+}
+"""What a terminal takes instead of an action."""
+
+TITLES = {
+    "let_go": "Take the force off and leave",
+    "note(False)": "Take a note",
+    "note(True)": "Note an adverse event",
+    "suspend_process": "Suspend",
+    "command_palette": "",
+}
+"""Of actions whose bindings are too short to say it; an empty one is no command."""
+
+
+def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
+    """What can be done on this screen now."""
+    told = set()
+    for active in screen.active_bindings.values():
+        binding = active.binding
+        action = binding.action.removeprefix("app.").removeprefix("screen.")
+        title = TITLES.get(action, binding.tooltip or binding.description)
+        if not title or not active.enabled or action in told:
+            continue
+        told.add(action)
+        key = app.get_key_display(binding)
+        twin = TWINS.get(action)
+        run = partial(app.run_action, binding.action, active.node)
+        yield SystemCommand(title, f"Key: {key}.{f' In a terminal: {twin}' if twin else ''}", run)

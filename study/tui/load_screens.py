@@ -1,0 +1,22 @@
+"""Screens that are needed later, loaded in a thread once the first one is drawn, so that none is late."""
+
+import threading
+from importlib import import_module
+
+NEEDED_LATER = (
+    "study.tui.asked_screens",
+    "study.tui.screens.trial",
+    "study.tui.screens.help",
+    "study.tui.screens.session",
+    "study.tui.app_commands",
+)
+
+
+def load_screens() -> None:
+    """Returns at once."""
+    threading.Thread(target=_load, name="load-screens", daemon=True).start()
+
+
+def _load() -> None:
+    for name in NEEDED_LATER:
+        import_module(name)

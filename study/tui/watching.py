@@ -1,0 +1,60 @@
+"""The experimenter's view in the application itself. A process of its own feeds it, so that no session is held up."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from textual.app import App
+
+from study.session.requests import Request
+
+if TYPE_CHECKING:
+    from study.tui.link.watch_feed import WatchFeed
+    from study.tui.screens.watch import WatchScreen
+
+
+class Watching:
+    """One view at a time."""
+
+    def __init__(self, app: App[Any]) -> None:
+        self._app = app
+        self._feed: WatchFeed | None = None
+        self._screen: WatchScreen | None = None
+        self._starting = False
+
+    def open(self, path: str, ask: Callable[[Request], object]) -> None:
+        """Returns at once: the feed is started in a thread, because starting a process takes its time."""
+        if self._starting or (self._screen is not None and self._screen in self._app.screen_stack):
+            return
+        self._starting = True
+
+        def start() -> None:
+            from study.tui.link.watch_feed import WatchFeed
+
+            self._app.call_from_thread(self._show, WatchFeed(path), ask)
+
+        threading.Thread(target=start, name="watch-start", daemon=True).start()
+
+    def close(self) -> None:
+        """Leave the view; the session goes on."""
+        screen, self._screen = self._screen, None
+        while screen is not None and screen in self._app.screen_stack:
+            self._app.pop_screen()
+        self.end()
+
+    def end(self) -> None:
+        """End the process that reads. Waiting for it is no work for the one that draws."""
+        feed, self._feed = self._feed, None
+        if feed is not None:
+            threading.Thread(target=feed.close, name="watch-end", daemon=True).start()
+
+    def _show(self, feed: WatchFeed, ask: Callable[[Request], object]) -> None:
+        from study.tui.screens.watch import WatchScreen
+
+        self.end()
+        self._starting = False
+        self._feed = feed
+        self._screen = WatchScreen(feed, ask)
+        self._app.push_screen(self._screen)
