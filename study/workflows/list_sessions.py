@@ -4,6 +4,7 @@ from pathlib import Path
 
 from study.devices.opening import DEVICES
 from study.session.archive_views import HomeView, SessionLine
+from study.session.printable import printable, printable_text
 from study.store.archive import session_folders
 from study.workflows.list_protocols import protocol_lines
 from study.workflows.session_line import session_line
@@ -11,7 +12,7 @@ from study.workflows.session_line import session_line
 
 def home_view(data: Path) -> HomeView:
     """Everything on the start screen. A data folder that is not there is an empty one."""
-    return HomeView(str(data), session_lines(data), protocol_lines(data), DEVICES)
+    return HomeView(printable_text(str(data)), session_lines(data), printable(protocol_lines(data)), DEVICES)
 
 
 def session_lines(data: Path) -> tuple[SessionLine, ...]:
@@ -20,4 +21,5 @@ def session_lines(data: Path) -> tuple[SessionLine, ...]:
         folders = session_folders(data)
     except OSError:
         return ()
-    return tuple(sorted(map(session_line, folders), key=lambda line: (line.begun_utc, line.name), reverse=True))
+    lines = printable(tuple(map(session_line, folders)))
+    return tuple(sorted(lines, key=lambda line: (line.begun_utc, line.name), reverse=True))

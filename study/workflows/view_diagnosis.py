@@ -5,6 +5,7 @@ from pathlib import Path
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Mismatch, NamedEffect, Rival, Verdict
 from analysis.wording import NONE, listed
 from study.session.archive_views import DiagnosisView
+from study.session.printable import printable
 from study.store.diagnosis_file import read_diagnosis
 
 VERDICTS: dict[Verdict, str] = {
@@ -22,7 +23,7 @@ def diagnosis_view(path: Path) -> DiagnosisView:
     """Raises CannotReadError, UnusableFileError."""
     diagnosis = read_diagnosis(path)
     report = path.parent / "report.html"
-    return DiagnosisView(
+    view = DiagnosisView(
         path=str(path),
         verdict=VERDICTS[diagnosis.verdict],
         sentences=tuple(_effect(effect) for effect in diagnosis.effects),
@@ -34,6 +35,7 @@ def diagnosis_view(path: Path) -> DiagnosisView:
         report=str(report) if report.is_file() else "",
         notes=_notes(diagnosis),
     )
+    return printable(view)
 
 
 def _effect(effect: NamedEffect) -> str:

@@ -10,6 +10,7 @@ from protocols.trial import Phase
 from study.errors import StudyError
 from study.session.archive_views import SessionLine, SessionView, Staircase
 from study.session.event_words import log_in_words
+from study.session.printable import printable
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import readable_events
@@ -27,8 +28,8 @@ def session_view(path: Path) -> SessionView:
     try:
         folded = None if folder.withdrawn else fold_session(folder)
     except StudyError as problem:
-        return _damaged(folder, problem)
-    return _bare(folder, session_line(folder)) if folded is None else _whole(folder, folded)
+        return printable(_damaged(folder, problem))
+    return printable(_bare(folder, session_line(folder)) if folded is None else _whole(folder, folded))
 
 
 def _whole(folder: SessionFolder, folded: FoldedSession) -> SessionView:

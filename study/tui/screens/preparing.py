@@ -1,6 +1,7 @@
 """While the device is being prepared: what is going on, and for how long. No bar, because nobody knows the end."""
 
 import time
+from collections.abc import Callable
 
 from textual.app import ComposeResult
 from textual.containers import Vertical
@@ -29,10 +30,11 @@ class PreparingScreen(Screen[None]):
     PreparingScreen #elapsed { margin-top: 1; color: $foreground 65%; }
     """
 
-    def __init__(self, sentence: str) -> None:
+    def __init__(self, sentence: str, now_s: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
         self._sentence = sentence
-        self._began_s = time.monotonic()
+        self._now_s = now_s
+        self._began_s = now_s()
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
@@ -51,7 +53,7 @@ class PreparingScreen(Screen[None]):
             self.query_one("#sentence", Static).update(sentence)
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed(time.monotonic() - self._began_s))
+        self.query_one("#elapsed", Static).update(elapsed(self._now_s() - self._began_s))
 
 
 def elapsed(seconds: float) -> str:

@@ -15,6 +15,10 @@ COLUMNS = (("Standing", 12), ("Begun (UTC)", 16), ("Runs", 5), ("Answers", 7), (
 """With their widths in cells, so that nothing has to be measured in a long list. The session's name comes first."""
 _NAME = "Session"
 
+AT_ONCE = 60
+"""Rows: more than any terminal shows."""
+_BREATH_S = 0.01
+
 
 class SessionTable(DataTable[Content | str]):
     """Rows are made when they are there to be seen: the table itself draws only those."""
@@ -44,11 +48,21 @@ class SessionTable(DataTable[Content | str]):
         longest = max((len(line.name) for line in lines), default=0)
         for title, width in ((_NAME, max(len(_NAME), longest)), *COLUMNS):
             self.add_column(title, width=width)
-        self.add_rows(_row(line) for line in lines)
-        names = [line.name for line in lines]
-        if chosen is not None and chosen.name in names:
-            self.move_cursor(row=names.index(chosen.name))
+        self._add_more(lines, chosen.name if chosen is not None else "")
         self._tell()
+
+    def _add_more(self, lines: tuple[SessionLine, ...], chosen: str) -> None:
+        """A long list comes in parts, so that keys are heard in between."""
+        if lines is not self._lines:
+            return  # a newer list came meanwhile
+        have = self.row_count
+        part = lines[have : have + AT_ONCE]
+        self.add_rows(_row(line) for line in part)
+        for place, line in enumerate(part, start=have):
+            if line.name == chosen:
+                self.move_cursor(row=place)
+        if self.row_count < len(lines):
+            self.set_timer(_BREATH_S, lambda: self._add_more(lines, chosen))
 
     @property
     def _chosen(self) -> SessionLine | None:

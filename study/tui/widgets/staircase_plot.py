@@ -1,5 +1,7 @@
 """One staircase: its title, its picture in whatever room there is, and the run in a sentence."""
 
+import itertools
+
 from textual.content import Content
 from textual.widget import Widget
 
@@ -32,6 +34,9 @@ class StaircasePlot(Widget):
 
 
 def _styled(line: str) -> Content:
+    """Marks of one kind beside each other are one piece: fewer pieces are drawn faster."""
     parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED)]
-    parts += [(c, _STYLES[c]) if c in _STYLES else c for c in line[LABEL_COLUMNS:]]
+    for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):
+        text = "".join(characters)
+        parts.append((text, style) if style else text)
     return Content.assemble(*parts)

@@ -1,5 +1,6 @@
 """What a data folder looks like from outside: a line per session, whatever lies there."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -55,7 +56,7 @@ def test_a_finished_session_is_told_without_folding_it_and_like_folding_it(data)
 def test_an_unfinished_session_says_how_far_it_is(unfinished):
     line = only(unfinished)
     assert line.standing == "unfinished"
-    assert 0 < line.answers
+    assert line.answers > 0
     assert line.runs_done < line.runs == 3
 
 
@@ -162,3 +163,12 @@ def test_a_locked_protocol_is_said_to_be_locked(data):
     assert locked == {"direction_threshold": True, "direction_training": False} | {
         name: False for name in locked if name.endswith(".toml")
     }
+
+
+def test_nothing_in_a_tombstone_reaches_the_terminal_as_a_command(data):
+    folder = data / "P07_001"
+    folder.mkdir()
+    left = {"format": "hapteq-tombstone", "version": 1, "withdrawn_utc": "\x1b[2J", "begun": {"protocol": "\x1b]0;x"}}
+    (folder / "withdrawn.json").write_text(json.dumps(left))
+    line = next(line for line in session_lines(data) if line.name == "P07_001")
+    assert (line.standing, line.begun_utc, line.protocol) == ("withdrawn", " [2J", " ]0;x")

@@ -29,7 +29,8 @@ FRICTION = NamedEffect(
 ERRORS = Errors(0.3, 0.28, 0.05, None)
 FOUND = Diagnosis(
     "partly_explained", (PLACE,), (FRICTION,), {"mass": 0.2}, (replace(PLACE, amplitude=None, state=None),),
-    Fit(ERRORS, ERRORS), "free simulation", NextExperiment("hapteq record slow --out N.h5", ("coulomb_friction",), "Slow."),
+    Fit(ERRORS, ERRORS), "free simulation",
+    NextExperiment("hapteq record slow --out N.h5", ("coulomb_friction",), "Slow."),
 )  # fmt: skip
 
 

@@ -1,8 +1,10 @@
 """A bare application around one screen, which writes down what the screen asks for; and views to show."""
 
 import asyncio
+import os
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from textual.app import App
@@ -135,7 +137,7 @@ def home(lines) -> HomeView:
 def staircase() -> Staircase:
     levels = (1.0, 1.0, 1.0, 0.631, 0.631, 1.0, 1.0, 1.0, 0.631, 0.631, 0.631, 0.398, 0.447, 0.447, 0.447, 0.398)
     correct = (True, True, True, True, False, True, True, True, True, True, True, False, True, True, True, False)
-    turns = (False, False, False, False, True, False, False, True, False, False, False, True, False, False, True, True)
+    turns = (False, False, False, False, True, False, False, True, False, False, False, True, False, False, True, False)
     return Staircase("Run 2: 25 Hz, test", levels, correct, turns, 0.52, 3.0)
 
 
@@ -177,3 +179,18 @@ def diagnosis() -> DiagnosisView:
         report="/data/out/report.html",
         notes=("Errors are normalised root-mean-square over the channels, measured by free simulation.",),
     )  # fmt: skip
+
+
+@pytest.fixture
+def looks_like():
+    """Compares what is on the screen with a text file beside this one; UPDATE_SCREENS=1 writes it anew."""
+
+    def compare(sight: Sight, name: str) -> None:
+        path = Path(__file__).parent / "looks" / f"{name}.txt"
+        text = "\n".join(sight.lines) + "\n"
+        if os.environ.get("UPDATE_SCREENS"):
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+        assert text == path.read_text()
+
+    return compare
