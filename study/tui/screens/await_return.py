@@ -20,7 +20,7 @@ class AwaitReturnScreen(Screen[None]):
 - **Ctrl+C** leaves; the session can be resumed.
 """
     DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on")]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]
 
     def __init__(self, reason: str) -> None:
         super().__init__()

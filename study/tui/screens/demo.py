@@ -39,7 +39,7 @@ class DemoScreen(Screen[DemoChoice]):
         Binding("left,b", "turn(-1)", "Slower", key_display="←"),
         Binding("right,n", "turn(1)", "Faster", key_display="→"),
         Binding("p", "pause", "Pause"),
-        Binding("enter", "done", "Done"),
+        Binding("enter", "done", "Done", key_display="Enter"),
     ]
 
     class PauseWanted(Message):

@@ -28,7 +28,7 @@ class ErrorPanel(ModalScreen[str]):
     ErrorPanel { align: center middle; }
     ErrorPanel Card { border: heavy $error; }
     ErrorPanel #actions { height: auto; margin-top: 1; }
-    ErrorPanel Button { margin-right: 2; }
+    ErrorPanel Button { margin-right: 2; min-width: 0; padding: 0 2; background: $panel; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("left", "app.focus_previous", "Previous", show=False),

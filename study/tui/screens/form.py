@@ -17,6 +17,15 @@ from study.tui.widgets.said import Said
 LONGEST_QUOTE = 48
 
 
+class Questions(Sheet, can_focus=False, inherit_bindings=False):
+    """Up and down go from question to question, not line by line."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("pageup", "page_up", "Page up", show=False),
+        Binding("pagedown", "page_down", "Page down", show=False),
+    ]
+
+
 class FormScreen(Screen[FormReply]):
     HELP = """\
 # A form
@@ -48,7 +57,7 @@ class FormScreen(Screen[FormReply]):
     def compose(self) -> ComposeResult:
         form = self._form
         yield Said(id="top")
-        with Sheet(can_focus=False):
+        with Questions():
             yield Said(form.introduction, id="introduction")
             for number, field in enumerate(form.fields, start=1):
                 yield FormQuestion(number, field)
@@ -66,7 +75,7 @@ class FormScreen(Screen[FormReply]):
         """How much is answered, always in sight."""
         open_ones = len(missing(self._form, self._reply()))
         fields = len(self._form.fields)
-        told = "everything is answered" if not open_ones else f"{fields - open_ones} of {fields} answered"
+        told = f"{open_ones} of {fields} still open" if open_ones else "everything is answered"
         self.query_one("#top", Said).update(f"{self._form.title}: {told}")
         self.query_one("#said", Said).update("" if open_ones else "Go down to Continue and press Enter.")
 

@@ -21,7 +21,7 @@ class GoodbyeScreen(Screen[None]):
 - **Enter** closes this page.
 """
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "close_page", "Close")]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "close_page", "Close", key_display="Enter")]
 
     def __init__(self, notice: Goodbye) -> None:
         super().__init__()

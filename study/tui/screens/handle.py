@@ -50,7 +50,7 @@ class HandleScreen(Screen[Unanswered | None]):
 
     def update_view(self, view: HandleView) -> None:
         self._view = view
-        if self.is_mounted:
+        if self.query(HandleTarget):  # not yet, where it comes before the first frame
             self.query_one(HandleTarget).view = view
             self.query_one("#sentence", Said).update(view.sentence)
 

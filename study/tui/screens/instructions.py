@@ -30,7 +30,7 @@ class InstructionsScreen(Screen[None]):
     InstructionsScreen #pictures { height: 1fr; min-height: 8; max-height: 18; }
     InstructionsScreen .practice { border-left: thick $warning; padding-left: 1; margin-top: 1; }
     """
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "begin", "Begin")]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "begin", "Begin", key_display="Enter")]
 
     def __init__(self, welcome: Welcome, keys: AnswerKeys = DIGITS) -> None:
         super().__init__()
@@ -43,16 +43,15 @@ class InstructionsScreen(Screen[None]):
             yield Said(welcome.title, classes="title")
             if welcome.resumed_after:
                 yield Said(_welcome_back(welcome.resumed_after))
-            yield Said("Hold the handle with a constant, comfortable grip. In each trial it shakes along one of these:")
+            yield Said("Hold the handle with a constant, comfortable grip. It shakes along 1 or 2:")
             with Horizontal(id="pictures"):
                 yield DirectionPanel(1, welcome.picture)
                 yield DirectionPanel(2, welcome.picture)
             yield Said(_how(self._keys))
             yield Said(plan(welcome))
             yield Said(
-                "To stop at any time, let go of the handle: that is always allowed. p takes the force off and pauses; "
-                "Ctrl+C takes it off and leaves.",
-                classes="gap",
+                "You may stop at any time: let go of the handle, or press p for a pause, which takes the force off at "
+                "once. Ctrl+C takes it off and leaves."
             )
             if not welcome.felt:
                 yield Said(

@@ -39,13 +39,15 @@ class PauseScreen(Screen[AfterPause]):
 """
     DEFAULT_CSS = """
     PauseScreen { align: center middle; }
-    PauseScreen OptionList { height: auto; border: none; padding: 0; margin-top: 1; background: $surface; }
+    PauseScreen OptionList, PauseScreen OptionList:focus {
+        height: auto; border: none; padding: 0; margin-top: 1; background: transparent;
+    }
     PauseScreen #said { height: 1; margin-top: 1; text-style: bold; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("n", "note(False)", "Note"),
         Binding("e", "note(True)", "Something happened"),
-        Binding("enter", "choose", "Choose", key_display="Enter"),
+        Binding("enter", "choose", "Choose", key_display="Enter", priority=True),
     ]
 
     @dataclass
@@ -61,7 +63,7 @@ class PauseScreen(Screen[AfterPause]):
         answers = self._notice.answers
         with Card("Pause"):
             yield Said("Nothing is played. You may let go of the handle.", classes="strong")
-            yield Said(f"Why: {self._notice.reason}.", classes="gap")
+            yield Said(f"Reason: {self._notice.reason}.", classes="gap")
             yield Said(f"{'1 answer is' if answers == 1 else f'{answers} answers are'} on the disk.")
             yield OptionList(*(Option(words, id=choice.value) for choice, words in CHOICES.items()), markup=False)
             yield Said(id="said")

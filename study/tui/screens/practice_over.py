@@ -24,7 +24,7 @@ class PracticeOverScreen(Screen[None]):
 - **Enter** goes on.
 """
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on")]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]
 
     def __init__(self, result: PracticeResult) -> None:
         super().__init__()

@@ -32,10 +32,10 @@ class RestScreen(Screen[float]):
 """
     DEFAULT_CSS = """
     RestScreen { align: center middle; }
-    RestScreen Digits { width: 100%; text-align: center; margin-top: 1; }
+    RestScreen Digits { width: 100%; text-align: center; text-style: bold; margin-top: 1; }
     RestScreen Card Said { text-align: center; width: 100%; }
     """
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on")]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]
 
     def __init__(self, notice: RestNotice) -> None:
         super().__init__()

@@ -11,7 +11,7 @@ from textual.events import Key, Paste
 from textual.message import Message
 from textual.screen import Screen
 from textual.timer import Timer
-from textual.widgets import Footer, Static
+from textual.widgets import Footer
 
 from study.session.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.answer_keys import DIGITS, AnswerKeys
@@ -19,6 +19,7 @@ from study.tui.key_presses import KeyPresses, arrival_s
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
 from study.tui.trial_words import heading
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
+from study.tui.widgets.said import Said
 from study.tui.widgets.session_bar import SessionBar
 
 ASKED = {
@@ -43,12 +44,14 @@ class TrialScreen(Screen[None]):
     """One for a sitting: armed for each question, and dead in between."""
 
     HELP = """\
-- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes.
+# A trial
+
+- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes (or the interval in which it shook).
 - If you cannot tell, guess. Many trials are meant to be hard, and no answer can do harm.
-- p pauses: the handle stops at once, and this trial is drawn again later.
-- r skips this trial and plays a new one, for instance when you were disturbed.
-- q pauses too, and offers to leave. What you have answered is kept.
-- Ctrl-C takes the force off at once and leaves.
+- **p** pauses: the handle stops at once, and this trial is drawn again later.
+- **r** skips this trial and plays a new one, for instance when you were disturbed.
+- **q** pauses too, and offers to leave. What you have answered is kept.
+- **Ctrl+C** takes the force off at once and leaves.
 """
     DEFAULT_CSS = """
     TrialScreen { layout: vertical; }
@@ -86,13 +89,13 @@ class TrialScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         yield SessionBar()
-        yield Static(id="asked", markup=False)
+        yield Said(id="asked")
         with Horizontal(id="answers"):
             yield DirectionPanel(1)
             yield DirectionPanel(2)
-        yield Static(id="said", markup=False)
-        yield Static(id="trouble", markup=False)
-        yield Footer()
+        yield Said(id="said")
+        yield Said(id="trouble")
+        yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
         self._show()
@@ -132,8 +135,8 @@ class TrialScreen(Screen[None]):
         """Stays until the next trial is over: between two trials nobody could read it."""
         self._trouble = sentence
         self._trouble_is_old = False
-        if self.is_mounted:
-            self.query_one("#trouble", Static).update(sentence)
+        if self._composed:
+            self.query_one("#trouble", Said).update(sentence)
 
     def on_key(self, event: Key) -> None:
         at_s = arrival_s(event)
@@ -199,20 +202,25 @@ class TrialScreen(Screen[None]):
 
     def _show(self) -> None:
         """Everything anew, so that no trial leaves a trace in the next."""
-        if not self.is_mounted:
+        if not self._composed:
             return
-        self.query_one("#trouble", Static).update(self._trouble)
+        self.query_one("#trouble", Said).update(self._trouble)
         question = self._question
         if question is None:
             self._say(WAIT)
             return
         bar = self.query_one(SessionBar)
         bar.heading, bar.progress = heading(question), question.progress
-        self.query_one("#asked", Static).update(ASKED[question.task])
+        self.query_one("#asked", Said).update(ASKED[question.task])
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
         self._say(f"{self._press()} If you cannot tell, guess.")
+
+    @property
+    def _composed(self) -> bool:
+        """It may be armed before its first frame."""
+        return bool(self.query("#said"))
 
     def _mark(self, mark: Mark) -> None:
         for panel in self.query(DirectionPanel):
@@ -222,5 +230,5 @@ class TrialScreen(Screen[None]):
         return f"Press {self._keys.choice}."
 
     def _say(self, sentence: str) -> None:
-        if self.is_mounted:
-            self.query_one("#said", Static).update(sentence)
+        if self._composed:
+            self.query_one("#said", Said).update(sentence)

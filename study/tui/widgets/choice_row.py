@@ -24,8 +24,8 @@ class ChoiceRow(Widget, can_focus=True):
     """
     COMPONENT_CLASSES = {"choice-row--cursor", "choice-row--chosen"}  # noqa: RUF012  Textual's own type
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("left", "move(-1)", "Choose", key_display="←→", show=False),
-        Binding("right", "move(1)", "Choose", show=False),
+        Binding("left", "move(-1)", "Move", key_display="← →"),
+        Binding("right", "move(1)", "Move", show=False),
         Binding("space", "choose", "Choose", key_display="Space"),
         Binding("enter", "choose_and_leave", "Choose, next", key_display="Enter"),
     ]

@@ -26,7 +26,7 @@ class DirectionPanel(Widget):
     DEFAULT_CSS = """
     DirectionPanel {
         width: 1fr; height: 1fr; min-height: 7; border: round $foreground 40%; border-subtitle-align: center;
-        border-subtitle-style: bold;
+        border-subtitle-style: bold; border-subtitle-color: $foreground;
     }
     DirectionPanel.-taken, DirectionPanel.-saved, DirectionPanel.-now { border: heavy $foreground; }
     DirectionPanel > .direction-panel--one { color: #56B4E9; text-style: bold; }

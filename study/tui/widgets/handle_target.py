@@ -38,7 +38,8 @@ def _drawn(view: HandleView, columns: int, rows: int) -> list[str]:
     x, y = canvas.middle
     edge = min(x, y)
     dots_per_mm = 0.4 * edge / max(view.radius_mm, 1e-9)
-    canvas.circle((x, y), dots_per_mm * view.radius_mm)
+    for radius in (dots_per_mm * view.radius_mm, dots_per_mm * view.radius_mm + 1):
+        canvas.circle((x, y), radius)
     canvas.line((x - 3, y), (x + 3, y))
     canvas.line((x, y - 3), (x, y + 3))
     right, up = view.offset_mm
