@@ -19,7 +19,7 @@ from study.workflows.fold_session import FoldedSession, fold_session
 from study.workflows.session_facts import session_facts
 from study.workflows.session_line import line_of, session_line, with_writer
 
-THRESHOLD_HEADER = ("run", "phase", "frequency", "threshold", "delivered", "reversals", "trials", "right", "remark")
+THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "turns", "trials", "right", "remark")
 
 
 def session_view(path: Path) -> SessionView:
@@ -82,7 +82,7 @@ def _threshold_rows(state: SessionState, analysis: StudyAnalysis | None) -> tupl
 
 
 def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
-    remark = "lower bound: the cap was reached" if row.censored else ""
+    remark = "lower bound" if row.censored else ""
     if not row.complete:
         remark = "not complete"
     threshold = f"{'≥ ' if row.censored else ''}{number(row.threshold_n, 3)} N" if row.complete else NONE

@@ -21,10 +21,14 @@ LOOKING = "Looking for sessions…"
 EMPTY = """\
 No sessions here yet. To begin with:
 
-  1  Try it as a participant would: type the code P00 and press F5. With the simulated device nothing moves.
-  2  See a whole study: [b]hapteq rehearse[/b] in a terminal lets ten simulated participants take it, with a report.
-  3  Read the protocol: [b]hapteq protocol show direction_threshold[/b] gives each value, and the reason for it.
-  4  Before the first real participant: [b]hapteq protocol lock direction_threshold[/b] keeps it as it is.
+1  Try it as a participant would: type the code P00 and press F5.
+   With the simulated device nothing moves.
+2  See a whole study: [b]hapteq rehearse[/b] in a terminal lets ten
+   simulated participants take it, with a report.
+3  Read the protocol, each value with its reason:
+   [b]hapteq protocol show direction_threshold[/b]
+4  Keep it as it is, before the first real participant:
+   [b]hapteq protocol lock direction_threshold[/b]
 
 F1 explains this screen.\
 """

@@ -196,7 +196,7 @@ def _thresholds(view: SessionView) -> ComposeResult:
     yield Static(
         Content.styled(
             "Thresholds: mean of the last peaks and valleys. Delivered: what the handle did along the direction there. "
-            "≥ marks a lower bound.",
+            "Turns: reversals. ≥ marks a lower bound, because the cap was reached.",
             "$foreground 65%",
         ),
         classes="part",
