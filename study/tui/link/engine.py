@@ -5,9 +5,11 @@ session was interrupted, and this process ends.
 """
 
 import faulthandler
+import os
 import signal
 import sys
 import threading
+import time
 import traceback
 from importlib import import_module
 from multiprocessing.connection import Connection
@@ -24,6 +26,9 @@ if TYPE_CHECKING:
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.trial_recordings")
 """Loaded while somebody still types a code, so that beginning is quick."""
 
+LAST_RESORT_S = 5.0
+"""The device was stopped long before."""
+
 INTERRUPTED = StudyError(
     "Interrupted", "No force is on.", "Begin again, or leave.", "Every answer that was given is on disk."
 )
@@ -32,7 +37,7 @@ INTERRUPTED = StudyError(
 class Engine:
     def __init__(self, connection: Connection) -> None:
         self._busy = False
-        self._link = ScreenLink(connection, self._interrupt)
+        self._link = ScreenLink(connection, self._interrupt, _end_by_force)
         self._desk: Desk | None = None
         for name in ("SIGINT", "SIGTERM"):
             signal.signal(getattr(signal, name), self._on_signal)
@@ -105,6 +110,12 @@ class Engine:
             # Once: what cleans up after it must not be interrupted.
             self._busy = False
             raise KeyboardInterrupt
+
+
+def _end_by_force() -> None:
+    """Of a process that has lost its screen and does not end: it hangs in a driver, or on a disk."""
+    time.sleep(LAST_RESORT_S)
+    os._exit(1)
 
 
 def _bug(bug: Exception) -> StudyError:

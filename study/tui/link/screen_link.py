@@ -1,6 +1,5 @@
 """The engine's end of the pipe: a thread that hears the screen while the engine is busy with a session."""
 
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -10,14 +9,12 @@ from queue import Empty, SimpleQueue
 from study.tui.link.messages import Command, FromEngine, Heartbeat, LetGo, Relay, Reply, ToEngine
 from study.workflows.requests_port import QueuedRequests
 
-LAST_RESORT_S = 5.0
-"""So long after the screen is gone the process ends by force. The device was stopped long before."""
-
 
 class ScreenLink:
-    """interrupt: raises KeyboardInterrupt in the main thread, if that is busy. Called from the reading thread."""
+    """interrupt: raises KeyboardInterrupt in the main thread, if that is busy. gone: comes last, when the screen is
+    gone. Both are called from the reading thread."""
 
-    def __init__(self, connection: Connection, interrupt: Callable[[], None]) -> None:
+    def __init__(self, connection: Connection, interrupt: Callable[[], None], gone: Callable[[], None]) -> None:
         self.commands: SimpleQueue[Command | None] = SimpleQueue()
         """None: the screen is gone."""
         self.requests = QueuedRequests()
@@ -26,6 +23,7 @@ class ScreenLink:
         self.ended = False
         self._connection = connection
         self._interrupt = interrupt
+        self._gone = gone
         self._replies: SimpleQueue[Reply] = SimpleQueue()
         self._sending = threading.Lock()
         self._heard_s = time.monotonic()
@@ -63,8 +61,7 @@ class ScreenLink:
             self.ended = True
         self._let_go()
         self.commands.put(None)
-        time.sleep(LAST_RESORT_S)
-        os._exit(1)
+        self._gone()
 
     def _take(self, message: ToEngine) -> None:
         # Whatever comes was sent by a living screen; only heartbeats come all the time.

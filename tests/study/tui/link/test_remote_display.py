@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from multiprocessing import Pipe
 
 import pytest
@@ -35,7 +36,7 @@ class OtherEnd:
 
     def __init__(self) -> None:
         self.pipe, theirs = Pipe()
-        self.link = ScreenLink(theirs, lambda: None)
+        self.link = ScreenLink(theirs, interrupt=lambda: None, gone=lambda: None)
         self.link.start()
         self.display = RemoteDisplay(self.link, RealClock())
         self._alive = True
@@ -65,9 +66,7 @@ class OtherEnd:
 
 
 @pytest.fixture
-def screen(monkeypatch) -> Iterator[OtherEnd]:
-    # The link ends its process a while after its screen is gone; here that process is the test's.
-    monkeypatch.setattr("study.tui.link.screen_link.os._exit", lambda code: None)
+def screen() -> Iterator[OtherEnd]:
     made = OtherEnd()
     yield made
     made.fall_silent()
@@ -171,4 +170,4 @@ def test_a_wait_gives_signs_of_life_twenty_times_a_second(screen):
         return len(signs) < 15
 
     screen.display.ask(QUESTION, sign)
-    assert max(later - earlier for earlier, later in zip(signs, signs[1:], strict=False)) < 0.1
+    assert max(later - earlier for earlier, later in pairwise(signs)) < 0.1
