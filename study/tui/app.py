@@ -85,6 +85,10 @@ class HapteqApp(App[None]):
         self._engine.start()
         load_screens()
 
+    @property
+    def engine_pid(self) -> int | None:
+        return self._engine.pid
+
     def close_engine(self) -> None:
         """After `run`: wait until the device has let go and the log is closed."""
         self._watching.end()

@@ -33,7 +33,12 @@ class Watching:
         def start() -> None:
             from study.tui.link.watch_feed import WatchFeed
 
-            self._app.call_from_thread(self._show, WatchFeed(path), ask)
+            try:
+                feed = WatchFeed(path)
+            except OSError as problem:
+                self._app.call_from_thread(self._refused, problem)
+            else:
+                self._app.call_from_thread(self._show, feed, ask)
 
         threading.Thread(target=start, name="watch-start", daemon=True).start()
 
@@ -49,6 +54,10 @@ class Watching:
         feed, self._feed = self._feed, None
         if feed is not None:
             threading.Thread(target=feed.close, name="watch-end", daemon=True).start()
+
+    def _refused(self, problem: OSError) -> None:
+        self._starting = False
+        self._app.notify(f"The view cannot be opened: {problem.strerror or problem}.", severity="error", markup=False)
 
     def _show(self, feed: WatchFeed, ask: Callable[[Request], object]) -> None:
         from study.tui.screens.watch import WatchScreen

@@ -8,7 +8,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Callable
@@ -17,6 +16,7 @@ from queue import SimpleQueue
 from typing import IO
 
 from study.errors import ExitCode
+from study.tui.link.child_process import start_child
 from study.tui.link.messages import ErrorText, Failed, FromEngine, Heartbeat, Opened, ToEngine
 
 CLOSING_S = 6.0
@@ -65,7 +65,7 @@ class EngineClient:
     def _live(self) -> None:
         with tempfile.TemporaryFile() as said:
             try:
-                connection, process = _started(said)
+                connection, process = start_child("study.tui.link.engine", "run", said=said)
             except OSError as problem:
                 self.dead = True
                 self._deliver(_not_started(problem))
@@ -97,27 +97,6 @@ class EngineClient:
         # The engine sees the end of the pipe, and this side the end of the engine.
         with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
             end.shutdown(socket.SHUT_WR)
-
-
-def _started(said: IO[bytes]) -> tuple[Connection, "subprocess.Popen[bytes]"]:
-    """A process of its own session: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it has nothing to write on.
-
-    It finds modules where this process finds them, however this one was started.
-    """
-    ours, theirs = socket.socketpair()
-    with theirs:
-        program = (
-            f"import sys; sys.path[:] = {sys.path!r}; from study.tui.link.engine import run; run({theirs.fileno()})"
-        )
-        process = subprocess.Popen(
-            [sys.executable, "-c", program],
-            stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=said,
-            pass_fds=(theirs.fileno(),),
-            start_new_session=True,
-        )
-    return Connection(ours.detach()), process
 
 
 def _not_started(problem: OSError) -> Failed:

@@ -1,14 +1,12 @@
 """Views of a running session for a screen: a child process reads and folds the log, so that the screen never waits."""
 
 import contextlib
-import os
-import signal
-import sys
+import subprocess
 import threading
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 
 from study.session.watch_view import WatchView
+from study.tui.link.child_process import start_child
 
 LOOK_EVERY_S = 0.2
 CLOSING_S = 2.0
@@ -18,15 +16,10 @@ class WatchFeed:
     """Is a `study.tui.screens.watch.WatchSource`. The child ends with `close`, and when this process dies."""
 
     def __init__(self, session_path: str) -> None:
-        # Spawned, not forked: a screen has threads and a terminal that the child must not share.
-        context = get_context("spawn")
-        self._connection, childs_end = context.Pipe()
-        self._child = context.Process(target=_feed, args=(session_path, childs_end), daemon=True, name="hapteq-watch")
+        self._connection, self._child = start_child("study.tui.link.watch_feed", "feed", session_path)
         self._latest: WatchView | None = None
         self._problem = ""
         self._closing = False
-        self._child.start()
-        childs_end.close()
         self._reader = threading.Thread(target=self._read, daemon=True, name="watch-feed")
         self._reader.start()
 
@@ -38,7 +31,7 @@ class WatchFeed:
         return self._problem
 
     @property
-    def child_pid(self) -> int | None:
+    def child_pid(self) -> int:
         return self._child.pid
 
     def close(self) -> None:
@@ -47,10 +40,11 @@ class WatchFeed:
         self._closing = True
         with contextlib.suppress(OSError):
             self._connection.send(None)
-        self._child.join(CLOSING_S)
-        if self._child.is_alive():
+        try:
+            self._child.wait(CLOSING_S)
+        except subprocess.TimeoutExpired:
             self._child.kill()
-            self._child.join()
+            self._child.wait()
         self._reader.join(CLOSING_S)
         self._connection.close()
 
@@ -69,7 +63,7 @@ class WatchFeed:
                 self._problem = received
 
 
-def _feed(session_path: str, connection: Connection) -> None:
+def feed(descriptor: int, session_path: str) -> None:
     """The child. Imports here, because the screen's process must load none of this."""
     from pathlib import Path
 
@@ -77,9 +71,7 @@ def _feed(session_path: str, connection: Connection) -> None:
     from study.errors import StudyError
     from study.workflows.watch_session import follow
 
-    # Ctrl-C is for the screen, and a traceback in the middle of it helps nobody.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _silence()
+    connection = Connection(descriptor)
     clock, follower = RealClock(), follow(Path(session_path))
     # Whatever can be read here means the end: a word to close, or a parent that is gone.
     while not connection.poll(LOOK_EVERY_S):
@@ -98,11 +90,3 @@ def _send(connection: Connection, what: WatchView | str) -> bool:
     except OSError:
         return False
     return True
-
-
-def _silence() -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError, AttributeError):
-            os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)

@@ -1,0 +1,35 @@
+"""A process beside the one that draws, and a pipe to it.
+
+Not `multiprocessing`: that hands the terminal on, and cannot start anything while Textual holds stdout and stderr.
+"""
+
+import socket
+import subprocess
+import sys
+from multiprocessing.connection import Connection
+from typing import IO
+
+
+def start_child(
+    module: str, function: str, *arguments: str, said: IO[bytes] | int = subprocess.DEVNULL
+) -> tuple[Connection, "subprocess.Popen[bytes]"]:
+    """Runs `function(descriptor of its end of the pipe, *arguments)`, named because what works is not loaded here.
+    What it prints goes to `said`.
+
+    It has a session of its own: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write on the screen.
+    It finds modules where this process finds them, however this one was started. It sees the end of the pipe when
+    this process ends, in whatever way. Raises OSError where the system refuses.
+    """
+    ours, theirs = socket.socketpair()
+    with theirs:
+        call = f"{function}({', '.join(map(repr, (theirs.fileno(), *arguments)))})"
+        program = f"import sys; sys.path[:] = {sys.path!r}; from {module} import {function}; {call}"
+        process = subprocess.Popen(
+            [sys.executable, "-c", program],
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=said,
+            pass_fds=(theirs.fileno(),),
+            start_new_session=True,
+        )
+    return Connection(ours.detach()), process
