@@ -45,7 +45,7 @@ OPENING = "Preparing the device: some ten seconds the first time."
 
 class HapteqApp(App[None]):
     TITLE = "hapteq"
-    CSS_PATH = "study.tcss"
+    CSS = "Toast { max-width: 76; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f1,question_mark", "help", "Help", key_display="F1"),
         Binding("f2", "watch", "Watch", show=False),
