@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
-import signal
-import threading
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -21,6 +18,7 @@ from study.session.views import Reply as TrialReply
 from study.tui import home_messages, outcomes
 from study.tui.app_start import AppStart
 from study.tui.archive_screens import ArchiveScreens, ArchiveWanted, command_for
+from study.tui.departure import leave_with_the_terminal
 from study.tui.engine_line import EngineLine, EngineSaid
 from study.tui.everywhere import EVERYWHERE
 from study.tui.link.messages import (
@@ -74,7 +72,7 @@ class HapteqApp(App[None]):
         register_themes(self)
 
     async def on_mount(self) -> None:
-        self._hear_signals()
+        leave_with_the_terminal(self, lambda: self._leave(ExitCode.INTERRUPTED))
         if self._start.first is not None:
             await self._sit(self._start.first)
         else:
@@ -93,12 +91,8 @@ class HapteqApp(App[None]):
         """After `run`: wait until the device has let go and the log is closed."""
         self._watching.end()
         self._engine.close()
-
-    def _hear_signals(self) -> None:
-        """A polite kill or a closed terminal leaves as Ctrl-C does, with the screen given back."""
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGTERM, signal.SIGHUP):
-                asyncio.get_running_loop().add_signal_handler(number, self._leave, ExitCode.INTERRUPTED)
+        if self._sitting is not None:
+            self.outcome = self._engine.last_end
 
     async def _sit(self, first: Begin | Resume) -> None:
         self._direct = self._direct and first is self._start.first

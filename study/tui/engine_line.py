@@ -8,7 +8,7 @@ from textual.app import App
 from textual.message import Message
 
 from study.tui.link.client import EngineClient
-from study.tui.link.messages import FromEngine, Heartbeat, ToEngine
+from study.tui.link.messages import Begin, Failed, Finished, FromEngine, Heartbeat, Resume, ToEngine
 
 HEARTBEAT_S = 0.1
 
@@ -23,6 +23,8 @@ class EngineLine:
     def __init__(self, app: App[Any]) -> None:
         self._app = app
         self._engine = EngineClient(self._deliver)
+        self.last_end: Finished | Failed | None = None
+        """Also one that comes when the application is leaving already."""
 
     @property
     def pid(self) -> int | None:
@@ -39,6 +41,8 @@ class EngineLine:
         if self._engine.dead:
             self._engine = EngineClient(self._deliver)
             self._engine.start()
+        if isinstance(message, Begin | Resume):
+            self.last_end = None
         self._engine.send(message)
 
     def close(self) -> None:
@@ -50,4 +54,6 @@ class EngineLine:
             self._engine.send(Heartbeat())
 
     def _deliver(self, message: FromEngine) -> None:
+        if isinstance(message, Finished | Failed):
+            self.last_end = message
         self._app.post_message(EngineSaid(message))

@@ -7,6 +7,7 @@ NEEDED_LATER = (
     "study.tui.asked_screens",
     "study.tui.screens.trial",
     "study.tui.screens.help",
+    "textual.widgets._markdown",
     "study.tui.screens.session",
     "study.tui.app_commands",
 )

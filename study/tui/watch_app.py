@@ -9,6 +9,7 @@ from textual.app import App
 from textual.binding import Binding, BindingType
 
 from study.session.requests import Request
+from study.tui.departure import leave_with_the_terminal
 from study.tui.screens.watch import WatchScreen, WatchSource
 from study.tui.themes import DARK, NEXT, register_themes
 
@@ -26,6 +27,7 @@ class WatchApp(App[None]):
         register_themes(self, theme)
 
     def on_mount(self) -> None:
+        leave_with_the_terminal(self, self.exit)
         self.push_screen(WatchScreen(self._source, self._ask))
 
     def on_watch_screen_left(self) -> None:

@@ -6,7 +6,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
-from textual.widgets import Footer, Markdown
+from textual.widgets import Footer
 
 
 class HelpScreen(ModalScreen[None]):
@@ -24,6 +24,8 @@ class HelpScreen(ModalScreen[None]):
         self._text = text
 
     def compose(self) -> ComposeResult:
+        from textual.widgets import Markdown  # takes its time, and the first frame needs none
+
         with VerticalScroll() as box:
             box.border_title = "Help"
             yield Markdown(self._text)
