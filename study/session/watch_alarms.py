@@ -98,9 +98,7 @@ def _device(now: Situation) -> Alarm | None:
 def _clipped(now: Situation) -> Alarm | None:
     if now.live is None or not now.fresh or not now.live.sensor_clipped:
         return None
-    return Alarm(
-        "sensor", "The acceleration sensor is clipped: it reads too little.", now.now_utc
-    )
+    return Alarm("sensor", "The acceleration sensor is clipped: it reads too little.", now.now_utc)
 
 
 def _handle(now: Situation) -> Alarm | None:

@@ -10,8 +10,9 @@ from textual.binding import Binding, BindingType
 
 from study.session.requests import Request
 from study.tui.departure import leave_with_the_terminal
-from study.tui.screens.watch import WatchScreen, WatchSource
+from study.tui.screens.watch import WatchScreen
 from study.tui.themes import DARK, NEXT, register_themes
+from study.tui.watch_source import WatchSource
 
 
 class WatchApp(App[None]):

@@ -13,7 +13,7 @@ CLOSING_S = 2.0
 
 
 class WatchFeed:
-    """Is a `study.tui.screens.watch.WatchSource`. The child ends with `close`, and when this process dies."""
+    """Is a `study.tui.watch_source.WatchSource`. The child ends with `close`, and when this process dies."""
 
     def __init__(self, session_path: str) -> None:
         self._connection, self._child = start_child("study.tui.link.watch_feed", "feed", session_path)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -21,6 +21,9 @@ from study.errors import StudyError
 from study.session.requests import NoteAsked, PauseAsked, Request, StopAsked
 from study.session.watch_view import ON, Alarm, WatchView
 from study.tui.screens.note_prompt import NotePrompt
+from study.tui.screens.watch_help import GUIDE, HELP
+from study.tui.screens.watch_style import STYLE
+from study.tui.watch_source import WatchSource
 from study.tui.watch_words import staircase_title
 from study.tui.widgets.alarm_book import AlarmBook
 from study.tui.widgets.level_history import LevelHistory
@@ -31,45 +34,6 @@ UNHEARD_AFTER_S = 2.0
 """A session looks for requests twenty times a second."""
 NO_NEWS_AFTER_S = 3.0
 SAID_FOR_S = 8.0
-
-GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
-
-HELP = """\
-# Watching a session
-
-You follow a running session. Nothing here changes it, apart from four keys:
-
-* **S** (shift and s) or **F8**: stop. The force is off at once; nothing is asked. The session can be resumed.
-* **p**: pause. Hands free at once; the participant goes on at the own screen.
-* **n**: a note for the log. **e**: an adverse event (pain, numbness, a fright).
-
-The other keys: **a** says that you have seen the alarms, **d** shows forms, practice and notes, **t** goes through
-light, dark and high contrast, **q** leaves the view; the session goes on.
-
-## What you see
-
-* **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ turns of the level, ? the next level.
-* **Last trials**: the newest on top. *shown* and *said* are the numbers 1 and 2; *s* is the time to answer; *m/s²* is \
-what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial, ! a remark \
-(shown in a wider window).
-* **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
-* **Catch**: trials at full force that anybody should get right; errors in them are lapses of attention.
-
-The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
-"""
-
-
-class WatchSource(Protocol):
-    """Where views come from; `study.tui.link.watch_feed.WatchFeed` is one."""
-
-    def latest(self) -> WatchView | None:
-        """At once, without any work: called ten times a second by the event loop."""
-        ...
-
-    @property
-    def problem(self) -> str:
-        """Why no views come any more, a sentence; empty while they come."""
-        ...
 
 
 class WatchMessage(Message):
@@ -83,30 +47,7 @@ class WatchMessage(Message):
 class WatchScreen(Screen[None]):
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as in the base class
-    CSS = """
-    WatchScreen #standing, WatchScreen #guide { height: 1; padding: 0 1; }
-    WatchScreen #guide { color: $text-muted; }
-    WatchScreen #guide.said { color: $text; text-style: bold; }
-    WatchScreen #alarms { height: auto; max-height: 7; padding: 0 1; border: heavy $error; display: none; }
-    WatchScreen #alarms.any { display: block; }
-    WatchScreen #alarms.seen { border: round $panel; }
-    WatchScreen .panel { border-top: solid $foreground 40%; border-title-color: $text; padding: 0 1; }
-    WatchScreen #left { width: 1fr; }
-    WatchScreen #right { width: 32; }
-    WatchScreen #levels { height: 1fr; min-height: 6; }
-    WatchScreen #trials { height: 8; }
-    WatchScreen #runs { height: 1fr; min-height: 3; }
-    WatchScreen #gauges { height: 8; }
-    WatchScreen #aside { width: 42; display: none; }
-    WatchScreen.details #aside { display: block; }
-    WatchScreen.-narrow.details #right { display: none; }
-    WatchScreen.-narrow.details #left { display: none; }
-    WatchScreen.-narrow.details #aside { width: 1fr; }
-    WatchScreen.-wide #aside { display: block; width: 38; }
-    WatchScreen.-wide #right { width: 34; }
-    WatchScreen.-wide #trials { height: 14; }
-    WatchScreen.-wide.details #aside { display: none; }
-    """
+    CSS = STYLE
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("S,f8", "stop", "STOP", key_display="S"),
         Binding("p", "pause", "Pause"),

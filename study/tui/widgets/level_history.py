@@ -9,15 +9,15 @@ from textual.widget import Widget
 
 from study.session.watch_view import StaircasePoint
 from study.tui.braille import Canvas
+from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG
 
-LABEL_COLUMNS = 8
 LEAST_RANGE = 4.0
 """Cap over the lowest level drawn, at least: a staircase that hardly moves must not look wild."""
 DOTS_PER_TRIAL = 4.0
 """At most; many trials move together."""
 
 MUTED = "$foreground 65%"
-RIGHT, WRONG, PEAK, VALLEY, NEXT = "○", "×", "▼", "▲", "?"
+NEXT = "?"
 LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} turn {NEXT} next ┄ cap"
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}

@@ -1,0 +1,27 @@
+"""What the watcher's screen says of itself."""
+
+GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
+
+HELP = """\
+# Watching a session
+
+You follow a running session. Nothing here changes it, apart from four keys:
+
+* **S** (shift and s) or **F8**: stop. The force is off at once; nothing is asked. The session can be resumed.
+* **p**: pause. Hands free at once; the participant goes on at the own screen.
+* **n**: a note for the log. **e**: an adverse event (pain, numbness, a fright).
+
+The other keys: **a** says that you have seen the alarms, **d** shows forms, practice and notes, **t** goes through
+light, dark and high contrast, **q** leaves the view; the session goes on.
+
+## What you see
+
+* **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ turns of the level, ? the next level.
+* **Last trials**: the newest on top. *shown* and *said* are the numbers 1 and 2; *s* is the time to answer; *m/s²* is \
+what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial, ! a remark \
+(shown in a wider window).
+* **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
+* **Catch**: trials at full force that anybody should get right; errors in them are lapses of attention.
+
+The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
+"""

@@ -1,0 +1,26 @@
+"""How the watcher's screen is laid out: two columns in a narrow terminal, three in a wide one."""
+
+STYLE = """
+WatchScreen #standing, WatchScreen #guide { height: 1; padding: 0 1; }
+WatchScreen #guide { color: $text-muted; }
+WatchScreen #guide.said { color: $text; text-style: bold; }
+WatchScreen #alarms { height: auto; max-height: 7; padding: 0 1; border: heavy $error; display: none; }
+WatchScreen #alarms.any { display: block; }
+WatchScreen #alarms.seen { border: round $panel; }
+WatchScreen .panel { border-top: solid $foreground 40%; border-title-color: $text; padding: 0 1; }
+WatchScreen #left { width: 1fr; }
+WatchScreen #right { width: 32; }
+WatchScreen #levels { height: 1fr; min-height: 6; }
+WatchScreen #trials { height: 8; }
+WatchScreen #runs { height: 1fr; min-height: 3; }
+WatchScreen #gauges { height: 8; }
+WatchScreen #aside { width: 42; display: none; }
+WatchScreen.details #aside { display: block; }
+WatchScreen.-narrow.details #right { display: none; }
+WatchScreen.-narrow.details #left { display: none; }
+WatchScreen.-narrow.details #aside { width: 1fr; }
+WatchScreen.-wide #aside { display: block; width: 38; }
+WatchScreen.-wide #right { width: 34; }
+WatchScreen.-wide #trials { height: 14; }
+WatchScreen.-wide.details #aside { display: none; }
+"""
