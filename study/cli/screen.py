@@ -1,5 +1,6 @@
 """The screen of `study` and `resume`: started from here, and what it ends with is said here."""
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -20,16 +21,14 @@ KINDS: dict[int, type[StudyError]] = {
 
 def has_screen() -> bool:
     """Whether there is a terminal, or a browser of `hapteq serve`, to draw on. Results may go to a file."""
-    if in_a_browser():
+    if "TEXTUAL_DRIVER" in os.environ:
         return True
-    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+    return has_keys() and sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
-def in_a_browser() -> bool:
-    """Started by `hapteq serve`: there is no terminal, and the page is the screen."""
-    import os
-
-    return "TEXTUAL_DRIVER" in os.environ
+def has_keys() -> bool:
+    """Whether somebody may sit at a keyboard."""
+    return sys.stdin is not None and sys.stdin.isatty()
 
 
 def open_screen(start: "AppStart", as_json: bool) -> None:

@@ -35,7 +35,7 @@ def study(
     as_json: JsonOption = False,
 ) -> None:
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
-    from study.cli.screen import has_screen, open_screen
+    from study.cli.screen import has_keys, has_screen, open_screen
 
     answer_keys = parse_keys(keys)
     if observer is None and not plain and has_screen():
@@ -47,7 +47,7 @@ def study(
         return
     from study.cli.conduct import Sitter, begin
 
-    if observer is None and not plain:
+    if observer is None and not plain and not has_keys():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
     sitter = Sitter(observer=observer, subject=subject, keys=answer_keys)
