@@ -1,0 +1,248 @@
+"""Pages that are read and left, and waits that the application ends."""
+
+import asyncio
+import subprocess
+import sys
+
+import pytest
+
+from study.session.views import (
+    DemoDone,
+    DemoMenu,
+    DeviceFinding,
+    DeviceReport,
+    DirectionPicture,
+    Goodbye,
+    HandleView,
+    PlayDemo,
+    PlayingNotice,
+    PracticeResult,
+    RestNotice,
+    Welcome,
+)
+from study.tui.answer_keys import parse_keys
+from study.tui.screens.await_return import AwaitReturnScreen
+from study.tui.screens.demo import DemoScreen
+from study.tui.screens.device_check import DeviceCheckScreen
+from study.tui.screens.error_panel import ErrorPanel
+from study.tui.screens.goodbye import GoodbyeScreen
+from study.tui.screens.handle import HandleScreen
+from study.tui.screens.instructions import InstructionsScreen
+from study.tui.screens.playing import PlayingScreen
+from study.tui.screens.practice_over import PracticeOverScreen
+from study.tui.screens.rest import RestScreen
+from study.tui.trial_replies import LEAVING, PAUSE
+
+PICTURE = DirectionPicture("yz", (135.0, 45.0))
+MENU = DemoMenu(PICTURE, 3, 2, ((2, 1),), handle_moves=True)
+FINE = DeviceFinding("Loop", "4000 ticks", fine=True, advice="not to be shown")
+BAD = DeviceFinding("Sensor", "silent", fine=False, advice="Plug it in.")
+
+
+@pytest.fixture
+def read(on_stage):
+    """Presses keys on a page; returns what was heard, and the words that were on it before."""
+
+    def page(screen, *keys):
+        seen = []
+
+        async def story(stage):
+            seen.append(stage.words)
+            for key in keys:
+                await stage.press(key)
+
+        return on_stage(screen, story), seen[0]
+
+    return page
+
+
+@pytest.mark.parametrize(
+    "screen",
+    [
+        lambda: InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", felt=True, resumed_after=0)),
+        lambda: PracticeOverScreen(PracticeResult(True, 8, 10)),
+        lambda: AwaitReturnScreen("reason"),
+        lambda: GoodbyeScreen(Goodbye(True, 5)),
+    ],
+    ids=["instructions", "practice over", "await return", "goodbye"],
+)
+def test_enter_and_no_other_key_leaves_a_page(read, screen):
+    assert read(screen(), "x", "space", "1")[0] == []
+    assert read(screen(), "enter")[0] == [None]
+
+
+def test_instructions_say_what_happens_and_that_nothing_can_go_wrong(read):
+    words = read(InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", felt=True, resumed_after=0)))[1]
+    for part in (
+        "press 1 or 2",
+        "if you cannot tell, guess. A guess can do no harm.",
+        "then 5 runs",
+        "press p for a pause",
+    ):
+        assert part in words
+    assert "Practice:" not in words and "Welcome back" not in words
+
+
+def test_instructions_tell_practice_resumption_and_other_keys(read):
+    welcome = Welcome("T", PICTURE, 5, 0, "the simulation", felt=False, resumed_after=12)
+    words = read(InstructionsScreen(welcome, parse_keys("f,j")))[1]
+    assert "Welcome back: 12 answers are on the disk." in words
+    assert "Practice: the device is a simulation (the simulation)" in words
+    assert "press f for 1, j for 2" in words
+
+
+def test_a_practice_that_went_badly_is_no_failure(read):
+    assert "That is enough to go on." in read(PracticeOverScreen(PracticeResult(True, 8, 10)))[1]
+    words = read(PracticeOverScreen(PracticeResult(False, 3, 10)))[1]
+    assert "3 of the last 10 answers were right." in words and "hard to tell, for anybody" in words
+
+
+def test_the_end_says_what_is_saved_and_why_it_ended(read):
+    assert "1 answer is on the disk." in read(GoodbyeScreen(Goodbye(True, 1)))[1]
+    words = read(GoodbyeScreen(Goodbye(False, 7, "the device is gone")))[1]
+    assert "The session stops here: the device is gone." in words and "7 answers are on the disk." in words
+
+
+def test_a_void_trial_is_explained(read):
+    assert "It is void: the handle was gone." in read(AwaitReturnScreen("the handle was gone"))[1]
+
+
+def test_a_device_that_is_fine_goes_on_by_enter(read):
+    heard, words = read(DeviceCheckScreen(DeviceReport("d", True, (FINE,))), "g", "enter")
+    assert heard == [True]
+    assert "ok Loop 4000 ticks" in words and "not to be shown" not in words and "nothing moves" in words
+
+
+def test_a_device_that_needs_a_look_is_not_passed_by_enter(read):
+    heard, words = read(DeviceCheckScreen(DeviceReport("d", False, (FINE, BAD))), "enter")
+    assert heard == []
+    assert "LOOK Sensor silent Plug it in." in words
+    assert read(DeviceCheckScreen(DeviceReport("d", False, (BAD,))), "g")[0] == [True]
+    assert read(DeviceCheckScreen(DeviceReport("d", False, (BAD,))), "c")[0] == [False]
+
+
+@pytest.mark.parametrize(
+    ("keys", "choice"),
+    [
+        ("1", PlayDemo(2, 1)),
+        ("2", PlayDemo(2, 2)),
+        (("right", "1"), PlayDemo(3, 1)),
+        (("n", "n", "2"), PlayDemo(3, 2)),
+        (("b", "left", "2"), PlayDemo(1, 2)),
+        (("enter",), DemoDone()),
+    ],
+)
+def test_the_demonstration_plays_turns_and_ends(read, keys, choice):
+    assert read(DemoScreen(MENU), *keys)[0] == [choice]
+
+
+def test_the_demonstration_plays_by_keys_of_ones_own(read):
+    assert read(DemoScreen(MENU, parse_keys("f,j")), "j")[0] == [PlayDemo(2, 2)]
+
+
+def test_the_demonstration_marks_what_was_felt_and_where_its_ends_are(on_stage):
+    async def story(stage):
+        assert "vibration 2 of 3" in stage.words and "[2 ✓·]" in stage.text and "1 felt" in stage.words
+        assert "nothing moves" not in stage.words
+        await stage.press("right")
+        assert "Nothing of it was felt yet." in stage.words and "1 felt" not in stage.words
+        await stage.press("right")
+        assert "This is the fastest vibration." in stage.words
+        await stage.press("left")
+        assert "Felt so far: 1." in stage.words
+        await stage.press("left", "left")
+        assert "This is the slowest vibration." in stage.words
+
+    on_stage(DemoScreen(MENU), story)
+
+
+def test_a_demonstration_that_moves_nothing_says_so(read):
+    assert "The device is a simulation: nothing moves." in read(DemoScreen(DemoMenu(PICTURE, 3, 1, (), False)))[1]
+
+
+def test_a_pause_can_be_asked_for_in_a_demonstration(read):
+    (message,) = read(DemoScreen(MENU), "p")[0]
+    assert isinstance(message, DemoScreen.PauseWanted)
+
+
+@pytest.mark.parametrize(("key", "reply"), [("p", PAUSE), ("q", LEAVING)])
+@pytest.mark.parametrize(
+    "screen",
+    [
+        lambda: PlayingScreen(PlayingNotice("Interval 1", 1, 2.0, None)),
+        lambda: HandleScreen(HandleView(False, "Move it.", (5.0, 5.0), 8.0)),
+    ],
+    ids=["playing", "handle"],
+)
+def test_whatever_is_waited_for_can_be_paused(read, screen, key, reply):
+    assert read(screen(), "1", "enter", key)[0] == [reply]
+
+
+def test_a_wait_that_the_application_closes_has_no_reply(on_stage):
+    screen = PlayingScreen(PlayingNotice("Direction 1", 1, 2.0, PICTURE))
+
+    async def story(stage):
+        assert "1 now" in stage.words and "2 now" not in stage.words
+        screen.dismiss(None)
+
+    assert on_stage(screen, story) == [None]
+
+
+def test_in_the_gap_between_two_intervals_nothing_is_marked(read):
+    words = read(PlayingScreen(PlayingNotice("", 1, 0.5, None)))[1]
+    assert "now" not in words
+
+
+def test_the_spot_follows_the_handle_and_stays_in_sight(on_stage):
+    screen = HandleScreen(HandleView(False, "Move it left.", (20.0, 0.0), 8.0))
+
+    async def story(stage):
+        far = stage.text
+        screen.update_view(HandleView(False, "Move it up.", (0.0, -3.0), 8.0))
+        await stage.pilot.pause()
+        assert "Move it up." in stage.words and stage.text != far
+        screen.update_view(HandleView(False, "Move it left.", (1e6, 0.0), 8.0))
+        await stage.pilot.pause()
+        assert stage.text == far
+
+    on_stage(screen, story)
+
+
+def test_a_rest_cannot_be_shortened_and_tells_what_is_left(on_stage):
+    async def story(stage):
+        assert "1 run is left." in stage.words and "0:01" not in stage.words
+        await stage.press("enter", "space", "escape")
+        assert stage.heard == []
+        assert "There is no hurry." in stage.words
+        await asyncio.sleep(0.9)
+        assert "When you are ready, press Enter." in stage.words
+        await stage.press("enter")
+
+    (rested_s,) = on_stage(RestScreen(RestNotice(0.6, 1)), story)
+    assert 0.6 <= rested_s < 10.0
+
+
+def test_an_error_says_what_happened_what_is_safe_and_what_to_do(on_stage):
+    async def story(stage):
+        for part in ("Lost", "What happened A [1].", "What is safe B.", "What to do now C."):
+            assert part in stage.words
+        await stage.press("right", "enter")
+
+    assert on_stage(ErrorPanel("Lost", "A [1].", "B.", "C.", ("Again", "Leave")), story) == ["Leave"]
+
+
+def test_an_error_is_closed_by_escape_and_says_nothing_of_what_was_not_at_stake(read):
+    heard, words = read(ErrorPanel("Lost", "A.", "", "C."), "escape")
+    assert heard == ["Close"]
+    assert "What is safe" not in words
+
+
+def test_screens_load_nothing_heavy():
+    code = (
+        "import sys, importlib\n"
+        "for name in ('trial','form','demo','playing','handle','rest','pause','instructions','device_check'):\n"
+        "    importlib.import_module('study.tui.screens.' + name)\n"
+        "print([m for m in ('numpy','pydantic','h5py','scipy','study.store','study.devices') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,142 @@
+"""Every screen of a participant as text at two sizes, and the trial as a picture in both themes."""
+
+import pytest
+
+from protocols.trial import Phase
+from study.session.form_views import Form, FormField, FormKind
+from study.session.views import (
+    DemoMenu,
+    DeviceFinding,
+    DeviceReport,
+    DirectionPicture,
+    Goodbye,
+    HandleView,
+    PauseNotice,
+    PlayingNotice,
+    PracticeResult,
+    Progress,
+    Question,
+    RestNotice,
+    Task,
+    Welcome,
+)
+from study.tui.screens.await_return import AwaitReturnScreen
+from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
+from study.tui.screens.demo import DemoScreen
+from study.tui.screens.device_check import DeviceCheckScreen
+from study.tui.screens.error_panel import ErrorPanel
+from study.tui.screens.form import FormScreen
+from study.tui.screens.goodbye import GoodbyeScreen
+from study.tui.screens.handle import HandleScreen
+from study.tui.screens.instructions import InstructionsScreen
+from study.tui.screens.note import NoteScreen
+from study.tui.screens.pause import PauseScreen
+from study.tui.screens.playing import PlayingScreen
+from study.tui.screens.practice_over import PracticeOverScreen
+from study.tui.screens.rest import RestScreen
+from study.tui.screens.trial import TrialScreen
+
+SIZES = ((80, 24), (132, 40))
+PICTURE = DirectionPicture("yz", (135.0, 45.0))
+QUESTION = Question(Phase.TEST, 2, 5, 7, False, 0.0, PICTURE, progress=Progress(0.42, 12))
+INTERVAL = Question(Phase.DETECTION, 1, 5, 3, True, 0.0, PICTURE, task=Task.INTERVAL, progress=Progress(0.1, None))
+YES_NO = ("yes", "no")
+CONSENT = Form(
+    FormKind.CONSENT,
+    "Consent",
+    "Please read each statement. The study begins only if you agree to all of them.",
+    tuple(
+        FormField(f"statement_{i}", f"Statement {i}: I know what is done here, and may stop at any time.", YES_NO)
+        for i in range(1, 9)
+    ),
+    "2",
+    "EC 2026-17",
+)
+HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothing of these")
+SETUP = Form(
+    FormKind.SETUP,
+    "How you sit",
+    "Arrange these with the experimenter.",
+    (
+        FormField("hearing", "What covers the sound?", HEARING),
+        FormField("strategy", "How did you decide?", needed=False),
+    ),
+)  # fmt: skip
+REPORT = DeviceReport(
+    "omega.3",
+    simulated=False,
+    findings=(
+        DeviceFinding("Loop", "4000 ticks in 1 s, zero force held to the end", fine=True),
+        DeviceFinding("Missed ticks", "31 of 4000", fine=False, advice="Close other programs."),
+    ),
+)
+
+
+def armed(question):
+    screen = TrialScreen()
+    screen.arm(question)
+    return screen
+
+
+SCREENS = {
+    "trial": lambda: armed(QUESTION),
+    "trial_interval": lambda: armed(INTERVAL),
+    "form_consent": lambda: FormScreen(CONSENT),
+    "form_setup": lambda: FormScreen(SETUP),
+    "device_check": lambda: DeviceCheckScreen(REPORT),
+    "instructions": lambda: InstructionsScreen(Welcome("A study", PICTURE, 5, 1, "simulated omega.3", False, 0)),
+    "demo": lambda: DemoScreen(DemoMenu(PICTURE, 5, 2, ((1, 1), (1, 2), (2, 1)), handle_moves=False)),
+    "playing": lambda: PlayingScreen(PlayingNotice("Direction 2", 2, 2.0, PICTURE)),
+    "playing_interval": lambda: PlayingScreen(PlayingNotice("Interval 1", 1, 2.0, None)),
+    "handle": lambda: HandleScreen(HandleView(False, "Bring the handle 12 mm back.", (11.0, 5.0), 8.0)),
+    "practice_over": lambda: PracticeOverScreen(PracticeResult(False, 6, 10)),
+    "rest": lambda: RestScreen(RestNotice(75.0, 3, Progress(0.4, 14))),
+    "pause": lambda: PauseScreen(PauseNotice("asked for a pause", 37)),
+    "await_return": lambda: AwaitReturnScreen("no answer within the time limit"),
+    "goodbye": lambda: GoodbyeScreen(Goodbye(False, 37, "the participant left")),
+    "note": lambda: NoteScreen(adverse=True),
+    "confirm_withdrawal": lambda: ConfirmWithdrawal(),
+    "error_panel": lambda: ErrorPanel(
+        "The device is gone", "The force is off.", "37 answers are on disk.", "Check the cable.", ("Again", "Leave")
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("name", SCREENS)
+def test_a_screen_reads_as_it_did(on_stage, same_as_before, name, size):
+    async def story(stage):
+        same_as_before(f"{name}_{size[0]}x{size[1]}.txt", stage.text)
+
+    on_stage(SCREENS[name](), story, size)
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_the_trial_looks_as_it_did(on_stage, same_as_before, size, theme):
+    async def story(stage):
+        same_as_before(f"trial_{size[0]}x{size[1]}_{theme}.svg", stage.svg)
+
+    on_stage(armed(QUESTION), story, size, f"hapteq-{theme}")
+
+
+@pytest.mark.parametrize("name", SCREENS)
+def test_every_screen_has_help_and_tells_its_keys(on_stage, name):
+    screen = SCREENS[name]()
+    assert 3 <= len([line for line in screen.HELP.splitlines() if line.startswith("- ")]) <= 8
+
+    async def story(stage):
+        assert "Help" in stage.text.splitlines()[-1]
+
+    on_stage(screen, story)
+
+
+@pytest.mark.parametrize("size", [(40, 12), (200, 60)], ids=["tiny", "huge"])
+@pytest.mark.parametrize("name", ["trial", "trial_interval", "handle", "form_consent"])
+def test_a_screen_survives_any_size_and_a_resize(on_stage, name, size):
+    async def story(stage):
+        await stage.pilot.resize_terminal(*size)
+        await stage.pilot.pause()
+        assert stage.text.strip()
+
+    on_stage(SCREENS[name](), story)
