@@ -88,7 +88,7 @@ def _reason(watched: Watched, standing: Standing) -> str:
         case "stopped":
             return watched.left
         case "not running":
-            return "the program that ran it is gone; every answer is in the log"
+            return "its program is gone; every answer is on disk"
         case "finished":
             return "all runs are done"
         case _:

@@ -319,7 +319,7 @@ def test_a_program_that_is_gone_is_not_running(story):
     story.open_trial()
     view = story.view(writer=False)
     assert view.standing == "not running"
-    assert "every answer is in the log" in view.reason
+    assert "every answer is on disk" in view.reason
 
 
 def test_a_finished_session_has_no_alarms(story):
