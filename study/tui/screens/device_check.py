@@ -25,7 +25,6 @@ class DeviceCheckScreen(Screen[bool]):
 """
     DEFAULT_CSS = """
     DeviceCheckScreen { align: center top; }
-    DeviceCheckScreen .title { margin-bottom: 1; }
     DeviceCheckScreen .advice { margin-left: 6; color: $text-warning; }
     DeviceCheckScreen .look { text-style: bold; color: $text-warning; }
     """
@@ -46,6 +45,7 @@ class DeviceCheckScreen(Screen[bool]):
             yield Said(f"Device check: {report.device}", classes="title")
             if report.simulated:
                 yield Said("The device is a simulation: nothing moves.")
+            yield Said()
             for finding in report.findings:
                 yield Said(_line(finding, names), classes="fine" if finding.fine else "look")
                 if finding.advice and not finding.fine:

@@ -5,6 +5,7 @@ from typing import ClassVar
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.containers import Container
 from textual.screen import Screen
 from textual.widgets import Button, Footer, Input
 
@@ -37,7 +38,7 @@ class FormScreen(Screen[FormReply]):
 - You may ask the experimenter about anything that is unclear. **Ctrl+C** leaves.
 """
     DEFAULT_CSS = """
-    FormScreen { align: center top; }
+    FormScreen Container { height: 1fr; align-horizontal: center; }
     FormScreen #top { height: 1; padding: 0 1; background: $panel; text-style: bold; }
     FormScreen #introduction { margin: 1 0; }
     FormScreen #origin { color: $foreground 65%; margin-bottom: 1; }
@@ -57,7 +58,7 @@ class FormScreen(Screen[FormReply]):
     def compose(self) -> ComposeResult:
         form = self._form
         yield Said(id="top")
-        with Questions():
+        with Container(), Questions():
             yield Said(form.introduction, id="introduction")
             for number, field in enumerate(form.fields, start=1):
                 yield FormQuestion(number, field)

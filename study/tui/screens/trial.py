@@ -46,7 +46,8 @@ class TrialScreen(Screen[None]):
     HELP = """\
 # A trial
 
-- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes (or the interval in which it shook).
+- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes. Where two intervals
+  are asked about, press the number of the one in which it shook.
 - If you cannot tell, guess. Many trials are meant to be hard, and no answer can do harm.
 - **p** pauses: the handle stops at once, and this trial is drawn again later.
 - **r** skips this trial and plays a new one, for instance when you were disturbed.
@@ -85,6 +86,7 @@ class TrialScreen(Screen[None]):
         self._limit: Timer | None = None
         self._trouble = ""
         self._trouble_is_old = False
+        self._verdict = ""
         self._wanted: tuple[Unanswered, float] | None = None
 
     def compose(self) -> ComposeResult:
@@ -104,12 +106,14 @@ class TrialScreen(Screen[None]):
         """From now on one reply counts."""
         self._drop_limit()
         self._question, self._taken = question, 0
+        # Its own trial ends a moment after the answer: it could not be read if it went with it.
+        last, self._verdict = self._verdict, ""
         if self._trouble_is_old:
             self.show_trouble("")
         self._trouble_is_old = True
         if question.time_limit_s > 0:
             self._limit = self.set_timer(question.time_limit_s, self._time_over)
-        self._show()
+        self._show(f"Last answer: {last} " if last else "")
         self._armed_s = time.monotonic()
         if self._wanted is not None and self._armed_s - self._wanted[1] < WANTED_FOR_S:
             self._reply(self._wanted[0])
@@ -126,10 +130,12 @@ class TrialScreen(Screen[None]):
         """The answer is on the disk."""
         if self._taken:
             self._mark("saved")
-            self._say(f"{self._taken} saved. {WAIT}")
+            self._say(self._verdict_sentence() or f"{self._taken} saved. {WAIT}")
 
     def show_feedback(self, correct: bool) -> None:
-        self._say("Right." if correct else "Wrong.")
+        """Told in words now, and with the next question."""
+        self._verdict = "right." if correct else "wrong."
+        self._say(self._verdict_sentence())
 
     def show_trouble(self, sentence: str) -> None:
         """Stays until the next trial is over: between two trials nobody could read it."""
@@ -200,8 +206,11 @@ class TrialScreen(Screen[None]):
             name = {"enter": "Enter", "space": "The space bar"}.get(event.key, f"'{event.character}'")
             self._say(f"{name} is no answer. {self._press()}")
 
-    def _show(self) -> None:
-        """Everything anew, so that no trial leaves a trace in the next."""
+    def _verdict_sentence(self) -> str:
+        return self._verdict.capitalize()
+
+    def _show(self, last: str = "") -> None:
+        """Everything anew: of a trial nothing but the feedback is seen in the next."""
         if not self._composed:
             return
         self.query_one("#trouble", Said).update(self._trouble)
@@ -215,7 +224,7 @@ class TrialScreen(Screen[None]):
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
-        self._say(f"{self._press()} If you cannot tell, guess.")
+        self._say(f"{last}{self._press()} If you cannot tell, guess.")
 
     @property
     def _composed(self) -> bool:

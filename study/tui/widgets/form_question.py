@@ -15,9 +15,9 @@ MOST_CHARACTERS = 500
 class FormQuestion(Vertical):
     DEFAULT_CSS = """
     FormQuestion {
-        height: auto; margin-bottom: 1; padding: 0 1; border-left: thick $surface; background: $surface;
+        height: auto; margin-bottom: 1; padding: 0 1 0 2; background: $surface;
     }
-    FormQuestion:focus-within { border-left: thick $primary; background: $panel; }
+    FormQuestion:focus-within { border-left: thick $primary; padding: 0 1; background: $panel; }
     FormQuestion Input { background: $boost; }
     """
 

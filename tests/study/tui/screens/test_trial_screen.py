@@ -78,7 +78,6 @@ def test_a_wrong_key_leaves_no_trace_in_the_next_trial(on_stage):
         before = stage.text
         await stage.press("x", "1")
         screen.saved()
-        screen.show_feedback(False)
         screen.arm(QUESTION)
         await stage.pilot.pause()
         assert stage.text == before
@@ -210,6 +209,26 @@ def test_what_became_of_the_answer_is_said_in_words(on_stage):
             screen.show_feedback(correct)
             await stage.pilot.pause()
             assert word in stage.words
+            screen.saved()
+            await stage.pilot.pause()
+            assert word in stage.words
+
+    on_stage(screen, story)
+
+
+def test_feedback_can_be_read_during_the_next_trial_and_no_longer(on_stage):
+    screen = TrialScreen()
+
+    async def story(stage):
+        screen.arm(QUESTION)
+        await stage.press("2")
+        screen.show_feedback(False)
+        screen.arm(QUESTION)
+        await stage.pilot.pause()
+        assert "Last answer: wrong. Press 1 or 2." in stage.words
+        screen.arm(QUESTION)
+        await stage.pilot.pause()
+        assert "Last answer" not in stage.words
 
     on_stage(screen, story)
 
