@@ -38,7 +38,8 @@ def test_headless_packages_load_no_screen_and_no_plots(package):
 def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():
     screens = sorted((ROOT / "study" / "tui" / "screens").glob("*.py"))
     names = [f"study.tui.screens.{module.stem}" for module in screens if module.stem != "__init__"]
-    everything = ", ".join(("study.cli.main", "study.tui.app", "study.tui.asked_screens", "study.tui.watch_app", *names))
+    apps = ("study.cli.main", "study.tui.app", "study.tui.asked_screens", "study.tui.watch_app")
+    everything = ", ".join((*apps, *names))
     loaded = loaded_by(f"import {everything}")
     assert "textual" in loaded
     heavy = {"numpy", "scipy", "numba", "pandas", "statsmodels", "matplotlib", "h5py", "pydantic", "filelock"}

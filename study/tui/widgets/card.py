@@ -22,7 +22,10 @@ class Card(Vertical):
 
 class Sheet(VerticalScroll):
     DEFAULT_CSS = """
-    Sheet { width: 100%; max-width: 100; height: 1fr; padding: 0 2; scrollbar-size-vertical: 1; scrollbar-color: $foreground 40%; }
+    Sheet {
+        width: 100%; max-width: 100; height: 1fr; padding: 0 2;
+        scrollbar-size-vertical: 1; scrollbar-color: $foreground 40%;
+    }
     Sheet > .title { text-style: bold; color: $text-primary; margin-top: 1; }
     Sheet > .strong { text-style: bold; }
     Sheet > .gap { margin-top: 1; }
