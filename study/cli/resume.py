@@ -28,7 +28,7 @@ def resume(
     answer_keys = parse_keys(keys)
     if not plain and has_screen() and not _simulated(session, data):
         from study.tui.app_start import AppStart
-        from study.tui.link.messages import Resume
+        from study.tui.link.to_engine import Resume
 
         open_screen(AppStart(str(data), device, answer_keys, Resume(session, device, str(data))), as_json)
         return

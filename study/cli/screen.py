@@ -10,7 +10,7 @@ from study.errors import DeviceError, ExitCode, LeftError, StudyError, WrongUseE
 
 if TYPE_CHECKING:
     from study.tui.app_start import AppStart
-    from study.tui.link.messages import Failed, Finished
+    from study.tui.link.from_engine import Failed, Finished
 
 KINDS: dict[int, type[StudyError]] = {
     ExitCode.WRONG_USE: WrongUseError,
@@ -46,7 +46,7 @@ def open_screen(start: "AppStart", as_json: bool) -> None:
 
 
 def _say(outcome: "Finished | Failed | None", as_json: bool) -> None:
-    from study.tui.link.messages import Failed
+    from study.tui.link.from_engine import Failed
 
     if outcome is None:
         return

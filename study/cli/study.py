@@ -40,7 +40,7 @@ def study(
     answer_keys = parse_keys(keys)
     if observer is None and not plain and has_screen():
         from study.tui.app_start import AppStart
-        from study.tui.link.messages import Begin, SessionOrder
+        from study.tui.link.to_engine import Begin, SessionOrder
 
         first = None if subject is None else Begin(SessionOrder(protocol, device, subject, str(data), seed))
         open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed), as_json)

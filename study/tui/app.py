@@ -21,17 +21,9 @@ from study.tui.archive_screens import ArchiveScreens, ArchiveWanted, command_for
 from study.tui.departure import leave_with_the_terminal
 from study.tui.engine_line import EngineLine, EngineSaid
 from study.tui.everywhere import EVERYWHERE
-from study.tui.link.messages import (
-    AskBeside,
-    Begin,
-    Failed,
-    Finished,
-    LetGo,
-    Relay,
-    Resume,
-    SessionOrder,
-    ShowSession,
-)
+from study.tui.link.from_engine import Failed, Finished
+from study.tui.link.to_engine import AskBeside, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
+from study.tui.key_names import key_name
 from study.tui.load_screens import load_screens
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.sitting_screens import SittingScreens
@@ -70,6 +62,9 @@ class HapteqApp(App[None]):
         if "TEXTUAL_ANIMATIONS" not in os.environ:
             self.animation_level = "none"
         register_themes(self)
+
+    def get_key_display(self, binding: Binding) -> str:
+        return key_name(super().get_key_display(binding))
 
     async def on_mount(self) -> None:
         leave_with_the_terminal(self, lambda: self._leave(ExitCode.INTERRUPTED))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from study.tui.answer_keys import DIGITS, AnswerKeys
-from study.tui.link.messages import Begin, Resume
+from study.tui.link.to_engine import Begin, Resume
 
 
 @dataclass(frozen=True, slots=True)

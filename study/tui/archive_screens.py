@@ -10,22 +10,8 @@ from textual.app import App
 from study.session.archive_views import DiagnosisView, SessionView
 from study.tui.app_start import AppStart
 from study.tui.home_messages import AnalyzeWanted, DiagnosisWanted, SessionWanted, WithdrawWanted
-from study.tui.link.messages import (
-    Analyze,
-    Command,
-    Diagnosis,
-    FromEngine,
-    Home,
-    Preparing,
-    Session,
-    ShowDiagnosis,
-    ShowHome,
-    ShowSession,
-    ToEngine,
-    Trouble,
-    Withdraw,
-    Withdrawn,
-)
+from study.tui.link.from_engine import Diagnosis, FromEngine, Home, Preparing, Session, Trouble, Withdrawn
+from study.tui.link.to_engine import Analyze, Command, ShowDiagnosis, ShowHome, ShowSession, ToEngine, Withdraw
 
 if TYPE_CHECKING:
     from study.tui.screens.home import HomeScreen

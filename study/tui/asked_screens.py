@@ -6,7 +6,7 @@ from typing import Any
 from textual.screen import Screen
 
 from study.tui.answer_keys import AnswerKeys
-from study.tui.link.messages import Ask, Call
+from study.tui.link.from_engine import Ask, Call
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen

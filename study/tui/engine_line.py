@@ -8,7 +8,8 @@ from textual.app import App
 from textual.message import Message
 
 from study.tui.link.client import EngineClient
-from study.tui.link.messages import Begin, Failed, Finished, FromEngine, Heartbeat, Resume, ToEngine
+from study.tui.link.from_engine import Failed, Finished, FromEngine
+from study.tui.link.to_engine import Begin, Heartbeat, Resume, ToEngine
 
 HEARTBEAT_S = 0.1
 

@@ -1,6 +1,6 @@
 """What is said when something ended, in words for a panel."""
 
-from study.tui.link.messages import Failed, Finished
+from study.tui.link.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
 
 UNHEARD_AFTER_S = 2.0

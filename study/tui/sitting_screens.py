@@ -11,19 +11,8 @@ from textual.screen import Screen
 
 from study.session.views import Reply as TrialReply
 from study.tui.answer_keys import AnswerKeys
-from study.tui.link.messages import (
-    Ask,
-    Call,
-    Close,
-    Feedback,
-    FromEngine,
-    LookUpdate,
-    Opened,
-    Preparing,
-    Reply,
-    ToEngine,
-    Trouble,
-)
+from study.tui.link.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble
+from study.tui.link.to_engine import Reply, ToEngine
 from study.tui.screens.preparing import PreparingScreen
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from textual.binding import Binding, BindingType
 
 from study.session.requests import Request
 from study.tui.departure import leave_with_the_terminal
+from study.tui.key_names import key_name
 from study.tui.screens.watch import WatchScreen
 from study.tui.themes import DARK, NEXT, register_themes
 from study.tui.watch_source import WatchSource
@@ -26,6 +27,9 @@ class WatchApp(App[None]):
         self._ask = ask
         self.animation_level = "none"
         register_themes(self, theme)
+
+    def get_key_display(self, binding: Binding) -> str:
+        return key_name(super().get_key_display(binding))
 
     def on_mount(self) -> None:
         leave_with_the_terminal(self, self.exit)

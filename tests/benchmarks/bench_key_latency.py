@@ -138,7 +138,7 @@ def watched_screen(protocol: str, data: str, news: int) -> None:
     """The application itself, with a task in its event loop that measures how late it comes."""
     from study.tui.app import HapteqApp
     from study.tui.app_start import AppStart
-    from study.tui.link.messages import Begin, SessionOrder
+    from study.tui.link.to_engine import Begin, SessionOrder
 
     class Watched(HapteqApp):
         async def on_mount(self) -> None:

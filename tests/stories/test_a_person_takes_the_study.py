@@ -1,4 +1,4 @@
-"""A person with real keys in a real terminal, on the simulated device, in real time."""
+"""A person with real keys in a real terminal, in line mode, on the simulated device, in real time."""
 
 import csv
 import sys
@@ -16,7 +16,7 @@ def study(tmp_path, small_file):
     terminals = []
 
     def start(*more: str, command: str = "study") -> Terminal:
-        terminals.append(Terminal(command, *more, "--data", str(tmp_path / "data")))
+        terminals.append(Terminal(command, *more, "--plain", "--data", str(tmp_path / "data")))
         return terminals[-1]
 
     yield start
@@ -28,6 +28,8 @@ def begin(study, small_file) -> Terminal:
     terminal = study("--protocol", str(small_file), "--seed", "4")
     terminal.wait_for("Participant code")
     terminal.type("P07\n")
+    terminal.wait_for("The device is ready.*Enter goes on")
+    terminal.type("\n")
     shown = terminal.wait_for("Press Enter to begin")
     assert "up-left to down-right" in shown
     assert "nothing moves here" in shown
@@ -59,6 +61,8 @@ def test_from_the_code_to_the_report_with_a_kill_in_the_middle(study, small_file
     terminal.kill()
 
     again = study("P07_001", command="resume")
+    again.wait_for("The device is ready.*Enter goes on")
+    again.type("\n")
     assert "3 answers are on disk" in again.wait_for("Press Enter to begin")
     again.type("\n")
     answer_until_finished(again)
@@ -110,6 +114,8 @@ def test_a_closed_terminal_loses_nothing(study, small_file, tmp_path):
     terminal.hang_up()
     assert terminal.process.wait(timeout=30) != 0
     again = study("P07_001", command="resume")
+    again.wait_for("The device is ready.*Enter goes on")
+    again.type("\n")
     assert "1 answers are on disk" in again.wait_for("Press Enter to begin")
     again.type("q\n")
     assert again.end() == 130

@@ -17,7 +17,8 @@ from typing import IO
 
 from study.errors import ExitCode
 from study.tui.link.child_process import start_child
-from study.tui.link.messages import ErrorText, Failed, FromEngine, Heartbeat, Opened, ToEngine
+from study.tui.link.from_engine import ErrorText, Failed, FromEngine, Opened
+from study.tui.link.to_engine import Heartbeat, ToEngine
 
 CLOSING_S = 6.0
 """An engine that lost its screen has ended itself long before."""

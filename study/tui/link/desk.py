@@ -11,29 +11,31 @@ from study.devices.device import Device
 from study.errors import WrongUseError
 from study.session.archive_views import HomeView
 from study.store.archive import SessionFolder, find_session
-from study.tui.link.messages import (
-    Analyze,
-    AskBeside,
-    Begin,
-    Command,
+from study.tui.link.from_engine import (
     Diagnosis,
     Finished,
     Home,
     Opened,
     Preparing,
     Results,
-    Resume,
     Session,
-    SessionOrder,
-    ShowDiagnosis,
-    ShowHome,
-    ShowSession,
     Trouble,
-    Withdraw,
     Withdrawn,
 )
 from study.tui.link.remote_display import RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
+from study.tui.link.to_engine import (
+    Analyze,
+    AskBeside,
+    Begin,
+    Command,
+    Resume,
+    SessionOrder,
+    ShowDiagnosis,
+    ShowHome,
+    ShowSession,
+    Withdraw,
+)
 from study.workflows.ask_session import ask_session
 from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.display import PersonsHand

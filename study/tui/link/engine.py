@@ -17,8 +17,9 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from study.errors import ExitCode, StudyError
-from study.tui.link.messages import Command, ErrorText, Failed
+from study.tui.link.from_engine import ErrorText, Failed
 from study.tui.link.screen_link import ScreenLink
+from study.tui.link.to_engine import Command
 
 if TYPE_CHECKING:
     from study.tui.link.desk import Desk

@@ -22,8 +22,9 @@ from study.session.views import (
     Welcome,
 )
 from study.session.views import Reply as Answer
-from study.tui.link.messages import Ask, Call, Close, Feedback, LookUpdate, Reply, Trouble
+from study.tui.link.from_engine import Ask, Call, Close, Feedback, LookUpdate, Trouble
 from study.tui.link.screen_link import ScreenLink
+from study.tui.link.to_engine import Reply
 from study.workflows.display import SignOfLife
 
 GLANCE_S = 0.04

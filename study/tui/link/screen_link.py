@@ -6,7 +6,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 
-from study.tui.link.messages import Command, FromEngine, Heartbeat, LetGo, Relay, Reply, ToEngine
+from study.tui.link.from_engine import FromEngine
+from study.tui.link.to_engine import Command, Heartbeat, LetGo, Relay, Reply, ToEngine
 from study.workflows.requests_port import QueuedRequests
 
 

@@ -13,6 +13,8 @@ from study.session.participant_codes import code_problem, is_code, next_code
 from study.tui.home_messages import BeginWanted
 
 SIMULATED = "simulated"
+NOTHING_YET = [("…", "")]
+"""Until the choices are known. Nothing can be chosen that is none of them."""
 
 
 class NewSessionForm(Vertical):
@@ -39,10 +41,10 @@ class NewSessionForm(Vertical):
             yield Input(placeholder="code, such as P01", compact=True, id="code", max_length=64)
         with Horizontal(classes="field"):
             yield Label("Protocol")
-            yield Select[str]((), prompt="…", compact=True, id="protocol", disabled=True)
+            yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="protocol", disabled=True)
         with Horizontal(classes="field"):
             yield Label("Device")
-            yield Select[str]((), prompt="…", compact=True, id="device", disabled=True)
+            yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="device", disabled=True)
         yield Static("", id="about", markup=False)
         yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
 
@@ -119,11 +121,10 @@ class NewSessionForm(Vertical):
     def _offer(self, which: str, options: list[tuple[str, str]]) -> None:
         select: Select[str] = self.query_one(which, Select)
         before = select.value
-        values = [value for _, value in options]
-        select.set_options(options)
+        values = [value for _, value in options or NOTHING_YET]
+        select.set_options(options or NOTHING_YET)
         select.disabled = not options
-        if options:
-            select.value = before if before in values else values[0]
+        select.value = before if before in values else values[0]
 
     def _about(self, text: str, kind: str) -> None:
         about = self.query_one("#about", Static)

@@ -12,7 +12,8 @@ import pytest
 from study.store.log_writer import somebody_writes
 from study.tui.app import HapteqApp
 from study.tui.app_start import AppStart
-from study.tui.link.messages import Begin, Failed, Finished, SessionOrder
+from study.tui.link.from_engine import Failed, Finished
+from study.tui.link.to_engine import Begin, SessionOrder
 
 SIZE = (100, 30)
 SHORT = {

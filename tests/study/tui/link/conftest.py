@@ -12,18 +12,8 @@ import pytest
 from study.session.form_views import FormReply
 from study.session.views import AfterPause, Answered, DemoDone
 from study.tui.link.client import EngineClient
-from study.tui.link.messages import (
-    Ask,
-    Begin,
-    Call,
-    Failed,
-    Finished,
-    FromEngine,
-    Heartbeat,
-    Reply,
-    SessionOrder,
-    ToEngine,
-)
+from study.tui.link.from_engine import Ask, Call, Failed, Finished, FromEngine
+from study.tui.link.to_engine import Begin, Heartbeat, Reply, SessionOrder, ToEngine
 
 SHORT = {"after_run_s = 2.0": "after_run_s = 0.1", "trial_limit = 4": "trial_limit = 1"}
 

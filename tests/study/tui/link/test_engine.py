@@ -12,25 +12,18 @@ import pytest
 from study.session.requests import NoteAsked, PauseAsked, StopAsked
 from study.session.views import Answered
 from study.store.log_writer import somebody_writes
-from study.tui.link.messages import (
-    Ask,
+from study.tui.link.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
+from study.tui.link.to_engine import (
     AskBeside,
     Begin,
-    Call,
-    Close,
-    Failed,
-    Finished,
-    Home,
     LetGo,
     Relay,
     Reply,
     Resume,
-    Session,
     SessionOrder,
     ShowHome,
     ShowSession,
     Withdraw,
-    Withdrawn,
 )
 
 ROOT = Path(__file__).parents[4]
@@ -178,7 +171,8 @@ import importlib.util
 spec = importlib.util.spec_from_file_location("scripted", {conftest!r})
 scripted = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(scripted)
-from study.tui.link.messages import Ask, Begin, Call, SessionOrder
+from study.tui.link.from_engine import Ask, Call
+from study.tui.link.to_engine import Begin, SessionOrder
 screen = scripted.ScriptedScreen()
 screen.send(Begin(SessionOrder({protocol!r}, "simulated", "P01", {data!r}, seed=4)))
 for _ in range(3):

@@ -22,9 +22,10 @@ from study.session.views import (
     RestNotice,
     Unanswered,
 )
-from study.tui.link.messages import Ask, Call, Close, Heartbeat, LookUpdate, Reply
+from study.tui.link.from_engine import Ask, Call, Close, LookUpdate
 from study.tui.link.remote_display import SILENT_AFTER_S, RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
+from study.tui.link.to_engine import Heartbeat, Reply
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE)

@@ -1,0 +1,103 @@
+"""What the screen says to the engine. Values only, pickled over a pipe, and light to import."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from study.session.requests import Request
+
+
+@dataclass(frozen=True, slots=True)
+class SessionOrder:
+    """A new session, as somebody asks for it."""
+
+    protocol: str
+    """A shipped protocol's name, or a file."""
+    device: str
+    subject: str
+    data: str
+    seed: int | None = None
+    """None: drawn, and logged."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowHome:
+    data: str
+    protocol: str = ""
+    """What is offered first; so is the device."""
+    device: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowSession:
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShowDiagnosis:
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    order: SessionOrder
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    session: str
+    """Folder, or its name in the data folder."""
+    device: str
+    data: str
+
+
+@dataclass(frozen=True, slots=True)
+class Analyze:
+    """Write the tables and the report of one session, and show it."""
+
+    session: str
+
+
+@dataclass(frozen=True, slots=True)
+class Withdraw:
+    """Erase all sessions of this session's participant. Whoever sends it has asked twice."""
+
+    session: str
+
+
+@dataclass(frozen=True, slots=True)
+class AskBeside:
+    """Ask a session that runs in another program."""
+
+    session: str
+    request: Request
+
+
+@dataclass(frozen=True, slots=True)
+class Relay:
+    """To the running session, as a second terminal could ask for it: a note, a pause, a stop."""
+
+    request: Request
+
+
+@dataclass(frozen=True, slots=True)
+class LetGo:
+    """Ctrl-C: force off at once, whatever the engine is doing. What it is doing ends; a session can be resumed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """The event loop of the screen is alive. Ten times a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """To the `Ask` of the same number. A number that is over is ignored."""
+
+    number: int
+    value: Any
+
+
+Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | AskBeside
+"""What the engine works through, one after the other."""
+
+ToEngine = Command | Relay | LetGo | Heartbeat | Reply
