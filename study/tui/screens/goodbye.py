@@ -34,8 +34,9 @@ class GoodbyeScreen(Screen[None]):
                 yield Said("Thank you! This was the last trial.", classes="strong")
             else:
                 yield Said(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
-            yield Said(f"{_answers(notice.answers)} on the disk.", classes="gap")
-            if not notice.finished:
+            if notice.answers:
+                yield Said(f"{_answers(notice.answers)} on the disk.", classes="gap")
+            if notice.answers and not notice.finished:
                 yield Said("It can be resumed at the trial where it stopped.", classes="gap")
             yield Said("You may let go of the handle. Press Enter to close this page.", classes="gap")
         yield Footer(show_command_palette=False)
