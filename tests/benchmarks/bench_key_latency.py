@@ -22,6 +22,7 @@ ROWS, COLUMNS = 40, 120
 FRAMES = 5
 KEYS = 100
 QUIET_S = 0.25
+ARMED = "TrialScreen!"
 
 KEY_MS, FRAME_S, BLOCK_MS = 30.0, 0.6, 50.0
 TIMES_THE_PEER = 12.0
@@ -37,9 +38,9 @@ start_n = 1.0
 cap_n = 3.0
 up_after_wrong = 1
 down_after_right = 3
-steps = [{ step_db = 4.0, reversals = 2 }, { step_db = 1.0, reversals = 7 }]
-reversals = 9
-averaged_reversals = 7
+steps = [{ step_db = 4.0, reversals = 2 }, { step_db = 1.0, reversals = 5 }]
+reversals = 7
+averaged_reversals = 5
 [directions]
 [safety]
 stimulus_cap_n = 3.0
@@ -108,8 +109,7 @@ class Pty:
         os.write(self.end, text.encode())
 
     def key_ms(self, key: str) -> float:
-        """From the key to the first output that it causes."""
-        self.drain(QUIET_S)
+        """From the key to the first output that it causes: nothing else may be drawn at that time."""
         typed_s = time.monotonic()
         self.type(key)
         if not self.read(2.0):
@@ -194,7 +194,10 @@ def session(folder: Path) -> tuple[list[float], dict[str, float]]:
         while news.state != "OutcomeScreen" and time.monotonic() < until_s:
             screen.read(0.01)
             news.take()
-            if news.state == "TrialScreen!":
+            if news.state == ARMED:
+                screen.drain(QUIET_S)
+                news.take()
+            if news.state == ARMED:
                 keys_ms.append(screen.key_ms("12"[len(keys_ms) % 2]))
             elif news.state in ("DeviceCheckScreen", "InstructionsScreen", "RestScreen", "GoodbyeScreen"):
                 screen.drain(QUIET_S)
@@ -206,7 +209,10 @@ def session(folder: Path) -> tuple[list[float], dict[str, float]]:
 def peer_keys() -> list[float]:
     with terminal([sys.executable, "-c", PEER]) as screen:
         screen.read_until(b"ready")
-        keys = [screen.key_ms("12"[n % 2]) for n in range(KEYS)]
+        keys = []
+        for n in range(KEYS):
+            screen.drain(QUIET_S)
+            keys.append(screen.key_ms("12"[n % 2]))
         screen.type("q")
     return keys
 
