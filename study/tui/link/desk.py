@@ -64,6 +64,9 @@ class Desk:
     def perform(self, command: Command) -> None:
         """Raises StudyError where it cannot be done, KeyboardInterrupt where somebody let go."""
         self.opened = None
+        # From here on a signal interrupts. What came before found nobody to interrupt.
+        if self._link.taken_is_let_go:
+            raise KeyboardInterrupt
         match command:
             case ShowHome():
                 self._link.send(Home(_offered(command)))

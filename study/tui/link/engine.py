@@ -57,13 +57,13 @@ class Engine:
                     self._fail(INTERRUPTED, ExitCode.INTERRUPTED)
 
     def _next_command(self) -> Command | None:
-        if self._link.commands.empty():
+        if not self._link.command_waits:
             self._warm_up()
-        return self._link.commands.get()
+        return self._link.next_command()
 
     def _warm_up(self) -> None:
         for name in ("study.tui.link.desk", *NEEDED_FOR_A_SESSION):
-            if self._link.commands.empty():
+            if not self._link.command_waits:
                 import_module(name)
 
     def _perform(self, command: Command) -> None:

@@ -16,8 +16,9 @@ class ScreenLink:
     gone. Both are called from the reading thread."""
 
     def __init__(self, connection: Connection, interrupt: Callable[[], None], gone: Callable[[], None]) -> None:
-        self.commands: SimpleQueue[Command | None] = SimpleQueue()
-        """None: the screen is gone."""
+        self._commands: SimpleQueue[Command | None] = SimpleQueue()
+        self._heard, self._taken, self._let_go_up_to = 0, 0, 0
+        """Commands, counted: one that is let go of may not have been begun, or not even taken."""
         self.requests = QueuedRequests()
         self.stop_device: Callable[[], None] | None = None
         """While a device is open: what takes its force away from any thread."""
@@ -41,6 +42,21 @@ class ScreenLink:
             self.ended = True
             raise KeyboardInterrupt from None
 
+    def next_command(self) -> Command | None:
+        """Waits for it. None: the screen is gone."""
+        command = self._commands.get()
+        self._taken += 1
+        return command
+
+    @property
+    def command_waits(self) -> bool:
+        return not self._commands.empty()
+
+    @property
+    def taken_is_let_go(self) -> bool:
+        """Whether somebody let go after the command that was taken last had been sent."""
+        return self._taken <= self._let_go_up_to
+
     def reply(self, patience_s: float) -> Reply | None:
         """The next reply, whatever its number. Raises KeyboardInterrupt where the screen is gone."""
         if self.ended:
@@ -61,7 +77,7 @@ class ScreenLink:
         except (EOFError, OSError):
             self.ended = True
         self._let_go()
-        self.commands.put(None)
+        self._commands.put(None)
         self._gone()
 
     def _take(self, message: ToEngine) -> None:
@@ -77,10 +93,12 @@ class ScreenLink:
             case LetGo():
                 self._let_go()
             case _:
-                self.commands.put(message)
+                self._heard += 1
+                self._commands.put(message)
 
     def _let_go(self) -> None:
         """The main thread takes the force away too, but it may be waiting for a disk or a driver."""
+        self._let_go_up_to = self._heard
         self._interrupt()
         if (stop := self.stop_device) is not None:
             stop()

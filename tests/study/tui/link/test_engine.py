@@ -88,6 +88,17 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     assert begun.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2
 
 
+def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, session):
+    screen.send(Begin(order))
+    screen.send(LetGo())
+    failure = screen.next()
+    assert isinstance(failure, Failed)
+    assert (failure.error.title, failure.path) == ("Interrupted", "")
+    assert not session.exists()
+    screen.send(Begin(order))
+    screen.wait_for(asks(Call.WELCOME))
+
+
 def test_a_reply_to_what_is_over_is_ignored(begun, session):
     trial = third_trial(begun)
     begun.send(Reply(trial.number - 1, Answered(2, time.monotonic())))
