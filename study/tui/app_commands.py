@@ -35,9 +35,14 @@ TITLES = {
     "note(False)": "Take a note",
     "note(True)": "Note an adverse event",
     "suspend_process": "Suspend",
+    "watch": "Watch this session",
+    "pause": "Pause",
+    "next_theme": "Light, dark or high contrast",
+    "heard(1)": "",
+    "heard(2)": "",
     "command_palette": "",
 }
-"""Of actions whose bindings are too short to say it; an empty one is no command."""
+"""Of actions whose bindings are too short to say it, or not in the footer; an empty one is no command."""
 
 
 def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
@@ -47,7 +52,8 @@ def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
         binding = active.binding
         action = binding.action.removeprefix("app.").removeprefix("screen.")
         title = TITLES.get(action, binding.tooltip or binding.description)
-        if not title or not active.enabled or action in told:
+        hidden = not binding.show and action not in TITLES
+        if hidden or not title or not active.enabled or action in told:
             continue
         told.add(action)
         key = app.get_key_display(binding)
