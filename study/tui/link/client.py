@@ -10,6 +10,7 @@ import socket
 import subprocess
 import tempfile
 import threading
+import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
@@ -75,8 +76,8 @@ class EngineClient:
             writer = threading.Thread(target=self._write, args=(connection,), name="engine-writer", daemon=True)
             writer.start()
             self._read(connection)
-            code = process.wait()
             self._outbox.put(None)
+            code = _code_at_end(process)
             writer.join()
             connection.close()
             if not self._closing:
@@ -84,12 +85,16 @@ class EngineClient:
                 self._deliver(_death(code, _last_words(said), self._opened))
 
     def _read(self, connection: Connection) -> None:
-        with contextlib.suppress(EOFError, OSError):
+        try:
             while True:
                 message: FromEngine = connection.recv()
                 if isinstance(message, Opened):
                     self._opened = message
                 self._deliver(message)
+        except (EOFError, OSError):
+            return
+        except Exception:  # noqa: BLE001 - what cannot be understood is the end of the engine, and is told as that
+            traceback.print_exc()
 
     def _write(self, connection: Connection) -> None:
         with contextlib.suppress(OSError):
@@ -98,6 +103,15 @@ class EngineClient:
         # The engine sees the end of the pipe, and this side the end of the engine.
         with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
             end.shutdown(socket.SHUT_WR)
+
+
+def _code_at_end(process: "subprocess.Popen[bytes]") -> int:
+    """Of an engine whose pipe has ended; it ends by itself, or by force."""
+    try:
+        return process.wait(CLOSING_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
 
 
 def _not_started(problem: OSError) -> Failed:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
@@ -75,10 +76,16 @@ class ScreenLink:
             while True:
                 self._take(self._connection.recv())
         except (EOFError, OSError):
+            pass
+        except Exception:  # noqa: BLE001 - an engine that understands nothing any more must not go on
+            traceback.print_exc()
+        finally:
             self.ended = True
-        self._let_go()
-        self._commands.put(None)
-        self._gone()
+            self._commands.put(None)
+            try:
+                self._let_go()
+            finally:
+                self._gone()
 
     def _take(self, message: ToEngine) -> None:
         # Whatever comes was sent by a living screen; only heartbeats come all the time.

@@ -172,3 +172,16 @@ def test_a_wait_gives_signs_of_life_twenty_times_a_second(screen):
 
     screen.display.ask(QUESTION, sign)
     assert max(later - earlier for earlier, later in pairwise(signs)) < 0.1
+
+
+def test_an_engine_that_understands_nothing_any_more_stops_its_device_and_ends(screen, capfd):
+    stopped = threading.Event()
+    screen.link.stop_device = stopped.set
+    screen.fall_silent()
+    time.sleep(0.15)
+    screen.pipe.send_bytes(b"nothing that was pickled")
+    assert stopped.wait(2.0)
+    assert screen.link.next_command() is None
+    with pytest.raises(KeyboardInterrupt):
+        screen.display.await_return("a reason")
+    assert "UnpicklingError" in capfd.readouterr().err
