@@ -124,7 +124,7 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
         if text:
             write_note(session, text, adverse)
     if pause:
-        _ask_for(session, PauseAsked("experimenter"), "Paused. The participant goes on at the own screen.")
+        _ask_for(session, PauseAsked("experimenter"), "Paused. The participant goes on at their own screen.")
 
 
 def _ask_for(session: "SessionFolder", request: "Request", said: str) -> None:

@@ -11,6 +11,8 @@ NEEDED_LATER = (
     "textual.widgets._markdown",
     "study.tui.screens.session",
     "study.tui.app_commands",
+    "study.tui.screens.watch",
+    "study.tui.link.watch_feed",
 )
 
 

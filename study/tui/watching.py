@@ -26,6 +26,9 @@ class Watching:
 
     def open(self, path: str, ask: Callable[[Request], object]) -> None:
         """Returns at once: the feed is started in a thread, because starting a process takes its time."""
+        if self._screen is not None and self._app.screen is self._screen:
+            self.close()  # the key that opens it closes it
+            return
         if self._starting or (self._screen is not None and self._screen in self._app.screen_stack):
             return
         self._starting = True

@@ -67,7 +67,8 @@ class InstructionsScreen(Screen[None]):
 
 
 def _welcome_back(answers: int) -> str:
-    return f"Welcome back: {answers} answers are on the disk. The study goes on where it stopped."
+    kept = "1 answer is" if answers == 1 else f"{answers} answers are"
+    return f"Welcome back: {kept} on the disk. The study goes on where it stopped."
 
 
 def _how(keys: AnswerKeys) -> str:

@@ -85,10 +85,9 @@ def gauges(view: WatchView) -> Content:
 
 def details(view: WatchView) -> Content:
     who = f"simulated '{view.observer}'" if view.observer else "a person"
+    answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
     parts: list[Piece] = [
-        *_section(
-            "Session", [f"{view.subject}, {who}, {view.answers} answers", view.protocol, f"Device: {view.device}"]
-        ),
+        *_section("Session", [f"{view.subject}, {who}, {answers}", view.protocol, f"Device: {view.device}"]),
         *_section("Forms", [f"{local_time(f.utc)}  {f.form}: {_passed(f.passed)}" for f in view.forms]),
         *_section(
             "Practice",
