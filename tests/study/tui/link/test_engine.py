@@ -206,7 +206,7 @@ def test_a_killed_screen_takes_the_engine_with_it_and_loses_nothing(screen, orde
     other.kill()
     other.wait()
     other.stdout.close()
-    assert gone_within(engine, 1.5)
+    assert gone_within(engine, 4.5)  # about one on a machine that is not busy; its last resort comes at five
     assert "session_interrupted" in log_of(session).splitlines()[-1]
     screen.send(Resume("P01_001", "simulated", order.data))
     assert screen.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2
