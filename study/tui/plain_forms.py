@@ -67,7 +67,10 @@ def _understood(field: FormField, line: Line, numbered: bool) -> str | None:
         return None if line.word in (BACK, "q") else text
     if numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
-    return next((choice for choice in field.choices if choice.casefold() == text.casefold()), None)
+    meant = [choice for choice in field.choices if choice.casefold() == text.casefold()]
+    # As on the screen, a beginning will do that only one choice has: y for yes.
+    meant = meant or [choice for choice in field.choices if choice.casefold().startswith(text.casefold())]
+    return meant[0] if len(meant) == 1 else None
 
 
 def _prompt(field: FormField, numbered: bool) -> str:
