@@ -15,8 +15,8 @@ class FormOutcome:
     passed: bool
     kept: dict[str, str]
     """Of the answers, what goes into the log."""
-    reminders: tuple[str, ...] = ()
-    """Where the set-up is not what the protocol asks for."""
+    reminder: str = ""
+    """Where the set-up is not what the protocol asks for; empty where it is."""
 
 
 def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
@@ -41,7 +41,7 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
             # Which question it was is about somebody's health, and no study needs it.
             return FormOutcome(all(answer == "no" for answer in answers.values()), {})
         case FormKind.SETUP:
-            return FormOutcome(True, answers, _reminders(protocol.setup, answers))
+            return FormOutcome(True, answers, _reminder(protocol.setup, answers))
         case FormKind.DEBRIEF:
             return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
 
@@ -100,13 +100,14 @@ def _asked(question: str, wish: str, wished: bool) -> str:
     return f"{question} {wish}" if wished else question
 
 
-def _reminders(settings: SetupSettings, answers: dict[str, str]) -> tuple[str, ...]:
+def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
     differing = (
-        (settings.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
-        (settings.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
-        (settings.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
+        (setup.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
+        (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
+        (setup.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
     )
-    return tuple(f"The set-up is not the protocol's: {what}." for differs, what in differing if differs)
+    told = ", ".join(what for differs, what in differing if differs)
+    return f"The set-up is not the protocol's: {told}." if told else ""
 
 
 def _debrief(questions: tuple[DebriefQuestion, ...]) -> Form:

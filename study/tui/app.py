@@ -35,7 +35,8 @@ OPENING = "Preparing the device: some ten seconds the first time."
 
 class HapteqApp(App[None]):
     TITLE = "hapteq"
-    CSS = "Toast { max-width: 76; }"
+    # At the top: the keys and what to press next stand at the bottom.
+    CSS = "ToastRack { align: right top; } Toast { max-width: 76; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f1,question_mark", "help", "Help", key_display="F1"),
         Binding("f2", "watch", "Watch", show=False),

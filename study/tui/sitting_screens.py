@@ -18,7 +18,7 @@ from study.tui.screens.preparing import PreparingScreen
 if TYPE_CHECKING:
     from study.tui.screens.trial import TrialScreen
 
-TROUBLE_FOR_S = 15.0
+TROUBLE_FOR_S = 8.0
 
 
 class SittingScreens:
@@ -65,9 +65,10 @@ class SittingScreens:
             self._preparing = PreparingScreen(sentence)
             await self._app.push_screen(self._preparing)
             return
+        covered = self._app.screen is not self._preparing
         while self._app.screen is not self._preparing and self._preparing in self._app.screen_stack:
             self._app.pop_screen()
-        self._preparing.say(sentence)
+        self._preparing.say(sentence, afresh=covered)
 
     async def _ask(self, ask: Ask) -> None:
         self._drop()

@@ -84,7 +84,6 @@ def _run(opened: OpenedSession, device: Device, participant: Participant) -> Con
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
-    inbox.clear()
     attendant = Attendant(
         device,
         participant.clock,

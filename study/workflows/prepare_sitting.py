@@ -38,9 +38,9 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
         answers=outcome.kept,
     )
     state = record(state, event, sitting)
-    for reminder in outcome.reminders:
-        sitting.display.trouble(reminder)
-        sitting.attendant.note(NoteAsked("program", reminder))
+    if outcome.reminder:
+        sitting.display.trouble(outcome.reminder)
+        sitting.attendant.note(NoteAsked("program", outcome.reminder))
     return state
 
 

@@ -16,6 +16,7 @@ from study.session.stimulus import direction_vector
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend
 from study.store.provenance import versions
+from study.store.request_inbox import RequestInbox
 from study.store.session_lock import locked
 from study.store.trial_recordings import find_trial_recording, recording_name
 from study.workflows.fold_session import fold_session
@@ -27,6 +28,8 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
     """An existing session, mended and locked as long as the context lasts."""
     with locked(folder.path):
         log = EventLog.reopen(folder.log)
+        # Yesterday's stop must not end today's sitting; from now on somebody hears.
+        RequestInbox(folder.path).clear()
         try:
             folded = fold_session(folder)
             _check_resumable(folded.state, device, folder)

@@ -6,11 +6,14 @@ import pty
 import re
 import select
 import signal
+import struct
 import subprocess
 import sys
 import termios
 import time
 from pathlib import Path
+
+ESCAPE_SEQUENCE = re.compile(r"\x1b(\[[0-9;?<>=]*[A-Za-z]|[=>])")
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -24,6 +27,7 @@ def _own_the_terminal() -> None:
 class Terminal:
     def __init__(self, *arguments: str) -> None:
         self._master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
         paths = os.pathsep.join((str(ROOT), str(ROOT / "study" / "launcher")))
         self.process = subprocess.Popen(
             [sys.executable, "-m", "study", *arguments],
@@ -53,6 +57,14 @@ class Terminal:
             elif self.process.poll() is not None:
                 raise AssertionError(f"the program ended without '{pattern}':\n{fresh[-2000:]}")
         return " ".join(fresh.split())
+
+    def drain(self, seconds: float) -> str:
+        """What is printed within so many seconds, escape sequences left out."""
+        until_s, fresh = time.monotonic() + seconds, ""
+        while (left_s := until_s - time.monotonic()) > 0:
+            if select.select([self._master], [], [], left_s)[0]:
+                fresh += self._read()
+        return ESCAPE_SEQUENCE.sub("", fresh)
 
     def end(self, timeout_s: float = 60.0) -> int:
         """Read to the end; returns the exit code."""

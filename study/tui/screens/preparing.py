@@ -46,9 +46,11 @@ class PreparingScreen(Screen[None]):
     def on_mount(self) -> None:
         self.set_interval(TICK_S, self._tick)
 
-    def say(self, sentence: str) -> None:
-        """What is going on now; the time goes on."""
+    def say(self, sentence: str, afresh: bool = False) -> None:
+        """What is going on now; the time goes on, but where this is another wait (afresh)."""
         self._sentence = sentence
+        if afresh:
+            self._began_s = self._now_s()
         if self.query("#sentence"):
             self.query_one("#sentence", Static).update(sentence)
 

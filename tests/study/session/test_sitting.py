@@ -293,10 +293,7 @@ def test_a_set_up_that_is_not_the_protocols_is_said(full):
     outcome = judge_form(full, FormKind.SETUP, FormReply(answers))
     assert outcome.passed
     assert outcome.kept == answers
-    assert outcome.reminders == (
-        "The set-up is not the protocol's: the device can be heard.",
-        "The set-up is not the protocol's: the hand can be seen.",
-    )
+    assert outcome.reminder == "The set-up is not the protocol's: the device can be heard, the hand can be seen."
 
 
 def test_a_form_knows_what_is_missing(full):

@@ -1,0 +1,138 @@
+"""A person with real keys at the real screen, from the start to the report, with a kill in the middle."""
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from protocols.loading import load_protocol
+from study.devices.clock import VirtualClock
+from study.participants.observers import observer_named
+from study.session.views import Answered
+from study.store.archive import SessionFolder
+from study.workflows.conduct_session import Participant, conduct_new
+from study.workflows.fold_session import fold_session
+from study.workflows.open_session import SessionPlan
+from study.workflows.simulated_display import SimulatedDisplay
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from terminal import Terminal
+
+FELT_S = 0.3
+SEED = 4
+
+
+class AtTheScreen:
+    """Presses Enter where something is to be read, and answers trials, 1 and 2 in turn."""
+
+    def __init__(self, terminal: Terminal, session: Path) -> None:
+        self.terminal = terminal
+        self._log = session / "events.jsonl"
+        self._answered: set[tuple[int, int, int]] = set()
+
+    def events(self) -> list[dict]:
+        if not self._log.exists():
+            return []
+        whole = self._log.read_bytes().rpartition(b"\n")[0]
+        return [json.loads(line) for line in whole.splitlines()]
+
+    def sit(self, until, timeout_s: float = 120.0) -> None:
+        give_up_s = time.monotonic() + timeout_s
+        while not until(self.events()):
+            assert time.monotonic() < give_up_s, self.terminal.screen[-3000:]
+            assert self.terminal.process.poll() is None, self.terminal.screen[-3000:]
+            self._act(self.events())
+
+    def _act(self, events: list[dict]) -> None:
+        last = events[-1] if events else {}
+        if last.get("event") != "trial_presented":
+            self.terminal.type("\r")
+            self.terminal.drain(0.25)
+            return
+        trial = (last["run"], last["trial"], last["attempt"])
+        if trial not in self._answered:
+            self._answered.add(trial)
+            self.terminal.drain(FELT_S)
+            self.terminal.type("12"[len(self._answered) % 2])
+        self.terminal.drain(0.1)
+
+
+def answers(events: list[dict]) -> int:
+    return sum(event["event"] == "answer_given" for event in events)
+
+
+def closed(events: list[dict]) -> bool:
+    return any(event["event"] == "session_closed" for event in events)
+
+
+@pytest.fixture
+def at_the_screen(tmp_path, small_file):
+    seats = []
+
+    def sit_down(command: str, *more: str) -> AtTheScreen:
+        terminal = Terminal(command, *more, "--data", str(tmp_path / "data"))
+        seats.append(AtTheScreen(terminal, tmp_path / "data" / "P07_001"))
+        return seats[-1]
+
+    yield sit_down
+    for seat in seats:
+        seat.terminal.close()
+
+
+class SaysTheSame(SimulatedDisplay):
+    """Gives the answers that somebody else gave."""
+
+    def __init__(self, given: list[int], clock: VirtualClock) -> None:
+        super().__init__(observer_named("ideal", SEED), SEED, clock)
+        self._given = iter(given)
+
+    def ask(self, question, sign_of_life):
+        super().ask(question, sign_of_life)
+        return Answered(next(self._given), self._clock.now_s())
+
+
+def headless(given: list[int], text: str, data: Path):
+    clock = VirtualClock()
+    display = SaysTheSame(given, clock)
+    plan = SessionPlan(load_protocol(text, "small"), text, False, "H1", "ideal", SEED, data, participant_number=0)
+    return conduct_new(plan, "simulated", Participant(display=display, hand=display, clock=clock)).state
+
+
+@pytest.mark.timeout(280)
+def test_from_the_start_to_the_report_with_a_kill_in_the_middle(at_the_screen, small_file, small_text, tmp_path):
+    text = small_text.replace("[25.0, 35.0]", "[25.0]")
+    small_file.write_text(text)
+    first = at_the_screen("study", "--protocol", str(small_file), "--seed", str(SEED))
+    first.terminal.wait_for("New session")
+    first.terminal.wait_for("A small study for tests")
+    first.terminal.type("P07")
+    first.terminal.drain(0.5)
+    first.terminal.type("\x1b[15~")  # F5
+    first.terminal.wait_for("Device check")
+    first.sit(until=lambda events: answers(events) >= 6)
+    first.terminal.kill()
+    before = answers(first.events())
+
+    again = at_the_screen("resume", "P07_001")
+    again.terminal.wait_for("Device check")
+    again.sit(until=closed)
+    again.terminal.wait_for("Thank you")
+    again.terminal.type("\r")
+    again.terminal.wait_for("Leave hapteq")
+    again.terminal.type("q")
+    assert again.terminal.end() == 0
+    assert "Report:" in again.terminal.screen
+
+    session = SessionFolder(tmp_path / "data" / "P07_001")
+    state = fold_session(session).state
+    assert state.closed
+    assert answers(again.events()) >= before
+    assert "Nothing was felt" in (session.path / "analysis" / "report.html").read_text()
+
+    counted = [trial for trial in state.trials if trial.counts]
+    other = headless([trial.answer for trial in counted], text, tmp_path / "headless")
+    drawn = [(t.run, t.trial, t.phase, t.frequency_hz, t.level_n, t.answer) for t in counted]
+    assert drawn == [(t.run, t.trial, t.phase, t.frequency_hz, t.level_n, t.answer) for t in other.trials]
