@@ -17,7 +17,7 @@ from study.session.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.key_presses import KeyPresses, arrival_s
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
-from study.tui.trial_words import heading
+from study.tui.trial_words import heading, run_name
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.said import Said
 from study.tui.widgets.session_bar import SessionBar
@@ -105,6 +105,8 @@ class TrialScreen(Screen[None]):
     def arm(self, question: Question) -> None:
         """From now on one reply counts."""
         self._drop_limit()
+        if self._question is not None and run_name(question) != run_name(self._question):
+            self._verdict = ""  # of practice: nothing is told about the answers that come now
         self._question, self._taken = question, 0
         # Its own trial ends a moment after the answer: it could not be read if it went with it.
         last, self._verdict = self._verdict, ""

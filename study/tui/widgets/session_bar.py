@@ -21,7 +21,9 @@ class SessionBar(Widget):
 
     def render_line(self, y: int) -> Strip:
         width = self.size.width
-        right = self._told(max(8, min(40, width // 4)))
+        # The bar gives way to the words, which must not be cut off.
+        room = width - len(self.heading) - 1 - len(self._told(0))
+        right = self._told(max(8, min(40, width // 4, room)))
         left = self.heading[: max(0, width - len(right) - 1)]
         gap = " " * (width - len(left) - len(right))
         style = self.rich_style

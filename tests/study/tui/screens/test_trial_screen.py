@@ -283,3 +283,30 @@ def test_what_a_participant_must_not_know_changes_no_cell(on_stage, hidden, task
 
     on_stage(screen, story)
     assert seen[0] == seen[1]
+
+
+def test_feedback_of_practice_is_not_read_in_a_run_that_counts(on_stage):
+    screen = TrialScreen()
+
+    async def story(stage):
+        screen.arm(replace(QUESTION, practice=True))
+        await stage.press("2")
+        screen.show_feedback(False)
+        screen.arm(QUESTION)
+        await stage.pilot.pause()
+        assert "Last answer" not in stage.words
+
+    on_stage(screen, story)
+
+
+def test_at_80_columns_the_bar_gives_way_to_the_longest_heading(on_stage):
+    screen = TrialScreen()
+    far_on = Question(Phase.DETECTION, 2, 5, 112, True, 0.0, PICTURE, task=Task.INTERVAL, progress=Progress(0.42, 123))
+
+    async def story(stage):
+        screen.arm(far_on)
+        await stage.pilot.pause()
+        assert "Interval run 2 of 5, trial 112, once more" in stage.words
+        assert "about 123 min left" in stage.words
+
+    on_stage(screen, story)
