@@ -144,6 +144,8 @@ class HomeScreen(Screen[None]):
         self.query_one("#detail", Static).update("")
         self.query_one("#detail").display = some
         table.show(home.sessions)
+        if some and self.query_one("#empty").has_focus:  # F3 came before the list
+            table.focus()
 
     @on(SessionTable.Looked)
     def _describe(self, looked: SessionTable.Looked) -> None:

@@ -143,7 +143,7 @@ def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_goes_on(sitting, log):
         assert log.read_text().splitlines()[-1].endswith('"event":"session_interrupted"}')
         await person.press("r")
         await person.until("InstructionsScreen")
-        await person.reads("1 answers are on the disk")
+        await person.reads("1 answer is on the disk")
         await person.until("TrialScreen")
         await person.press("ctrl+c", "ctrl+c")
 

@@ -41,6 +41,25 @@ def test_the_first_frame_is_there_before_the_sessions(on_screen, home):
     on_screen(HomeScreen(None), story)
 
 
+def test_the_list_can_be_asked_for_before_it_is_there(on_screen, home):
+    async def story(sight):
+        await sight.press("f3")
+        sight.app.screen.show(home)
+        await sight.pilot.pause()
+        await sight.pilot.pause()
+        assert isinstance(sight.app.screen.focused, SessionTable)
+
+    on_screen(HomeScreen(None), story)
+
+
+def test_only_a_protocol_and_a_device_can_be_chosen(on_screen, home):
+    async def story(sight):
+        for select in sight.app.screen.query(Select):
+            assert not any(value in ("", Select.NULL) for _, value in select._options)
+
+    on_screen(HomeScreen(home), story)
+
+
 def test_a_new_lab_is_told_what_to_do_first(on_screen, home, looks_like):
     async def story(sight):
         looks_like(sight, "home-empty-80x24")
