@@ -23,6 +23,7 @@ REQUEST_VERSION = 1
 
 KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
 _STOP = "stop"
+_NOTE = "note-"
 _WHO = get_args(Who)
 _LARGEST = 1 << 16
 """Bytes of a request that are read; a note is a sentence or two."""
@@ -72,14 +73,16 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """At the start of a sitting: yesterday's stop must not end today's. Never raises."""
+        """At the start of a sitting: yesterday's stop must not end today's. Notes that nobody took any more are kept:
+        they are still for the log. Never raises."""
         try:
             self._folder.mkdir(exist_ok=True)
             names = os.listdir(self._folder)  # noqa: PTH208
         except OSError:
             return
         for name in names:
-            self._remove(name)
+            if not name.startswith(_NOTE):
+                self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
         """Stops first, then the oldest first; what was taken is removed. Never raises."""

@@ -55,7 +55,8 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
         sitting.device.stop()
         raise
     sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers, reason=end.left))
-    return end
+    # As long as the log is open, who notes something is told that the session writes it.
+    return replace(end, state=write_notes(end.state, sitting))
 
 
 def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:

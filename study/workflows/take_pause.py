@@ -24,8 +24,9 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBr
     sitting.attendant.begin("pause")
     started_s = sitting.clock.now_s()
     decision = sitting.display.pause(PauseNotice(reason, state.answers))
-    sitting.attendant.pause_asked = None
     state = write_notes(state, sitting)
+    # Whoever asked for a pause during the pause has had it: cleared only after the last look.
+    sitting.attendant.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
     state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)
     return AfterTheBreak(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

@@ -118,6 +118,7 @@ class Desk:
     @contextlib.contextmanager
     def _participant(self) -> Iterator[Participant]:
         self._link.requests.take()  # what was asked of an earlier session
+        self._link.forget_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
             yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._hear)

@@ -67,6 +67,11 @@ class ScreenLink:
         except Empty:
             return None
 
+    def forget_replies(self) -> None:
+        """What was replied in an earlier sitting, whose questions had the same numbers."""
+        while not self._replies.empty():
+            self._replies.get()
+
     def silent_s(self) -> float:
         """For how long the screen has given no sign of life."""
         return time.monotonic() - self._heard_s

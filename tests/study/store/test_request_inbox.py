@@ -66,12 +66,13 @@ def test_a_stop_is_a_stop_whatever_its_file_holds(inbox, folder, content):
     assert inbox.take() == ()
 
 
-def test_yesterdays_stop_does_not_end_todays_sitting(tmp_path, inbox):
+def test_yesterdays_stop_does_not_end_todays_sitting_and_its_notes_are_not_lost(tmp_path, inbox):
     inbox.send(STOP)
+    inbox.send(PAUSE)
     inbox.send(NOTE)
     today = RequestInbox(tmp_path)
     today.clear()
-    assert today.take() == ()
+    assert today.take() == (NOTE,)
 
 
 @pytest.mark.parametrize(

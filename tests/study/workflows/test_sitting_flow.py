@@ -249,6 +249,20 @@ def test_whoever_withdraws_in_a_pause_ends_the_sitting(plan, small_protocol, sea
     assert end.left == "the participant withdrew"
 
 
+def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protocol, seat, person):
+    person.pause = lambda notice: seat.requests.send(PauseAsked("participant")) or AfterPause.GO_ON
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 3 else None
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert len(of(end, PauseTaken)) == 1
+
+
+def test_what_is_noted_during_the_goodbye_is_in_the_log(plan, small_protocol, seat, person):
+    person.goodbye = lambda notice: seat.requests.send(NoteAsked("experimenter", "a rash", adverse=True))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert not end.left
+    assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
+
+
 def test_leaving_from_a_pause_can_be_resumed(plan, small_protocol, seat, person):
     person.decisions = [AfterPause.LEAVE]
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))

@@ -1,6 +1,7 @@
 """The engine as a process of its own, with a scripted screen at the other end of its pipe."""
 
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -97,6 +98,14 @@ def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, se
     assert not session.exists()
     screen.send(Begin(order))
     screen.wait_for(asks(Call.WELCOME))
+
+
+def test_a_reply_of_an_earlier_sitting_answers_nothing_in_the_next(screen, order):
+    screen.send(Reply(1, True))
+    screen.send(Begin(order))
+    assert screen.wait_for(is_a(Ask)).number == 1
+    with pytest.raises(queue.Empty):
+        screen.next(1.0)
 
 
 def test_a_reply_to_what_is_over_is_ignored(begun, session):
