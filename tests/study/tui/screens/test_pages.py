@@ -24,7 +24,6 @@ from study.tui.answer_keys import parse_keys
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen
-from study.tui.screens.error_panel import ErrorPanel
 from study.tui.screens.goodbye import GoodbyeScreen
 from study.tui.screens.handle import HandleScreen
 from study.tui.screens.instructions import InstructionsScreen
@@ -220,21 +219,6 @@ def test_a_rest_cannot_be_shortened_and_tells_what_is_left(on_stage):
 
     (rested_s,) = on_stage(RestScreen(RestNotice(0.6, 1)), story)
     assert 0.6 <= rested_s < 10.0
-
-
-def test_an_error_says_what_happened_what_is_safe_and_what_to_do(on_stage):
-    async def story(stage):
-        for part in ("Lost", "What happened A [1].", "What is safe B.", "What to do now C."):
-            assert part in stage.words
-        await stage.press("right", "enter")
-
-    assert on_stage(ErrorPanel("Lost", "A [1].", "B.", "C.", ("Again", "Leave")), story) == ["Leave"]
-
-
-def test_an_error_is_closed_by_escape_and_says_nothing_of_what_was_not_at_stake(read):
-    heard, words = read(ErrorPanel("Lost", "A.", "", "C."), "escape")
-    assert heard == ["Close"]
-    assert "What is safe" not in words
 
 
 def test_screens_load_nothing_heavy():

@@ -24,7 +24,6 @@ from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen
-from study.tui.screens.error_panel import ErrorPanel
 from study.tui.screens.form import FormScreen
 from study.tui.screens.goodbye import GoodbyeScreen
 from study.tui.screens.handle import HandleScreen
@@ -96,9 +95,6 @@ SCREENS = {
     "goodbye": lambda: GoodbyeScreen(Goodbye(False, 37, "the participant left")),
     "note": lambda: NoteScreen(adverse=True),
     "confirm_withdrawal": lambda: ConfirmWithdrawal(),
-    "error_panel": lambda: ErrorPanel(
-        "The device is gone", "The force is off.", "37 answers are on disk.", "Check the cable.", ("Again", "Leave")
-    ),
 }  # fmt: skip
 
 
