@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from study.session.due_trial import Present
 from study.session.form_views import Form, FormKind
 from study.session.forms import form_of
-from study.session.sitting_state import minutes_between
+from study.session.sitting_state import dose_now, minutes_between
 from study.session.state import SessionState, due
 from study.session.vibration_dose import a8_mps2
 
@@ -91,7 +91,7 @@ def limit_reached(state: SessionState, utc: str) -> str:
     minutes = minutes_between(state.sitting.began_utc, utc)
     if minutes >= limits.longest_min:
         return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
-    dose = a8_mps2(state.sitting.dose) if state.sitting.moved_utc[:10] == utc[:10] else 0.0
+    dose = a8_mps2(dose_now(state.sitting, utc))
     if dose >= limits.dose_a8_mps2:
         return (
             f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "

@@ -31,8 +31,12 @@ class SittingState:
     moved_utc: str = ""
     """Last time that it moved."""
     dose: Dose = NOTHING
-    """Of the day on which the handle moved last."""
+    """Since the last long rest: see NIGHT_H."""
 
+
+NIGHT_H = 10.0
+"""After so long without a movement a new day begins for the hand. A date would do worse: midnight, in whatever time
+zone, may fall into a sitting."""
 
 REFUSALS = {
     "consent": "consent was not given",
@@ -66,14 +70,18 @@ def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
 
 
 def moved(sitting: SittingState, utc: str) -> SittingState:
-    """The handle moves at this time. On another day than before, the dose starts from nothing."""
-    another_day = sitting.moved_utc[:10] != utc[:10]
+    """The handle moves at this time."""
     return replace(
         sitting,
         began_utc=sitting.began_utc or utc,
         moved_utc=utc,
-        dose=NOTHING if another_day else sitting.dose,
+        dose=dose_now(sitting, utc),
     )
+
+
+def dose_now(sitting: SittingState, utc: str) -> Dose:
+    """What counts today: nothing after a night's rest."""
+    return NOTHING if minutes_between(sitting.moved_utc, utc) >= 60 * NIGHT_H else sitting.dose
 
 
 def exposed(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from protocols.trial import Phase
 from study.session.live import Live
-from study.session.sitting_state import minutes_between
+from study.session.sitting_state import dose_now, minutes_between
 from study.session.vibration_dose import a8_mps2
 from study.session.watch_alarms import Situation, alarms_of
 from study.session.watch_view import ON, Exposure, Standing, WatchView
@@ -127,7 +127,7 @@ def _exposure(watched: Watched, standing: Standing, now_utc: str) -> Exposure:
     return Exposure(
         elapsed_min=max(0.0, minutes_between(sitting.began_utc, until_utc)),
         limit_min=limits.longest_min,
-        dose_a8_mps2=a8_mps2(sitting.dose) if sitting.moved_utc[:10] == until_utc[:10] else 0.0,
+        dose_a8_mps2=a8_mps2(dose_now(sitting, until_utc)),
         dose_limit_mps2=limits.dose_a8_mps2,
     )
 

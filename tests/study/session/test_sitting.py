@@ -225,12 +225,14 @@ def test_a_stimulus_that_nobody_measured_is_told_apart(begun, small_protocol, fa
     assert state.sitting.dose.unmeasured_s == 3.0
 
 
-def test_the_dose_starts_again_on_another_day(begun, small_protocol, facts):
-    state = facts.one_trial(begun(small_protocol), correct=True)
-    state = apply(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
-    before = state.sitting.dose.vibrated_s
-    assert before >= 2.0
-    tomorrow = apply(state, DemoPlayed(UTC.replace("01-01", "01-02"), 25.0, 1.0, 1, 135.0, 2.0))
+def test_the_dose_starts_again_after_a_night_and_not_at_midnight(begun, small_protocol, facts):
+    late = "2026-01-01T23:50:00.000+00:00"
+    state = apply(begun(small_protocol), DemoPlayed(late, 25.0, 1.0, 1, 135.0, 2.0))
+    past_midnight = apply(state, DemoPlayed("2026-01-02T00:10:00.000+00:00", 25.0, 1.0, 1, 135.0, 2.0))
+    assert past_midnight.sitting.dose.vibrated_s == 4.0
+    set_back = apply(state, DemoPlayed(UTC, 25.0, 1.0, 1, 135.0, 2.0))
+    assert set_back.sitting.dose.vibrated_s == 4.0
+    tomorrow = apply(state, DemoPlayed("2026-01-02T11:00:00.000+00:00", 25.0, 1.0, 1, 135.0, 2.0))
     assert tomorrow.sitting.dose.vibrated_s == 2.0
 
 
