@@ -21,9 +21,9 @@ from study.tui.archive_screens import ArchiveScreens, ArchiveWanted, command_for
 from study.tui.departure import leave_with_the_terminal
 from study.tui.engine_line import EngineLine, EngineSaid
 from study.tui.everywhere import EVERYWHERE
+from study.tui.key_names import key_name
 from study.tui.link.from_engine import Failed, Finished
 from study.tui.link.to_engine import AskBeside, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
-from study.tui.key_names import key_name
 from study.tui.load_screens import load_screens
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.sitting_screens import SittingScreens

@@ -84,8 +84,8 @@ class PlainDisplay:
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
         return plain_pause.rest(notice, self._talk, sign_of_life)
 
-    def pause(self, notice: PauseNotice) -> AfterPause:
-        return plain_pause.pause(notice, self._talk, self._note)
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        return plain_pause.pause(notice, self._talk, self._note, sign_of_life)
 
     def await_return(self, reason: str) -> None:
         self._talk.forget()

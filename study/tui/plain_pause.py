@@ -26,13 +26,19 @@ def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> fl
     return talk.clock.now_s() - started_s
 
 
-def pause(notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None) -> AfterPause:
+def pause(
+    notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
+) -> AfterPause:
     talk.forget()
     talk.say("", f"Pause ({notice.reason}). Nothing is played. {notice.answers} answers are on disk.")
     talk.say(_choices(notes=note is not None))
     while True:
         talk.prompt("Enter goes on: ")
-        line = talk.answer()
+        line = talk.wait(sign_of_life)
+        if line is WaitOver.CUT_SHORT:
+            return AfterPause.LEAVE
+        if isinstance(line, WaitOver):
+            raise KeyboardInterrupt
         match line.word:
             case "":
                 return AfterPause.GO_ON

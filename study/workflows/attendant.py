@@ -59,6 +59,8 @@ class Attendant:
         self._device.keep_alive()
         self.listen()
         self._report()
+        if self._activity == "pause":
+            return self.stop_asked is None
         if self.stop_asked is not None or self.pause_asked is not None or self._answer is not None:
             return False
         # Between stimuli the last one's fault is still there, and over.

@@ -74,8 +74,8 @@ class Display(Protocol):
         it."""
         ...
 
-    def pause(self, notice: PauseNotice) -> AfterPause:
-        """Nothing is played until somebody decides how to go on."""
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        """Nothing is played until somebody decides how to go on. LEAVE where `sign_of_life` ended the wait."""
         ...
 
     def await_return(self, reason: str) -> None:

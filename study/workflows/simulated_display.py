@@ -105,7 +105,7 @@ class SimulatedDisplay:
         self._waited(notice.seconds, sign_of_life)
         return self._clock.now_s() - started_s
 
-    def pause(self, notice: PauseNotice) -> AfterPause:
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
         return AfterPause.GO_ON
 
     def goodbye(self, notice: Goodbye) -> None:

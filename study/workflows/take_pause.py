@@ -20,13 +20,16 @@ LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the par
 
 
 def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBreak:
-    who = sitting.attendant.pause_asked or "participant"
-    sitting.attendant.begin("pause")
+    attendant = sitting.attendant
+    who = attendant.pause_asked or "participant"
+    attendant.begin("pause")
     started_s = sitting.clock.now_s()
-    decision = sitting.display.pause(PauseNotice(reason, state.answers))
+    decision = sitting.display.pause(PauseNotice(reason, state.answers), attendant.glance)
     state = write_notes(state, sitting)
     # Whoever asked for a pause during the pause has had it: cleared only after the last look.
-    sitting.attendant.pause_asked = None
+    attendant.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
     state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)
+    if attendant.stop_asked is not None:
+        return AfterTheBreak(state, f"the {attendant.stop_asked} stopped the session", withdrawn=False)
     return AfterTheBreak(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

@@ -225,14 +225,14 @@ def test_the_handle_is_looked_at_until_it_is_back(seat):
 
 def test_a_pause_ends_when_somebody_goes_on(seat):
     seat.press("enter")
-    assert seat.display.pause(PAUSE) is AfterPause.GO_ON
+    assert seat.display.pause(PAUSE, lambda: True) is AfterPause.GO_ON
 
 
 def test_a_pause_can_end_the_sitting(persons_seat):
     persons_seat.press("q")
-    assert persons_seat.display.pause(PAUSE) is AfterPause.LEAVE
+    assert persons_seat.display.pause(PAUSE, lambda: True) is AfterPause.LEAVE
 
 
 def test_consent_can_be_taken_back_during_a_pause(persons_seat):
     persons_seat.withdraw()
-    assert persons_seat.display.pause(PAUSE) is AfterPause.WITHDRAW
+    assert persons_seat.display.pause(PAUSE, lambda: True) is AfterPause.WITHDRAW

@@ -133,9 +133,15 @@ class RemoteDisplay:
                 break
         return self._clock.now_s() - started_s
 
-    def pause(self, notice: PauseNotice) -> AfterPause:
-        reply: AfterPause = self._ask(Call.PAUSE, notice)
-        return reply
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        number = self._show(Call.PAUSE, notice)
+        while sign_of_life():
+            reply = self._reply(number)
+            if reply is not None:
+                decision: AfterPause = reply.value
+                return decision
+        self._link.send(Close(number))
+        return AfterPause.LEAVE
 
     def await_return(self, reason: str) -> None:
         self._ask(Call.AWAIT_RETURN, reason)

@@ -46,7 +46,7 @@ class WatchMessage(Message):
 
 class WatchScreen(Screen[None]):
     HELP = HELP
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as in the base class
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
     CSS = STYLE
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("S,f8", "stop", "STOP", key_display="S"),

@@ -62,19 +62,19 @@ def test_after_a_rest_one_can_leave(unhurried, line):
 )
 def test_a_pause_ends_by_decision_and_withdrawing_needs_the_whole_word(typed, lines, decision):
     typed.type(*lines)
-    assert typed.display.pause(PAUSE) is decision
+    assert typed.display.pause(PAUSE, lambda: True) is decision
     assert "Pause (the experimenter asked for it). Nothing is played. 12 answers are on disk." in typed.said
 
 
 def test_a_wrong_key_in_a_pause_is_named(typed):
     typed.type("1", "")
-    typed.display.pause(PAUSE)
+    typed.display.pause(PAUSE, lambda: True)
     assert "'1' is none of the keys; ? tells them." in typed.said
 
 
 def test_what_is_not_confirmed_is_not_erased(typed):
     typed.type("w", "y", "")
-    typed.display.pause(PAUSE)
+    typed.display.pause(PAUSE, lambda: True)
     assert "Nothing is erased." in typed.said
 
 
@@ -82,7 +82,7 @@ def test_notes_and_adverse_events_reach_the_session(typed_in):
     notes = []
     typed = typed_in(notes=notes)
     typed.type("n", "the phone rang", "e", "the thumb is numb", "n", "", "")
-    assert typed.display.pause(PAUSE) is AfterPause.GO_ON
+    assert typed.display.pause(PAUSE, lambda: True) is AfterPause.GO_ON
     assert notes == [
         NoteAsked("participant", "the phone rang", adverse=False),
         NoteAsked("participant", "the thumb is numb", adverse=True),
@@ -93,7 +93,7 @@ def test_notes_and_adverse_events_reach_the_session(typed_in):
 
 def test_without_anybody_to_take_them_no_notes_are_offered(typed):
     typed.type("n", "")
-    typed.display.pause(PAUSE)
+    typed.display.pause(PAUSE, lambda: True)
     assert "note" not in typed.said
     assert "'n' is none of the keys" in typed.said
 
@@ -101,4 +101,4 @@ def test_without_anybody_to_take_them_no_notes_are_offered(typed):
 def test_a_pause_ends_with_the_input(typed):
     typed.end()
     with pytest.raises(KeyboardInterrupt):
-        typed.display.pause(PAUSE)
+        typed.display.pause(PAUSE, lambda: True)

@@ -26,7 +26,7 @@ class PausesOnce:
         self._questions += 1
         return PAUSE if self._questions == 3 else self._display.ask(question, sign_of_life)
 
-    def pause(self, notice):
+    def pause(self, notice, sign_of_life):
         self._requests.send(NoteAsked("participant", "the phone rang"))
         self._requests.send(NoteAsked("participant", "the thumb is numb", adverse=True))
         return self._decision

@@ -47,6 +47,7 @@ class Person(SimulatedDisplay):
         super().__init__(observer_named("ideal", seed), seed, clock)
         self.calls, self.questions, self.playing, self.told = [], [], [], []
         self.at_question = lambda question: None
+        self.at_pause = lambda: None
         self.demo = [PlayDemo(1, 1), PlayDemo(2, 2), DemoDone()]
         self.refuse = None
         self.decisions = []
@@ -81,8 +82,11 @@ class Person(SimulatedDisplay):
     def practice_over(self, result):
         self.calls.append(result)
 
-    def pause(self, notice):
+    def pause(self, notice, sign_of_life):
         self.calls.append(notice.reason)
+        self.at_pause()
+        if not sign_of_life():
+            return AfterPause.LEAVE
         return self.decisions.pop(0) if self.decisions else AfterPause.GO_ON
 
     def trouble(self, sentence):
@@ -218,6 +222,14 @@ def test_a_stop_during_a_rest_cuts_it_short(plan, small_protocol, seat, person, 
     assert of(end, RestTaken) == []
 
 
+def test_a_stop_during_a_pause_ends_it(plan, small_protocol, seat, person):
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
+    person.at_pause = lambda: seat.requests.send(StopAsked("experimenter"))
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert end.left == "the experimenter stopped the session"
+    assert len(of(end, PauseTaken)) == 1
+
+
 def test_notes_reach_the_log_whoever_writes_them(plan, small_protocol, seat, person):
     def noted(question):
         if len(person.questions) == 2:
@@ -250,7 +262,7 @@ def test_whoever_withdraws_in_a_pause_ends_the_sitting(plan, small_protocol, sea
 
 
 def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protocol, seat, person):
-    person.pause = lambda notice: seat.requests.send(PauseAsked("participant")) or AfterPause.GO_ON
+    person.at_pause = lambda: seat.requests.send(PauseAsked("participant"))
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 3 else None
     end = conduct_new(plan(small_protocol), "simulated", seat)
     assert len(of(end, PauseTaken)) == 1
