@@ -11,6 +11,7 @@ from textual.screen import Screen
 
 from study.session.views import Reply as TrialReply
 from study.tui.answer_keys import AnswerKeys
+from study.tui.drawn_before import forget_drawn_before
 from study.tui.link.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble
 from study.tui.link.to_engine import Reply, ToEngine
 from study.tui.screens.preparing import PreparingScreen
@@ -123,3 +124,4 @@ class SittingScreens:
         shown, self._shown = self._shown, None
         while shown is not None and shown in self._app.screen_stack:
             self._app.pop_screen()
+        forget_drawn_before()
