@@ -1,5 +1,6 @@
 """The display port over the pipe: asks the screen, and never waits for it longer than a hand may be shaken."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +31,8 @@ from study.workflows.display import SignOfLife
 GLANCE_S = 0.04
 """Between two signs of life; the port allows 100 ms."""
 LOOK_EVERY_S = 0.1
+UNSHOWN_S = 1.0
+"""A wait for the handle that is no longer than this shows nothing of its own."""
 SILENT_AFTER_S = 0.5
 """A screen without a heartbeat for so long is suspended, dead or hung: nobody could stop what plays."""
 
@@ -82,22 +85,28 @@ class RemoteDisplay:
         return None
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        view = look()
-        number = self._show(Call.AWAIT_HANDLE, view)
-        looked_s = self._clock.now_s()
+        """Shown only where the handle is away from its place, or the wait is long: most trials begin with it there, held
+        still for a moment."""
+        number, view = 0, look()
+        began_s = looked_s = self._clock.now_s()
         while not view.ready:
+            away = math.hypot(*view.offset_mm) > view.radius_mm or self._clock.now_s() - began_s > UNSHOWN_S
+            if away and not number:
+                number = self._show(Call.AWAIT_HANDLE, view)
             reply = self._reply(number)
             if not sign_of_life():
                 return self._over(number, CUT_SHORT)
-            if reply is not None:
+            if reply is not None and number:
                 cut: Unanswered | None = reply.value
                 return cut
             if self._silent():
                 return self._over(number, SILENT)
             if self._clock.now_s() - looked_s >= LOOK_EVERY_S:
                 view, looked_s = look(), self._clock.now_s()
-                self._link.send(LookUpdate(number, view))
-        self._link.send(Close(number))
+                if number:
+                    self._link.send(LookUpdate(number, view))
+        if number:
+            self._link.send(Close(number))
         return None
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Answer:
@@ -173,5 +182,7 @@ class RemoteDisplay:
         return self._link.silent_s() > SILENT_AFTER_S
 
     def _over(self, number: int, why: Unanswered) -> Unanswered:
-        self._link.send(Close(number))
+        """number: 0 where nothing is shown."""
+        if number:
+            self._link.send(Close(number))
         return why

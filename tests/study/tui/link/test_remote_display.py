@@ -154,6 +154,19 @@ def test_a_rest_lasts_even_if_the_screen_comes_back_too_early(screen):
     assert screen.display.rest(RestNotice(0.4, 1), alive) >= 0.4
 
 
+def test_a_handle_that_is_held_still_for_a_moment_is_no_news(screen):
+    views = iter([HandleView(False, "Hold it", (1.0, 0.0), 5.0), HandleView(True, "There", (0.0, 0.0), 5.0)])
+    assert screen.display.await_handle(lambda: next(views), alive) is None
+    assert not screen.pipe.poll(0.1)
+
+
+def test_a_handle_that_nobody_can_see_is_shown_after_a_while(screen):
+    view = HandleView(False, "The device does not say where its handle is.", (0.0, 0.0), 5.0)
+    screen.soon(Reply(1, Unanswered("asked for a pause", leave=False, pause=True)), delay_s=1.4)
+    assert screen.display.await_handle(lambda: view, alive).pause
+    assert screen.hear().shown == view
+
+
 def test_the_screen_sees_the_handle_come_back(screen):
     views = [HandleView(False, "Back", (9.0 - n, 0.0), 5.0) for n in range(3)]
     views.append(HandleView(True, "There", (0.0, 0.0), 5.0))
