@@ -85,8 +85,8 @@ class RemoteDisplay:
         return None
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Shown only where the handle is away from its place, or the wait is long: most trials begin with it there, held
-        still for a moment."""
+        """Shown only where the handle is away from its place, or the wait is long: most trials begin with it there,
+        held still for a moment."""
         number, view = 0, look()
         began_s = looked_s = self._clock.now_s()
         while not view.ready:
