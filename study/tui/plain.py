@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import TextIO
 
 from study.devices.clock import Clock
+from study.session.counted import answers_are
 from study.session.form_views import Form, FormReply
 from study.session.requests import NoteAsked
 from study.session.views import (
@@ -97,7 +98,7 @@ class PlainDisplay:
             self._talk.say("", f"Finished: {notice.answers} answers. Thank you.")
         else:
             because = f": {notice.reason}" if notice.reason else ""
-            self._talk.say("", f"This sitting is over{because}. {notice.answers} answers are on disk. Thank you.")
+            self._talk.say("", f"This sitting is over{because}. {answers_are(notice.answers)} on disk. Thank you.")
 
     def trouble(self, sentence: str) -> None:
         self._talk.say(sentence)

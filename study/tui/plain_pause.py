@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from study.session.counted import answers_are
 from study.session.requests import NoteAsked
 from study.session.views import AfterPause, PauseNotice, RestNotice
 from study.tui.conversation import GLANCE_S, Conversation, Line, WaitOver, printable, shown
@@ -30,7 +31,7 @@ def pause(
     notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
 ) -> AfterPause:
     talk.forget()
-    talk.say("", f"Pause ({notice.reason}). Nothing is played. {notice.answers} answers are on disk.")
+    talk.say("", f"Pause ({notice.reason}). Nothing is played. {answers_are(notice.answers)} on disk.")
     talk.say(_choices(notes=note is not None))
     while True:
         talk.prompt("Enter goes on: ")

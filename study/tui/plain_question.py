@@ -1,5 +1,6 @@
 """Line mode: one trial, and what is said around it."""
 
+from study.session.counted import answers_are
 from study.session.views import (
     Answered,
     DirectionPicture,
@@ -37,7 +38,7 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
     talk.forget()
     talk.say(notice.title, "")
     if notice.resumed_after:
-        talk.say(f"Welcome back: {notice.resumed_after} answers are on disk; the study goes on where it stopped.", "")
+        talk.say(f"Welcome back: {answers_are(notice.resumed_after)} on disk; the study goes on where it stopped.", "")
     talk.say(
         "Hold the handle with a constant, comfortable grip. In each trial it shakes along one of two directions:",
         "",

@@ -2,6 +2,7 @@
 
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
+from study.session.counted import answers_are
 from study.workflows.conduct_session import Conducted
 from study.workflows.session_results import write_results
 from study.workflows.withdraw_participant import plan_withdrawal, withdraw
@@ -24,7 +25,7 @@ def _not_finished(end: Conducted) -> StudyError:
         "The session is not finished",
         f"The sitting ended: {end.left}.",
         f"Go on with: hapteq resume {end.folder.path}",
-        saved=f"{end.state.answers} answers are on disk.",
+        saved=f"{answers_are(end.state.answers)} on disk.",
     )
 
 

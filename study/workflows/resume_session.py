@@ -7,6 +7,7 @@ from protocols.schedule import label_of
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
+from study.session.counted import answers_are
 from study.session.delivered import delivered
 from study.session.due_trial import labels_are_swapped
 from study.session.events import SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
@@ -50,7 +51,7 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
             "This session is finished",
             f"{folder.name} has all its runs.",
             f"Look at its results: hapteq analyze {folder.path}",
-            saved=f"{state.answers} answers are on disk.",
+            saved=f"{answers_are(state.answers)} on disk.",
         )
     if device.simulated != state.opened.device.simulated:
         raise StudyError(

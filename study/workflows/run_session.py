@@ -7,6 +7,7 @@ from protocols.practice import practice_passed, practised, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
+from study.session.counted import answers_are
 from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
@@ -80,7 +81,7 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
             SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted: Ctrl-C, or the terminal was closed")
         )
     way_back = f"Go on with: hapteq resume {sitting.folder.path}"
-    saved = f"{state.answers} answers are on disk."
+    saved = f"{answers_are(state.answers)} on disk."
     if still_on:
         raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, way_back, saved) from interruption
     raise LeftError("Interrupted", "The force was released.", way_back, saved) from interruption
@@ -89,7 +90,7 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
 def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
     """The same error; only the session knows how much is safe and how to go on."""
     with contextlib.suppress(StudyError):
-        error.saved = f"{fold_session(sitting.folder).state.answers} answers are on disk."
+        error.saved = f"{answers_are(fold_session(sitting.folder).state.answers)} on disk."
         error.do_now = f"{error.do_now} Then go on with: hapteq resume {sitting.folder.path}"
     return error
 

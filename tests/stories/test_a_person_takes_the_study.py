@@ -89,7 +89,7 @@ def test_pasted_answers_answer_one_trial_and_leaving_keeps_them(study, small_fil
     terminal.type("q\n")
     assert terminal.end() == 130
     said = " ".join(terminal.screen.split())
-    assert "1 answers are on disk." in said
+    assert "1 answer is on disk." in said
     assert "Go on with: hapteq resume" in said
 
 
@@ -101,7 +101,7 @@ def test_ctrl_c_lets_go_and_says_how_to_go_on(study, small_file):
     terminal.wait_for(r"trial 2\b")
     terminal.type("\x03")
     assert terminal.end() == 130
-    assert "1 answers are on disk." in terminal.screen
+    assert "1 answer is on disk." in terminal.screen
     assert "hapteq resume" in terminal.screen
 
 
@@ -116,6 +116,6 @@ def test_a_closed_terminal_loses_nothing(study, small_file, tmp_path):
     again = study("P07_001", command="resume")
     again.wait_for("The device is ready.*Enter goes on")
     again.type("\n")
-    assert "1 answers are on disk" in again.wait_for("Press Enter to begin")
+    assert "1 answer is on disk" in again.wait_for("Press Enter to begin")
     again.type("q\n")
     assert again.end() == 130

@@ -12,6 +12,7 @@ import pytest
 from study.store.log_writer import somebody_writes
 from study.tui.app import HapteqApp
 from study.tui.app_start import AppStart
+from study.tui.home_messages import BeginWanted
 from study.tui.link.from_engine import Failed, Finished
 from study.tui.link.to_engine import Begin, SessionOrder
 
@@ -130,6 +131,21 @@ def test_from_the_start_screen_to_the_report_and_back(order, tmp_path):
     assert Path(app.outcome.results.report).is_file()
 
 
+def test_beginning_twice_at_once_begins_one_session(order):
+    async def story(person: Person) -> None:
+        await person.until("HomeScreen")
+        for _ in range(2):
+            person.app.post_message(BeginWanted(order.protocol, "simulated", "P01"))
+        await person.until("DeviceCheckScreen")
+        await person.press("ctrl+c")
+        await person.until("OutcomeScreen")
+        await person.reads("Interrupted")
+        await person.pilot.pause(2.0)
+
+    run(AppStart(order.data, "simulated", seed=4), story)
+    assert [path.name for path in Path(order.data).glob("P01_*")] == ["P01_001"]
+
+
 def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_goes_on(sitting, log):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")
@@ -138,7 +154,7 @@ def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_goes_on(sitting, log):
         await person.until("OutcomeScreen")
         await person.reads("! Interrupted")
         said = person.text()
-        assert "1 answers are on disk." in said
+        assert "1 answer is on disk." in said
         assert "Resume the session" in said
         assert log.read_text().splitlines()[-1].endswith('"event":"session_interrupted"}')
         await person.press("r")
@@ -168,7 +184,7 @@ def test_an_engine_that_dies_leaves_a_panel_and_a_way_on(sitting, log):
 
     app = sitting(story)
     assert isinstance(app.outcome, Failed)
-    assert app.outcome.error.saved == "1 answers are on disk."
+    assert app.outcome.error.saved == "1 answer is on disk."
 
 
 def test_an_event_loop_that_hangs_frees_the_hand(sitting, log):
