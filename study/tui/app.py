@@ -211,10 +211,14 @@ class HapteqApp(App[None]):
             self._sitting.replied(reply)
 
     async def on_begin_wanted(self, wanted: home_messages.BeginWanted) -> None:
+        if self._sitting is not None:  # Enter twice: one sitting
+            return
         start = self._start = replace(self._start, device=wanted.device)
         await self._sit(Begin(SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed)))
 
     async def on_resume_wanted(self, wanted: home_messages.ResumeWanted) -> None:
+        if self._sitting is not None:
+            return
         await self._sit(Resume(wanted.path, self._start.device, self._start.data))
 
     async def on_home_wanted(self) -> None:

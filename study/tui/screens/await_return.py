@@ -7,6 +7,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Footer
 
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
@@ -34,4 +35,4 @@ class AwaitReturnScreen(Screen[None]):
         yield Footer(show_command_palette=False)
 
     def action_go_on(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)

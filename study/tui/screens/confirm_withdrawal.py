@@ -9,6 +9,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Footer, Input
 
 from study.tui.screens.help import HelpScreen
+from study.tui.take_off import take_off
 from study.tui.trial_words import WITHDRAW
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
@@ -46,7 +47,7 @@ class ConfirmWithdrawal(ModalScreen[bool]):
     @on(Input.Submitted)
     def _judge(self, typed: Input.Submitted) -> None:
         if typed.value.strip().casefold() == WITHDRAW:
-            self.dismiss(True)
+            take_off(self, True)
         else:
             self.query_one("#said", Said).update(f"That is not the word {WITHDRAW}. Nothing is erased.")
 
@@ -54,4 +55,4 @@ class ConfirmWithdrawal(ModalScreen[bool]):
         self.app.push_screen(HelpScreen(self.HELP))
 
     def action_leave(self) -> None:
-        self.dismiss(False)
+        take_off(self, False)

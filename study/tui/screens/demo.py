@@ -12,6 +12,7 @@ from textual.widgets import Footer
 
 from study.session.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.answer_keys import DIGITS, AnswerKeys
+from study.tui.take_off import take_off
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.said import Said
 
@@ -68,7 +69,7 @@ class DemoScreen(Screen[DemoChoice]):
         answer = self._keys.answer(event.character or event.key)
         if answer is not None:
             event.stop()
-            self.dismiss(PlayDemo(self._vibration, answer))
+            take_off(self, PlayDemo(self._vibration, answer))
 
     def action_heard(self, answer: int) -> None:
         """The answers are heard in `on_key`; their bindings are there for the footer."""
@@ -87,7 +88,7 @@ class DemoScreen(Screen[DemoChoice]):
         self.post_message(self.PauseWanted())
 
     def action_done(self) -> None:
-        self.dismiss(DemoDone())
+        take_off(self, DemoDone())
 
     def _show(self, sentence: str) -> None:
         menu = self._menu

@@ -8,6 +8,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from study.session.views import DeviceFinding, DeviceReport
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.said import Said
 
@@ -62,13 +63,13 @@ class DeviceCheckScreen(Screen[bool]):
         return {"go_on": self._report.fine, "go_on_anyway": not self._report.fine}.get(action, True)
 
     def action_go_on(self) -> None:
-        self.dismiss(True)
+        take_off(self, True)
 
     def action_go_on_anyway(self) -> None:
-        self.dismiss(True)
+        take_off(self, True)
 
     def action_check_again(self) -> None:
-        self.dismiss(False)
+        take_off(self, False)
 
 
 def _line(finding: DeviceFinding, names: int) -> str:

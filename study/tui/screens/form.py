@@ -10,6 +10,7 @@ from textual.screen import Screen
 from textual.widgets import Button, Footer, Input
 
 from study.session.form_views import Form, FormReply, missing
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.form_question import FormQuestion
@@ -90,7 +91,7 @@ class FormScreen(Screen[FormReply]):
         reply = self._reply()
         gaps = missing(self._form, reply)
         if not gaps:
-            self.dismiss(reply)
+            take_off(self, reply)
             return
         questions = list(self.query(FormQuestion))
         first = next(question for question in questions if question.field == gaps[0])

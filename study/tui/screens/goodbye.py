@@ -8,6 +8,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from study.session.views import Goodbye
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
@@ -42,7 +43,7 @@ class GoodbyeScreen(Screen[None]):
         yield Footer(show_command_palette=False)
 
     def action_close_page(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)
 
 
 def _because(reason: str) -> str:

@@ -8,6 +8,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from study.session.views import HandleView, Unanswered
+from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.handle_target import HandleTarget
 from study.tui.widgets.said import Said
@@ -55,7 +56,7 @@ class HandleScreen(Screen[Unanswered | None]):
             self.query_one("#sentence", Said).update(view.sentence)
 
     def action_pause(self) -> None:
-        self.dismiss(PAUSE)
+        take_off(self, PAUSE)
 
     def action_leave(self) -> None:
-        self.dismiss(LEAVING)
+        take_off(self, LEAVING)

@@ -8,6 +8,8 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Footer
 
+from study.tui.take_off import take_off
+
 
 class HelpScreen(ModalScreen[None]):
     CSS = """
@@ -32,4 +34,4 @@ class HelpScreen(ModalScreen[None]):
         yield Footer()
 
     def action_leave(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)

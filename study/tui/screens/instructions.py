@@ -10,6 +10,7 @@ from textual.widgets import Footer
 
 from study.session.views import Welcome
 from study.tui.answer_keys import DIGITS, AnswerKeys
+from study.tui.take_off import take_off
 from study.tui.trial_words import plan
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.direction_panel import DirectionPanel
@@ -63,7 +64,7 @@ class InstructionsScreen(Screen[None]):
         yield Footer(show_command_palette=False)
 
     def action_begin(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)
 
 
 def _welcome_back(answers: int) -> str:

@@ -10,6 +10,7 @@ from textual.widgets import Button, Footer, TextArea
 
 from study.session.requests import NoteAsked, Who
 from study.tui.screens.help import HelpScreen
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.said import Said
@@ -74,10 +75,10 @@ class NoteScreen(ModalScreen[NoteAsked | None]):
         elif not who:
             self._refuse("Please choose who writes this.")
         else:
-            self.dismiss(NoteAsked(cast(Who, who), text, self.query_one("#adverse", ChoiceRow).answer == "yes"))
+            take_off(self, NoteAsked(cast(Who, who), text, self.query_one("#adverse", ChoiceRow).answer == "yes"))
 
     def action_leave(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP))

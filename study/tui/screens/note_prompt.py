@@ -9,6 +9,8 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Input, Label
 
+from study.tui.take_off import take_off
+
 MOST_CHARACTERS = 500
 
 
@@ -44,10 +46,10 @@ class NotePrompt(ModalScreen[str | None]):
             yield Label("Enter writes it into the log, Escape leaves, F8 stops the session.")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        self.dismiss(event.value.strip() or None)
+        take_off(self, event.value.strip() or None)
 
     def action_stop(self) -> None:
         self._stop()
 
     def action_leave(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)

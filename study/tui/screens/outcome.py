@@ -12,6 +12,8 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Static
 
+from study.tui.take_off import take_off
+
 Decision = Literal["resume", "look", "home", "quit", "back"]
 
 HELP = """\
@@ -99,7 +101,7 @@ class OutcomeScreen(ModalScreen[Decision]):
                 return
 
     def action_decide(self, decision: Decision) -> None:
-        self.dismiss(decision)
+        take_off(self, decision)
 
 
 def _told(outcome: Outcome) -> Content:

@@ -15,6 +15,7 @@ from study.session.requests import NoteAsked
 from study.session.views import AfterPause, PauseNotice
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
@@ -79,7 +80,7 @@ class PauseScreen(Screen[AfterPause]):
         if choice is AfterPause.WITHDRAW:
             self.app.push_screen(ConfirmWithdrawal(), self._withdraw)
         else:
-            self.dismiss(choice)
+            take_off(self, choice)
 
     def action_choose(self) -> None:
         self.query_one(OptionList).action_select()
@@ -89,7 +90,7 @@ class PauseScreen(Screen[AfterPause]):
 
     def _withdraw(self, confirmed: bool | None) -> None:
         if confirmed:
-            self.dismiss(AfterPause.WITHDRAW)
+            take_off(self, AfterPause.WITHDRAW)
         else:
             self.query_one("#said", Said).update("Nothing is erased.")
 

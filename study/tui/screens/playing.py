@@ -9,6 +9,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from study.session.views import PlayingNotice, Unanswered
+from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.said import Said
@@ -52,7 +53,7 @@ class PlayingScreen(Screen[Unanswered | None]):
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:
-        self.dismiss(PAUSE)
+        take_off(self, PAUSE)
 
     def action_leave(self) -> None:
-        self.dismiss(LEAVING)
+        take_off(self, LEAVING)

@@ -8,6 +8,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from study.session.views import PracticeResult
+from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
@@ -44,4 +45,4 @@ class PracticeOverScreen(Screen[None]):
         yield Footer(show_command_palette=False)
 
     def action_go_on(self) -> None:
-        self.dismiss(None)
+        take_off(self, None)

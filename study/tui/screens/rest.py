@@ -10,6 +10,7 @@ from textual.screen import Screen
 from textual.widgets import Digits, Footer
 
 from study.session.views import RestNotice
+from study.tui.take_off import take_off
 from study.tui.trial_words import progress_sentence, runs_left
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
@@ -64,7 +65,7 @@ class RestScreen(Screen[float]):
 
     def action_go_on(self) -> None:
         if self._over():
-            self.dismiss(self._rested_s())
+            take_off(self, self._rested_s())
 
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._rested_s()))

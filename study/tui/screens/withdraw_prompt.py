@@ -10,6 +10,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Footer, Input, Static
 
 from study.tui.screens.help import HelpScreen
+from study.tui.take_off import take_off
 
 HELP = """\
 # Withdrawal
@@ -61,7 +62,7 @@ class WithdrawPrompt(ModalScreen[bool]):
     @on(Input.Submitted)
     def _judge(self, typed: Input.Submitted) -> None:
         if typed.value.strip() == self._subject:
-            self.dismiss(True)
+            take_off(self, True)
         else:
             self.query_one("#said", Static).update(f"That is not {self._subject}. Nothing was erased.")
 
@@ -69,4 +70,4 @@ class WithdrawPrompt(ModalScreen[bool]):
         self.app.push_screen(HelpScreen(HELP))
 
     def action_leave(self) -> None:
-        self.dismiss(False)
+        take_off(self, False)
