@@ -24,7 +24,14 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBr
     who = attendant.pause_asked or "participant"
     attendant.begin("pause")
     started_s = sitting.clock.now_s()
-    decision = sitting.display.pause(PauseNotice(reason, state.answers), attendant.glance)
+
+    def glance() -> bool:
+        """A note is on the disk soon after it was typed, however long the pause."""
+        nonlocal state
+        state = write_notes(state, sitting)
+        return attendant.glance()
+
+    decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
     state = write_notes(state, sitting)
     # Whoever asked for a pause during the pause has had it: cleared only after the last look.
     attendant.pause_asked = None

@@ -230,6 +230,21 @@ def test_a_stop_during_a_pause_ends_it(plan, small_protocol, seat, person):
     assert len(of(end, PauseTaken)) == 1
 
 
+def test_a_note_is_on_the_disk_before_the_pause_is_over(plan, small_protocol, seat, person, tmp_path):
+    seen = []
+
+    def pause(notice, sign_of_life):
+        seat.requests.send(NoteAsked("participant", "my thumb is numb", adverse=True))
+        sign_of_life()
+        seen.append((tmp_path / "data" / "P01_001" / "events.jsonl").read_text())
+        return AfterPause.GO_ON
+
+    person.pause = pause
+    person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 2 else None
+    conduct_new(plan(small_protocol), "simulated", seat)
+    assert "my thumb is numb" in seen[0]
+
+
 def test_notes_reach_the_log_whoever_writes_them(plan, small_protocol, seat, person):
     def noted(question):
         if len(person.questions) == 2:
