@@ -124,4 +124,4 @@ class SittingScreens:
         shown, self._shown = self._shown, None
         while shown is not None and shown in self._app.screen_stack:
             self._app.pop_screen()
-        forget_drawn_before()
+        forget_drawn_before(self._app)
