@@ -55,7 +55,9 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     except BaseException:
         sitting.device.stop()
         raise
-    sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers, reason=end.left))
+    # Whoever leaves here by Ctrl-C leaves what is over already.
+    with contextlib.suppress(KeyboardInterrupt):
+        sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers, reason=end.left))
     # As long as the log is open, who notes something is told that the session writes it.
     return replace(end, state=write_notes(end.state, sitting))
 

@@ -290,6 +290,16 @@ def test_what_is_noted_during_the_goodbye_is_in_the_log(plan, small_protocol, se
     assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
 
 
+def test_ctrl_c_at_the_goodbye_of_a_finished_session_leaves_it_finished(plan, small_protocol, seat, person):
+    def goodbye(notice):
+        raise KeyboardInterrupt
+
+    person.goodbye = goodbye
+    end = conduct_new(plan(small_protocol), "simulated", seat)
+    assert not end.left
+    assert end.state.closed
+
+
 def test_leaving_from_a_pause_can_be_resumed(plan, small_protocol, seat, person):
     person.decisions = [AfterPause.LEAVE]
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant"))
