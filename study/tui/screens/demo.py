@@ -24,7 +24,7 @@ class DemoScreen(Screen[DemoChoice]):
 - **1** and **2** play that direction, as often as you like. Nothing is asked, nothing is recorded as an answer.
 - **Left** and **Right** (or **b** and **n**) change the vibration: 1 is the slowest.
 - What you have felt already is marked with a tick.
-- **Enter** ends the demonstration.
+- **Enter** ends the demonstration; it asks once if something was not felt yet.
 """
     DEFAULT_CSS = """
     DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
@@ -51,6 +51,7 @@ class DemoScreen(Screen[DemoChoice]):
         self._menu = menu
         self._keys = keys
         self._vibration = menu.vibration
+        self._asked = False
 
     def compose(self) -> ComposeResult:
         yield Said(id="title")
@@ -88,6 +89,12 @@ class DemoScreen(Screen[DemoChoice]):
         self.post_message(self.PauseWanted())
 
     def action_done(self) -> None:
+        """Asked once where something was not felt yet: Enter is pressed out of habit."""
+        unfelt = 2 * self._menu.vibrations - len(set(self._menu.felt))
+        if unfelt and not self._asked:
+            self._asked = True
+            self._show(f"{unfelt} of {2 * self._menu.vibrations} were not felt yet. Enter again goes on without them.")
+            return
         take_off(self, DemoDone())
 
     def _show(self, sentence: str) -> None:

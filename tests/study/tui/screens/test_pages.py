@@ -128,11 +128,25 @@ def test_a_device_that_needs_a_look_is_not_passed_by_enter(read):
         (("right", "1"), PlayDemo(3, 1)),
         (("n", "n", "2"), PlayDemo(3, 2)),
         (("b", "left", "2"), PlayDemo(1, 2)),
-        (("enter",), DemoDone()),
+        (("enter", "enter"), DemoDone()),
+        (("enter", "1"), PlayDemo(2, 1)),
     ],
 )
 def test_the_demonstration_plays_turns_and_ends(read, keys, choice):
     assert read(DemoScreen(MENU), *keys)[0] == [choice]
+
+
+def test_enter_by_habit_does_not_skip_the_demonstration(on_stage):
+    async def story(stage):
+        await stage.press("enter")
+        assert "5 of 6 were not felt yet. Enter again goes on without them." in stage.text
+
+    assert on_stage(DemoScreen(MENU), story) == []
+
+
+def test_once_all_was_felt_enter_goes_on(read):
+    everything = tuple((vibration, number) for vibration in (1, 2, 3) for number in (1, 2))
+    assert read(DemoScreen(DemoMenu(PICTURE, 3, 3, everything, True)), "enter")[0] == [DemoDone()]
 
 
 def test_the_demonstration_plays_by_keys_of_ones_own(read):
