@@ -7,9 +7,7 @@ from datetime import datetime
 
 from protocols.trial import Trial
 from study.session.sitting_events import DemoFinished, DeviceChecked, FormFilled
-from study.session.vibration_dose import Dose, add
-
-NOTHING = Dose(0.0, 0.0, 0.0)
+from study.session.vibration_dose import NO_DOSE, Dose, add
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +28,7 @@ class SittingState:
     """Given in earlier sittings."""
     moved_utc: str = ""
     """Last time that it moved."""
-    dose: Dose = NOTHING
+    dose: Dose = NO_DOSE
     """Since the last long rest: see NIGHT_H."""
 
 
@@ -81,7 +79,7 @@ def moved(sitting: SittingState, utc: str) -> SittingState:
 
 def dose_now(sitting: SittingState, utc: str) -> Dose:
     """What counts today: nothing after a night's rest."""
-    return NOTHING if minutes_between(sitting.moved_utc, utc) >= 60 * NIGHT_H else sitting.dose
+    return NO_DOSE if minutes_between(sitting.moved_utc, utc) >= 60 * NIGHT_H else sitting.dose
 
 
 def exposed(

@@ -7,6 +7,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Footer
 
+from study.session.counted import answers_are
 from study.session.views import Goodbye
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
@@ -36,7 +37,7 @@ class GoodbyeScreen(Screen[None]):
             else:
                 yield Said(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
             if notice.answers:
-                yield Said(f"{_answers(notice.answers)} on the disk.", classes="gap")
+                yield Said(f"{answers_are(notice.answers)} on the disk.", classes="gap")
             if notice.answers and not notice.finished:
                 yield Said("It can be resumed at the trial where it stopped.", classes="gap")
             yield Said("You may let go of the handle. Press Enter to close this page.", classes="gap")
@@ -48,7 +49,3 @@ class GoodbyeScreen(Screen[None]):
 
 def _because(reason: str) -> str:
     return f": {reason}" if reason else ""
-
-
-def _answers(answers: int) -> str:
-    return "1 answer is" if answers == 1 else f"{answers} answers are"

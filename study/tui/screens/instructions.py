@@ -8,6 +8,7 @@ from textual.containers import Horizontal
 from textual.screen import Screen
 from textual.widgets import Footer
 
+from study.session.counted import answers_are
 from study.session.views import Welcome
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.take_off import take_off
@@ -68,8 +69,7 @@ class InstructionsScreen(Screen[None]):
 
 
 def _welcome_back(answers: int) -> str:
-    kept = "1 answer is" if answers == 1 else f"{answers} answers are"
-    return f"Welcome back: {kept} on the disk. The study goes on where it stopped."
+    return f"Welcome back: {answers_are(answers)} on the disk. The study goes on where it stopped."
 
 
 def _how(keys: AnswerKeys) -> str:

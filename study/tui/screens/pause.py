@@ -11,6 +11,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, OptionList
 from textual.widgets.option_list import Option
 
+from study.session.counted import answers_are
 from study.session.requests import NoteAsked
 from study.session.views import AfterPause, PauseNotice
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
@@ -65,7 +66,7 @@ class PauseScreen(Screen[AfterPause]):
         with Card("Pause"):
             yield Said("Nothing is played. You may let go of the handle.", classes="strong")
             yield Said(f"Reason: {self._notice.reason}.", classes="gap")
-            yield Said(f"{'1 answer is' if answers == 1 else f'{answers} answers are'} on the disk.")
+            yield Said(f"{answers_are(answers)} on the disk.")
             yield OptionList(*(Option(words, id=choice.value) for choice, words in CHOICES.items()), markup=False)
             yield Said(id="said")
         yield Footer(show_command_palette=False)

@@ -156,9 +156,6 @@ class WatchScreen(Screen[None]):
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:
             self._stop_sent_s, self._stopped_here = None, True
             self._say(f"The session has stopped: {self.view.reason}.")
-        if self._stop_sent_s is not None and self.view is not None and self.view.standing == "paused":
-            self._stop_sent_s = now_s
-            self._say("Nothing is played now; the stop waits for the end of this pause.")
         if self._stop_sent_s is not None and now_s - self._stop_sent_s > UNHEARD_AFTER_S:
             unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
             alarms.append(Alarm("stop unheard", unheard, since))
