@@ -86,3 +86,13 @@ def small_file(tmp_path, small_text) -> Path:
     path = tmp_path / "small.toml"
     path.write_text(small_text)
     return path
+
+
+@pytest.fixture(scope="session")
+def plants() -> ModuleType:
+    """`tests/plants.py`, synthetic devices with a known truth."""
+    spec = importlib.util.spec_from_file_location("plants", Path(__file__).parent / "plants.py")
+    assert spec is not None and spec.loader is not None
+    module = sys.modules["plants"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,70 @@
+"""A measured frequency response: what came out per what entered, line by line, with what is known of its error."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencyResponse:
+    """From the total command to the response, both as sampled: `response[k]` is taken just before `command[k]`."""
+
+    frequency_hz: FloatArray
+    """(lines,), rising."""
+    response: ComplexArray
+    """(lines, outputs, inputs)"""
+    noise_variance: FloatArray
+    """(lines, outputs, inputs): expected |error|² of each entry of `response`; NaN where nothing tells it."""
+    coherence: FloatArray
+    """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN where not known."""
+    reliable: BoolArray
+    """(lines,): False where the estimate should not be used, for the reasons that `remarks` name."""
+    sample_rate_hz: float
+    input_channels: tuple[str, ...]
+    output_channels: tuple[str, ...]
+    input_unit: str = "N"
+    output_unit: str = "m/s^2"
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        lines, p, m = len(self.frequency_hz), len(self.output_channels), len(self.input_channels)
+        shapes = {
+            "response": (lines, p, m),
+            "noise_variance": (lines, p, m),
+            "coherence": (lines, p),
+            "reliable": (lines,),
+        }
+        for name, shape in shapes.items():
+            if np.shape(getattr(self, name)) != shape:
+                raise ValueError(f"{name} has shape {np.shape(getattr(self, name))}, not {shape}")
+        if lines and not (np.diff(self.frequency_hz) > 0).all():
+            raise ValueError("frequency_hz must rise from line to line")
+
+    def __len__(self) -> int:
+        return len(self.frequency_hz)
+
+    def within(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
+        """The lines of a band, its ends included."""
+        return self.of_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
+
+    def of_lines(self, chosen: BoolArray) -> "FrequencyResponse":
+        """chosen: (lines,)."""
+        return FrequencyResponse(
+            self.frequency_hz[chosen],
+            self.response[chosen],
+            self.noise_variance[chosen],
+            self.coherence[chosen],
+            self.reliable[chosen],
+            self.sample_rate_hz,
+            self.input_channels,
+            self.output_channels,
+            self.input_unit,
+            self.output_unit,
+            self.remarks,
+        )
