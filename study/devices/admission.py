@@ -66,6 +66,9 @@ def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> No
     _check_forces(stimulus.loop, limits, rate_hz)
     samples = stimulus.loop.samples
     _check_steps(np.diff(samples, axis=0, append=samples[:1]), limits, rate_hz)
+    if stimulus.onset is not None:
+        _check_forces(stimulus.onset, limits, rate_hz)
+        _check_steps(np.diff(stimulus.onset.samples, axis=0, prepend=0.0, append=samples[:1]), limits, rate_hz)
 
 
 def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:

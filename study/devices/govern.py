@@ -23,8 +23,9 @@ from study.devices.rig import SENSOR_CLIPPED
 (
     # Letter box: written from Python at any time, even in the middle of a block.
     STOP_ASKED, RELEASE_ASKED, LET_GO_ASKED, SIGN_OF_LIFE,
-    # What is played: written while nothing moves. Times in ticks; LENGTH is inf for a loop.
-    START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, LONGEST, RECORD_FROM,
+    # What is played: written while nothing moves. Times in ticks; LENGTH is inf for a loop, whose first LEAD rows
+    # are played once only.
+    START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, LEAD, LONGEST, RECORD_FROM,
     # How it goes.
     PHASE, FAULT, TICK, LAST_SIGN, RELEASED_AT, LET_GO_AT, STIMULUS_GAIN, SPRING_GAIN,
     # What was counted.
@@ -32,7 +33,7 @@ from study.devices.rig import SENSOR_CLIPPED
     # Vectors: the place of their first component.
     FORCE, _FY, _FZ, EXCITATION, _EY, _EZ, LAST_POSITION, _XY, _XZ, VELOCITY, _VY, _VZ, LET_GO_FROM, _LY, _LZ,
     STATE_SIZE,
-) = range(44)  # fmt: skip
+) = range(45)  # fmt: skip
 """Cells of `state`."""
 
 STILL, PLAYING, RELEASING, LETTING_GO = range(4)
@@ -181,8 +182,11 @@ def _aim(state: FloatArray, settings: FloatArray, loop: FloatArray, reading: Flo
     tick = int(state[TICK])
     _clear(force)
     if 0 <= tick < state[LENGTH]:
+        row, lead = tick, int(state[LEAD])
+        if tick >= lead:
+            row = lead + (tick - lead) % (loop.shape[0] - lead)
         for i in range(3):
-            force[i] = loop[tick % loop.shape[0], i]
+            force[i] = loop[row, i]
     if not (_below(force, IMPLAUSIBLE_N) and _below(reading, IMPLAUSIBLE_M)):
         _let_go(state, NOT_A_NUMBER)
         return

@@ -58,19 +58,21 @@ class Governor:
 
     def begin_hold(self, stimulus: HeldStimulus) -> None:
         fade_in, fade_out = self._ticks(stimulus.fade_in_s), self._ticks(stimulus.fade_out_s)
-        self._begin(stimulus.loop, self._kept_of_loop(len(stimulus.loop)))
-        state = self.state
-        state[govern.FADE_IN], state[govern.FADE_OUT] = fade_in, fade_out
+        self._begin(stimulus.played_once_then_loop, self._kept_of_loop(len(stimulus.loop)))
+        state, lead = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
+        state[govern.LEAD] = lead
+        # An onset has its own way of rising.
+        state[govern.FADE_IN], state[govern.FADE_OUT] = 0 if lead else fade_in, fade_out
         state[govern.RAISED_COSINE] = stimulus.fade_shape == "raised_cosine"
         state[govern.SPRING_RAMP] = max(fade_in, self.settings[govern.LET_GO_TICKS])
         state[govern.LENGTH] = math.inf
         state[govern.LONGEST] = self._ticks(self._longest_s)
-        state[govern.RECORD_FROM] = fade_in
+        state[govern.RECORD_FROM] = max(fade_in, lead)
         state[govern.PHASE] = govern.PLAYING
 
     def begin_play(self, commands: Signal) -> None:
         settle = self._ticks(SETTLE_S)
-        self._begin(commands, len(commands))
+        self._begin(commands.samples, len(commands))
         state = self.state
         state[govern.START] = state[govern.TICK] = state[govern.LAST_SIGN] = -settle
         state[govern.FADE_OUT] = self.settings[govern.LET_GO_TICKS]
@@ -132,8 +134,13 @@ class Governor:
         kept = min(recorded, size)
         return self.buffer[np.arange(recorded - kept, recorded) % size]
 
-    def _begin(self, played: Signal, rows: int) -> None:
-        self.loop = np.array(played.samples)
+    @property
+    def steady(self) -> FloatArray:
+        """(n, 3): what is repeated, without what leads into it."""
+        return self.loop[int(self.state[govern.LEAD]) :]
+
+    def _begin(self, played: FloatArray, rows: int) -> None:
+        self.loop = np.array(played, order="C")
         self.buffer = np.full((max(rows, 1), govern.ROW_SIZE), np.nan)
         # Never clear the stop, not even for a moment: another thread may be asking for it just now.
         self.state[govern.STOP_ASKED + 1 :] = 0.0

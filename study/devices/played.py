@@ -13,7 +13,7 @@ COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) fo
 
 def played_loop(governor: Governor, info: DeviceInfo) -> Played:
     """Of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
-    rows, loop = governor.rows(), governor.loop
+    rows, loop = governor.rows(), governor.steady
     whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
     kept = len(rows) // whole * whole
     if not kept:

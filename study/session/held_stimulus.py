@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from equalizer.signals.signal import Signal
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,3 +17,11 @@ class HeldStimulus:
     fade_out_s: float
     fade_shape: str
     """"raised_cosine" or "linear"."""
+    onset: Signal | None = None
+    """(ticks, 3) in N: played once before the loop, as it is, where a faded loop would not fade in what it moves.
+    Such a stimulus has no other fade-in."""
+
+    @property
+    def played_once_then_loop(self) -> FloatArray:
+        """(ticks + n, 3)"""
+        return self.loop.samples if self.onset is None else np.concatenate([self.onset.samples, self.loop.samples])

@@ -55,6 +55,33 @@ def test_the_steady_part_is_kept_in_whole_loops_of_what_was_played(device, clock
     assert played.health.fault is Fault.NONE
 
 
+@pytest.fixture
+def springless(rigs, rig, clock):
+    device = SafeDevice(rig, replace(rigs.SETTINGS, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0), clock)
+    yield device
+    device.close()
+
+
+def test_an_onset_is_played_once_as_it_is_and_the_loop_follows(springless, clock, rigs, rig):
+    loop = rigs.sine(2.0, periods_per_s=5)
+    onset = rigs.force(np.linspace(0.0, 1.0, 150)[:, None] * [0.0, 0.0, 1.0])
+    springless.hold(replace(loop, onset=onset))
+    feel(springless, clock, 0.5)
+    played = springless.release()
+    commands = np.concatenate([onset.samples, loop.loop.samples, loop.loop.samples])[:500]
+    assert np.allclose(rigs.written(rig)[:500], commands)
+    assert len(played.recording) == 200  # one loop of 200 in the 350 that followed the onset
+    assert played.recording.segments[0].period == 200
+
+
+def test_a_release_within_an_onset_fades_it_out(springless, clock, rigs, rig):
+    springless.hold(replace(rigs.sine(2.0), onset=rigs.force(np.full((400, 3), [0.0, 0.0, 0.01]))))
+    feel(springless, clock, 0.2)
+    assert springless.release().recording is None
+    written = rigs.written(rig)
+    assert np.allclose(written[:200, 2], 0.01) and (np.diff(written[200:, 2]) <= 0).all() and written[-1, 2] == 0.0
+
+
 def test_command_is_what_the_rig_got_and_readings_were_taken_just_before(device, clock, rigs, rig):
     device.hold(rigs.sine(2.0))
     feel(device, clock, 1.0)
@@ -194,6 +221,8 @@ REFUSED = {
     "not numbers": lambda s: replace(s, loop=replace(s.loop, samples=s.loop.samples + np.nan)),
     "cap of the stimulus is 3 N": lambda s: replace(s, loop=replace(s.loop, samples=s.loop.samples * 3.01)),
     "slew limit is 1500 N/s": lambda s: replace(s, loop=replace(s.loop, samples=s.loop.samples[:150])),
+    "cap of the stimulus": lambda s: replace(s, onset=replace(s.loop, samples=s.loop.samples * 3.01)),
+    "limit is 1500 N/s": lambda s: replace(s, onset=replace(s.loop, samples=s.loop.samples * 0.0 + 1.6)),
     "fade_in_s is nan": lambda s: replace(s, fade_in_s=float("nan")),
     "fade_out_s is -1": lambda s: replace(s, fade_out_s=-1.0),
     "fade shape is 'square'": lambda s: replace(s, fade_shape="square"),

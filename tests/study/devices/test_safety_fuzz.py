@@ -44,7 +44,9 @@ def random_stimulus(rng, rigs):
         samples[rng.integers(length), rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf, 1e308, 1e200])
     fade_s = rng.choice([0.0, 0.001, 0.05, 0.3])
     shape = str(rng.choice(["raised_cosine", "linear"]))
-    return replace(rigs.sine(), loop=rigs.force(samples), fade_in_s=fade_s, fade_out_s=fade_s, fade_shape=shape)
+    onset = rigs.force(samples[::-1] * rng.choice([-1.0, 1.0])) if rng.random() < 0.4 else None
+    stimulus = replace(rigs.sine(), loop=rigs.force(samples), onset=onset)
+    return replace(stimulus, fade_in_s=fade_s, fade_out_s=fade_s, fade_shape=shape)
 
 
 def disturb(rng, rigs, rig, governor) -> None:
