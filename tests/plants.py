@@ -63,8 +63,14 @@ class Plant:
 
 
 def omega_like(shift: float = 0.0, turn_deg: float = 0.0, bend: float = 0.0, hand: bool = False) -> Plant:
-    """The device at one place. shift: relative change of the frequencies of modes 11 to 31 Hz, 0 to 0.2 along a path
-    (bend, 0 to 1, makes that path not linear in the modes' parameters); turn_deg: how far mode shapes have turned.
+    """The device at one place; see `modes_of`."""
+    return _sampled(modes_of(shift, turn_deg, bend, hand))
+
+
+def modes_of(shift=0.0, turn_deg=0.0, bend=0.0, hand=False) -> list:
+    """(Hz, damping ratio, shape / sqrt(mass)) of each mode. shift: relative change of the frequencies of modes 11 to 31
+    Hz, 0 to 0.2 along a path (bend, 0 to 1, makes that path not linear in the modes' parameters); turn_deg: how far
+    mode shapes have turned.
     hand: in a light grip, a stiffer, heavier rigid body whose resonances are lower and more damped."""
     modes = []
     for axis in range(3):
@@ -81,7 +87,7 @@ def omega_like(shift: float = 0.0, turn_deg: float = 0.0, bend: float = 0.0, han
         grown = frequency * (1 + path * (1.0 if low else 0.2))
         softer = (0.94, 1.6) if hand and low else (1.0, 1.0)
         modes.append((grown * softer[0], damping * softer[1], np.sqrt(MODES_PER_KG[number]) * shape))
-    return _sampled(modes)
+    return modes
 
 
 def _turn(degrees, axis) -> np.ndarray:

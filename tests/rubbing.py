@@ -1,0 +1,83 @@
+"""The synthetic device of `plants` with dry friction at its handle. Nothing of an estimator is in it: modes stepped
+exactly at 20 kHz, friction as a set-valued force solved at each step (J. J. Moreau's time stepping), so it truly sticks.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.linalg import expm
+
+RATE_HZ, SUBSTEPS = 1000.0, 20
+SENSOR_RMS = np.array([0.042, 0.042, 0.083])
+"""Of an ADXL335 at 500 Hz, m/s²."""
+
+
+@dataclass(frozen=True)
+class Rubbing:
+    shapes: np.ndarray
+    """(modes, 3)"""
+    stiff: np.ndarray
+    """(modes, 2): squared angular frequency, damping over mass"""
+    step: np.ndarray
+    """(modes, 2, 3): [position, speed, force] to [position, speed] one substep later"""
+    friction_n: np.ndarray
+    """(3,): per axis of the handle"""
+
+    def play(self, commands) -> np.ndarray:
+        """True accelerations (N, 3), as `Plant.play`, from rest."""
+        W = np.einsum("ji,j,jk->ik", self.shapes, self.step[:, 1, 2], self.shapes)
+        return _play(np.ascontiguousarray(commands), self.shapes, self.stiff, self.step, W, self.friction_n)
+
+    def measured(self, commands, seed) -> np.ndarray:
+        """What the accelerometer reads."""
+        noise = np.random.default_rng(seed).standard_normal((len(commands), 3)) * SENSOR_RMS
+        return self.play(commands) + noise
+
+
+def rubbing(modes, friction_n) -> Rubbing:
+    """modes: of `plants.modes_of`. friction_n: one for all axes, or three."""
+    shapes = np.array([shape for _, _, shape in modes])
+    stiff = np.array([((2 * np.pi * f) ** 2, 4 * np.pi * zeta * f) for f, zeta, _ in modes])
+    step = np.empty((len(modes), 2, 3))
+    for row, (k, d) in zip(step, stiff, strict=True):
+        row[:] = expm(np.array([[0, 1, 0], [-k, -d, 1], [0, 0, 0]]) / (RATE_HZ * SUBSTEPS))[:2]
+    return Rubbing(shapes, stiff, step, np.broadcast_to(np.asarray(friction_n, float), 3).copy())
+
+
+@njit(cache=True)
+def _play(commands, shapes, stiff, step, W, friction_n):
+    h = 1 / (1000.0 * 20)
+    to_motor, to_sensor = 1 - np.exp(-2 * np.pi * 600 * h), 1 - np.exp(-2 * np.pi * 500 * h)
+    modes = len(shapes)
+    q, v, motor, sensor = np.zeros(modes), np.zeros(modes), np.zeros(3), np.zeros(3)
+    held, rub, free, read = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    out = np.empty(commands.shape)
+    for k in range(len(commands)):
+        out[k] = sensor
+        for _ in range(20):
+            before = motor.copy()
+            motor += to_motor * (held - motor)
+            mean = (before + motor) / 2
+            free[:] = 0.0
+            for j in range(modes):
+                force = shapes[j] @ mean
+                free += shapes[j] * (step[j, 1, 0] * q[j] + step[j, 1, 1] * v[j] + step[j, 1, 2] * force)
+            for _sweep in range(8):
+                for i in range(3):
+                    rest = free[i]
+                    for m in range(3):
+                        if m != i:
+                            rest += W[i, m] * rub[m]
+                    rub[i] = min(friction_n[i], max(-friction_n[i], -rest / W[i, i]))
+            read[:] = 0.0
+            for j in range(modes):
+                force = shapes[j] @ (mean + rub)
+                before_q, before_v = q[j], v[j]
+                q[j] = step[j, 0, 0] * before_q + step[j, 0, 1] * before_v + step[j, 0, 2] * force
+                v[j] = step[j, 1, 0] * before_q + step[j, 1, 1] * before_v + step[j, 1, 2] * force
+                # Mean acceleration of the step: what the sensor's pole is driven by.
+                read += shapes[j] * (v[j] - before_v) / h
+            sensor += to_sensor * (read - sensor)
+        held = commands[k].copy()
+    return out
