@@ -1,0 +1,121 @@
+"""What a recording holds of repeated looks at the plant: spectra of whole periods, or of windows where nothing repeats.
+
+An experiment is one excitation, seen one or more times. Spectra are rfft / length without the mean and without half the
+rate, so that white noise of variance s² has s² / length per line, whatever window was laid over it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
+_DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Experiment:
+    length: int
+    """Samples of one look: line k (from 1 on) lies at k rate / length."""
+    command: ComplexArray
+    """(looks, lines, inputs)"""
+    response: ComplexArray
+    """(looks, lines, outputs)"""
+    instrument: ComplexArray
+    """(looks, lines, inputs): the excitation, where it was recorded, else the command."""
+
+    @property
+    def looks(self) -> int:
+        return len(self.command)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """All experiments, and what had to be done to have them."""
+
+    experiments: tuple[Experiment, ...]
+    remarks: tuple[str, ...]
+    periodic: bool
+
+
+def instrument_of(recording: Recording) -> FloatArray:
+    """(n, inputs)"""
+    return (recording.command if recording.excitation is None else recording.excitation).samples
+
+
+def periodic_looks(recordings: Sequence[Recording]) -> Looks:
+    """Whole periods of every periodic broadband segment that is not kept for testing. The first period holds the
+    transient and is dropped, unless it is the only one; periods with missing samples are dropped too."""
+    experiments: list[Experiment] = []
+    alone, gaps = 0, 0
+    for recording in recordings:
+        for segment in recording.segments:
+            if segment.kind not in BROADBAND_KINDS or segment.period < 4 or segment.role == "test":
+                continue
+            starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
+            whole = [start for start in starts if _is_whole(recording, start, segment.period)]
+            gaps += len(starts) - len(whole)
+            counted = [start for start in whole if start != segment.start] or whole
+            alone += counted == [segment.start]
+            if counted:
+                experiments.append(_experiment(recording, counted, segment.period, np.ones(segment.period)))
+    remarks = []
+    if alone:
+        remarks.append(f"{_segments(alone)} had one usable period only: it was kept, with its transient.")
+    if gaps:
+        remarks.append(f"{_periods(gaps)} left out, because samples are missing in it.")
+    return Looks(tuple(experiments), tuple(remarks), periodic=True)
+
+
+def windowed_looks(recordings: Sequence[Recording], window_s: float) -> Looks:
+    """Hann windows that overlap by half, over everything that drives the plant."""
+    experiments: list[Experiment] = []
+    for recording in recordings:
+        length = max(8, round(window_s * recording.sample_rate_hz))
+        hann = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
+        for segment in _driven(recording):
+            starts = range(segment.start, segment.stop - length + 1, length // 2)
+            whole = [start for start in starts if _is_whole(recording, start, length)]
+            window = hann / np.sqrt(np.mean(hann**2))
+            # Unlike periods, windows are not alike: each is an experiment of its own.
+            experiments += [_experiment(recording, [start], length, window) for start in whole]
+    remark = f"No periodic excitation: averaged over Hann windows of {window_s:g} s (H1), which blur narrow resonances."
+    return Looks(tuple(experiments), (remark,), periodic=False)
+
+
+def _driven(recording: Recording) -> list[Segment]:
+    if not recording.segments:
+        return [Segment(0, len(recording), "noise")]
+    return [segment for segment in recording.segments if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
+
+
+def _is_whole(recording: Recording, start: int, length: int) -> bool:
+    there = slice(start, start + length)
+    signals = (recording.command.samples, recording.response.samples, instrument_of(recording))
+    return all(bool(np.isfinite(samples[there]).all()) for samples in signals)
+
+
+def _experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
+    def spectra(samples: FloatArray) -> ComplexArray:
+        looks = np.stack([samples[start : start + length] for start in starts])
+        looks = (looks - looks.mean(axis=1, keepdims=True)) * window[:, None]
+        return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+
+    return Experiment(
+        length,
+        spectra(recording.command.samples),
+        spectra(recording.response.samples),
+        spectra(instrument_of(recording)),
+    )
+
+
+def _segments(count: int) -> str:
+    return "One segment" if count == 1 else f"{count} segments"
+
+
+def _periods(count: int) -> str:
+    return "One period was" if count == 1 else f"{count} periods were"
