@@ -1,4 +1,4 @@
-"""The two passes of a tracker with stored gains, compiled: costate backward, model forward."""
+"""The two passes of a tracker with stored gains, compiled: costate backward, model forward; and one tick of it."""
 
 import numpy as np
 from numba import njit, types
@@ -6,6 +6,7 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 
 _VECTOR = types.float64[::1]
+_IN = types.Array(types.float64, 1, "C", readonly=True)
 _MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 _STACK = types.Array(types.float64, 3, "C", readonly=True)
 _OUT = types.float64[:, ::1]
@@ -73,3 +74,45 @@ def simulate(
         for c in range(n):
             z[c] = s[c]
     x[:] = z[:n]
+
+
+@njit(
+    types.void(_MATRIX, _STACK, _STACK, _IN, types.int64, _VECTOR),
+    cache=True,
+    nogil=True,
+    fastmath={"reassoc", "contract"},
+)
+def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, k: int, live: FloatArray) -> None:
+    """One tick of a transient that may turn: u = sum over c of direction_c g_kc - K_k x_k; no force after the last row.
+
+    g: (N, m, c); direction: (c,); live: (2 n + m + p,): the state, which becomes the next one; then the force of this
+    tick; then n numbers of work space; then what the model answers at this tick.
+    """
+    m, n = K.shape[1], K.shape[2]
+    for i in range(m):
+        force = 0.0
+        if k < K.shape[0]:
+            for c in range(direction.size):
+                force += g[k, i, c] * direction[c]
+            for c in range(n):
+                force -= K[k, i, c] * live[c]
+        live[n + i] = force
+    s = live[n + m :]
+    s[:] = 0.0
+    _add_product(live, step, s)
+    for c in range(n):
+        live[c] = s[c]
+
+
+@njit(types.void(_MATRIX, _STACK, _STACK, _MATRIX, _VECTOR, _OUT), cache=True, nogil=True)
+def run(
+    step: FloatArray, K: FloatArray, g: FloatArray, directions: FloatArray, live: FloatArray, out: FloatArray
+) -> None:
+    """`tick` for one row after the other of K, g and directions (T, c). out: (T, m + p), force and answer."""
+    m, n = K.shape[1], K.shape[2]
+    for row in range(directions.shape[0]):
+        tick(step, K, g, directions[row], row, live)
+        for i in range(m):
+            out[row, i] = live[n + i]
+        for i in range(out.shape[1] - m):
+            out[row, m + i] = live[2 * n + m + i]
