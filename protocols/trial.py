@@ -51,6 +51,8 @@ class Trial:
     status: TrialStatus
     angle_deg: float | None = None
     """Of the direction played, in the plane of the protocol's directions; does not depend on how they are labelled."""
+    wanted_mps2: float | None = None
+    """The acceleration that the level stands for. None where the level is the commanded force."""
 
     @property
     def counts(self) -> bool:

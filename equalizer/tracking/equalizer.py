@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from equalizer.signals.signal import Signal
+from equalizer.signals.signal import FloatArray, Signal
 
 
 class Equalizer(Protocol):
@@ -20,6 +20,11 @@ class Equalizer(Protocol):
         """One loop of the command, for one loop of the wanted signal. Both are whole periods and are repeated."""
         ...
 
+    def onset(self, wanted: Signal, envelope: FloatArray) -> Signal | None:
+        """The command that leads from rest into the loop while the wanted signal, one loop, rises by `envelope`,
+        shape (ticks,), 0 to 1; None where the loop's command times the envelope does that."""
+        ...
+
 
 class Identity:
     """No equalizer: the wanted force is the commanded force, as in the published study."""
@@ -31,3 +36,6 @@ class Identity:
         if wanted.quantity != "force":
             raise ValueError(f"without an equalizer only a force can be played, not {wanted.quantity}")
         return wanted
+
+    def onset(self, wanted: Signal, envelope: FloatArray) -> None:
+        return None

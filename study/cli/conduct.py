@@ -33,8 +33,16 @@ class Sitter:
     keys: AnswerKeys = DIGITS
 
 
-def begin(sitter: Sitter, protocol_name: str, device: str, data: Path, seed: int | None, as_json: bool) -> None:
-    plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data)
+def begin(
+    sitter: Sitter,
+    protocol_name: str,
+    device: str,
+    data: Path,
+    seed: int | None,
+    as_json: bool,
+    model: Path | None = None,
+) -> None:
+    plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data, model)
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
     _say_wait(sitter.observer)

@@ -6,24 +6,28 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption, show
+from study.cli.study import ModelOption, ProtocolOption, protocol_or_default
 
 
 def rehearse(
     subjects: Annotated[int, typer.Option(min=1, max=1000, help="How many simulated participants.")] = 10,
     out: Annotated[Path, typer.Option(help="Folder of the sessions and the report.")] = Path("rehearsal"),
-    protocol: Annotated[str, typer.Option(help="A shipped protocol's name, or a file.")] = "direction_threshold",
+    protocol: ProtocolOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the population and of all draws.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    model: ModelOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
     from study.cli.progress import bar
     from study.store.protocol_files import read_study_protocol
     from study.workflows.analyze_data import ANALYSIS_NAME, analyze_data
+    from study.workflows.equalize_stimuli import check_playable
     from study.workflows.rehearse_study import Rehearsal, rehearse_study
 
-    source = read_study_protocol(protocol, out)
-    rehearsal = Rehearsal(source.protocol, source.text, subjects=subjects, seed=seed, data=out)
+    source = read_study_protocol(protocol_or_default(protocol, model), out)
+    check_playable(source.protocol, model)
+    rehearsal = Rehearsal(source.protocol, source.text, subjects=subjects, seed=seed, data=out, model=model)
     with bar(f"{subjects} simulated participants", total=subjects) as advance:
         rehearse_study(rehearsal, workers=workers, on_finished=advance)
     show(analyze_data(out, out / ANALYSIS_NAME), as_json)

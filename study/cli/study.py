@@ -14,11 +14,21 @@ KeysOption = Annotated[
     str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 beside the digits, such as f,j.")
 ]
 
+ProtocolOption = Annotated[
+    str | None,
+    typer.Option(
+        help="A shipped protocol's name, or a file [default: direction_threshold; with --model: equalized_threshold]."
+    ),
+]
+ModelOption = Annotated[
+    Path | None, typer.Option(help="Identified model MODEL.h5: stimuli are accelerations, equalized through it.")
+]
+
 PlainOption = Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")]
 
 
 def study(
-    protocol: Annotated[str, typer.Option(help="A shipped protocol's name, or a file.")] = "direction_threshold",
+    protocol: ProtocolOption = None,
     device: DeviceOption = "simulated",
     subject: Annotated[str | None, typer.Option(help="Participant code, letters and digits.")] = None,
     observer: Annotated[
@@ -28,6 +38,7 @@ def study(
             "always_2, vibration_only, intensity_cue, drifting, scripted, or person (one of a simulated population)."
         ),
     ] = None,
+    model: ModelOption = None,
     plain: PlainOption = False,
     data: DataOption = Path("data"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all draws; drawn and logged if not given.")] = None,
@@ -37,13 +48,15 @@ def study(
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
     from study.cli.screen import has_keys, has_screen, open_screen
 
-    answer_keys = parse_keys(keys)
+    answer_keys, protocol = parse_keys(keys), protocol_or_default(protocol, model)
     if observer is None and not plain and has_screen():
         from study.tui.app_start import AppStart
         from study.tui.link.to_engine import Begin, SessionOrder
 
-        first = None if subject is None else Begin(SessionOrder(protocol, device, subject, str(data), seed))
-        open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed), as_json)
+        equalizer = "" if model is None else str(model)
+        order = None if subject is None else SessionOrder(protocol, device, subject, str(data), seed, equalizer)
+        first = None if order is None else Begin(order)
+        open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed, equalizer), as_json)
         return
     from study.cli.conduct import Sitter, begin
 
@@ -51,4 +64,8 @@ def study(
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
     sitter = Sitter(observer=observer, subject=subject, keys=answer_keys)
-    begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json)
+    begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model)
+
+
+def protocol_or_default(protocol: str | None, model: Path | None) -> str:
+    return protocol or ("direction_threshold" if model is None else "equalized_threshold")

@@ -24,6 +24,7 @@ def check_draw(event: TrialPresented, expected: Present) -> None:
         "direction": (event.direction, expected.label),
         "angle_deg": (event.angle_deg, expected.angle_deg),
         "polarity": (event.polarity, expected.polarity),
+        "wanted_mps2": (event.wanted_mps2, expected.wanted_mps2),
     }
     wrong = [f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _same(logged, due)]
     if wrong:
@@ -32,7 +33,7 @@ def check_draw(event: TrialPresented, expected: Present) -> None:
         )
 
 
-def _same(logged: str | float, due: str | float) -> bool:
+def _same(logged: str | float | None, due: str | float | None) -> bool:
     """Powers may differ in the last bit between machines; rules differ by far more."""
     if isinstance(logged, float) and isinstance(due, float):
         return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)

@@ -8,6 +8,7 @@ from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase
 from study.session.events import SessionOpened
+from study.session.level_scale import wanted_mps2
 from study.session.stimulus import direction_angle_deg
 
 
@@ -28,6 +29,8 @@ class Present:
     """The protocol's direction to play; another number than the label where labels are swapped."""
     angle_deg: float
     polarity: int
+    wanted_mps2: float | None = None
+    """The acceleration that the level stands for; None where levels are commanded forces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +68,7 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         direction=direction,
         angle_deg=direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
+        wanted_mps2=wanted_mps2(opened.equalized, newton, run.frequency_hz),
     )
 
 

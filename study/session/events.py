@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from protocols.trial import Phase
+from study.session.level_scale import EqualizedFacts
 from study.session.sitting_events import (
     FACT,
     DemoFinished,
@@ -77,6 +78,8 @@ class SessionOpened:
     device: DeviceFacts
     equalizer: str
     versions: dict[str, str]
+    equalized: EqualizedFacts | None = None
+    """Null: the commanded force is what was wanted."""
     event: Literal["session_opened"] = "session_opened"
 
 
@@ -96,6 +99,8 @@ class TrialPresented:
     """The number that is the right answer; with swapped labels not the number of the protocol's direction."""
     angle_deg: float
     polarity: Literal[-1, 1]
+    wanted_mps2: float | None = None
+    """The acceleration that the level stands for; null where levels are commanded forces."""
     event: Literal["trial_presented"] = "trial_presented"
 
 

@@ -1,6 +1,7 @@
 """From a level to a force that can be held: one loop of whole periods along one of the two directions."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,6 +36,13 @@ def loop_length(frequency_hz: float, sample_rate_hz: float) -> int:
     return rate // math.gcd(rate, frequency)
 
 
+def fade_in(settings: StimulusSettings, sample_rate_hz: float) -> FloatArray:
+    """(ticks,): how an amplitude rises, as the safety layer does it where a stimulus has no onset of its own."""
+    ticks = round(settings.fade_in_s * sample_rate_hz)
+    share: FloatArray = np.arange(ticks) / max(ticks, 1)
+    return share if settings.fade_shape == "linear" else 0.5 - 0.5 * np.cos(np.pi * share)
+
+
 def held_stimulus(
     settings: StimulusSettings,
     unit_vector: FloatArray,
@@ -55,8 +63,13 @@ def held_stimulus(
         unit="N" if force else "m/s^2",
         channels=("fx", "fy", "fz") if force else ("ax", "ay", "az"),
     )
+    envelope = fade_in(settings, sample_rate_hz)
+    loop, onset = equalizer.periodic(wanted), equalizer.onset(wanted, envelope)
+    if onset is not None:  # the loop goes on where its onset ends
+        loop = replace(loop, samples=np.roll(loop.samples, -len(envelope), axis=0))
     return HeldStimulus(
-        loop=equalizer.periodic(wanted),
+        loop=loop,
+        onset=onset,
         fade_in_s=settings.fade_in_s,
         fade_out_s=settings.fade_out_s,
         fade_shape=settings.fade_shape,

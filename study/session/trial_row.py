@@ -26,4 +26,5 @@ def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None) -
         felt=felt,
         status=TrialStatus.OPEN,
         angle_deg=event.angle_deg,
+        wanted_mps2=event.wanted_mps2,
     )

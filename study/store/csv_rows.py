@@ -6,7 +6,7 @@ True and false as `true` and `false`, nothing as an empty field, numbers with al
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from enum import Enum
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -36,15 +36,15 @@ def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
 
 
 def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
-    """Columns beyond the known ones are left out. Raises CsvError."""
+    """Columns beyond the known ones are left out; those with a default may be missing at the end. Raises CsvError."""
     try:
         lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
         raise CsvError((f"this is not CSV: {error}",)) from error
-    problem = header_problem(tuple(lines[0]), columns(row_type))
-    if problem:
+    names = _present(tuple(lines[0]), row_type)
+    if problem := header_problem(tuple(lines[0]), names):
         raise CsvError((problem,))
-    hints, names = get_type_hints(row_type), columns(row_type)
+    hints = get_type_hints(row_type)
     found: list[Row] = []
     problems: list[str] = []
     for number, line in enumerate(lines[1:], start=2):
@@ -63,6 +63,16 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
         rest = len(problems) - _SHOWN
         raise CsvError((*problems[:_SHOWN], *([f"and {rest} problems more like these"] if rest > 0 else [])))
     return tuple(found)
+
+
+def _present(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
+    """The columns to be read: those at the end that have a default may be missing, as in tables of before they
+    were."""
+    names = columns(row_type)
+    needed = sum(field.default is MISSING for field in fields(row_type))
+    while len(names) > needed and header[: len(names)] != names:
+        names = names[:-1]
+    return names
 
 
 def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:

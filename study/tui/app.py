@@ -214,7 +214,8 @@ class HapteqApp(App[None]):
         if self._sitting is not None:  # Enter twice: one sitting
             return
         start = self._start = replace(self._start, device=wanted.device)
-        await self._sit(Begin(SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed)))
+        order = SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed, start.model)
+        await self._sit(Begin(order))
 
     async def on_resume_wanted(self, wanted: home_messages.ResumeWanted) -> None:
         if self._sitting is not None:

@@ -17,3 +17,5 @@ class AppStart:
     """What the start screen proposes first; empty leaves it to the list."""
     seed: int | None = None
     """Of every session that is begun; None draws one each time."""
+    model: str = ""
+    """File of the identified model that equalizes the stimuli of every session that is begun; empty: none does."""

@@ -6,6 +6,7 @@ from protocols.trial import Phase
 from study.devices.device import Fault, Played
 from study.session.due_trial import Present
 from study.session.held_stimulus import HeldStimulus
+from study.session.level_scale import amplitude
 from study.session.state import SessionState
 from study.session.stimulus import direction_vector, held_stimulus
 from study.session.views import Answered, PlayingNotice, Question, Reply, Unanswered
@@ -74,7 +75,7 @@ def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldSt
         state.protocol.stimulus,
         direction_vector(state.protocol.directions, present.direction),
         present.frequency_hz,
-        present.polarity * present.level_n,
+        present.polarity * amplitude(state.opened.equalized, present.level_n, present.frequency_hz),
         sitting.equalizer,
         sitting.device.info.sample_rate_hz,
     )

@@ -4,7 +4,6 @@ import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from equalizer.tracking.equalizer import Identity
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault
 from study.devices.opening import open_device
@@ -14,11 +13,11 @@ from study.store.live_file import write_live
 from study.store.request_inbox import RequestInbox
 from study.workflows.attendant import Attendant
 from study.workflows.display import Display, Hand
+from study.workflows.equalize_stimuli import Equalized, check_playable, equalized_again, equalized_stimuli
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import (
     OpenedSession,
     SessionPlan,
-    check_playable,
     device_settings,
     opened_session,
 )
@@ -59,27 +58,25 @@ class Conducted:
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> Conducted:
     """Open the device, then the session, and run it."""
-    check_playable(plan.protocol)
+    check_playable(plan.protocol, plan.model)
     settings = device_settings(plan.protocol)
-    with (
-        contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
-        opened_session(plan, device.info, Identity.name, participant.clock) as opened,
-    ):
-        return _run(opened, device, participant)
+    with contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device:
+        equalized = equalized_stimuli(plan.protocol, plan.model, device.info)
+        with opened_session(plan, device.info, equalized, participant.clock) as opened:
+            return _run(opened, device, equalized, participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
     """Fold the log, open the device, and go on where the session stopped."""
     state = fold_session(folder).state
     settings = device_settings(state.protocol)
-    with (
-        contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
-        resumed_session(folder, device.info, participant.clock) as opened,
-    ):
-        return _run(opened, device, participant)
+    with contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device:
+        equalized = equalized_again(folder, state, device.info)
+        with resumed_session(folder, device.info, participant.clock) as opened:
+            return _run(opened, device, equalized, participant)
 
 
-def _run(opened: OpenedSession, device: Device, participant: Participant) -> Conducted:
+def _run(opened: OpenedSession, device: Device, equalized: Equalized, participant: Participant) -> Conducted:
     folder, protocol = opened.folder, opened.state.protocol
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
@@ -97,7 +94,7 @@ def _run(opened: OpenedSession, device: Device, participant: Participant) -> Con
         log=opened.log,
         clock=participant.clock,
         device=device,
-        equalizer=Identity(),
+        equalizer=equalized.equalizer,
         display=participant.display,
         hand=participant.hand,
         attendant=attendant,

@@ -4,6 +4,7 @@ from protocols.schedule import label_of
 from study.devices.device import Fault
 from study.session.due_trial import labels_are_swapped
 from study.session.events import DemoFinished, DemoPlayed
+from study.session.level_scale import amplitude
 from study.session.state import SessionState, felt
 from study.session.stimulus import direction_angle_deg, direction_vector, held_stimulus
 from study.session.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, picture_of
@@ -68,7 +69,7 @@ def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial
             protocol.stimulus,
             direction_vector(protocol.directions, direction),
             frequency_hz,
-            protocol.demo.level_n,
+            amplitude(state.opened.equalized, protocol.demo.level_n, frequency_hz),
             sitting.equalizer,
             sitting.device.info.sample_rate_hz,
         )

@@ -10,7 +10,6 @@ from protocols.hashing import protocol_hash
 from protocols.study_protocol import StudyProtocol
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo, DeviceSettings
-from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
 from study.session.fold import begin_session
 from study.session.limits import limits_of_study
@@ -19,6 +18,7 @@ from study.store.archive import SessionFolder, new_session_folder
 from study.store.event_log import EventLog
 from study.store.provenance import versions
 from study.store.session_lock import locked
+from study.workflows.equalize_stimuli import Equalized, keep_model
 from study.workflows.participant_number import participant_number
 
 
@@ -36,6 +36,8 @@ class SessionPlan:
     data: Path
     participant_number: int | None = None
     """Place in a balanced order; None counts the participants in the data folder."""
+    model: Path | None = None
+    """Identified model that equalizes the stimuli; None where forces are commanded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +61,10 @@ def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> Dev
     )
 
 
-def check_playable(protocol: StudyProtocol) -> None:
-    """Raises StudyError where the staircase is to move what this set-up cannot deliver."""
-    if protocol.stimulus.quantity == "delivered_acceleration":
-        raise StudyError(
-            "This protocol needs an equalizer",
-            f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and there is no equalizer model.",
-            'Set stimulus.quantity = "commanded_force": this version has no equalizer for it yet.',
-        )
-
-
 @contextmanager
-def opened_session(plan: SessionPlan, device: DeviceInfo, equalizer: str, clock: Clock) -> Iterator[OpenedSession]:
+def opened_session(
+    plan: SessionPlan, device: DeviceInfo, equalized: Equalized, clock: Clock
+) -> Iterator[OpenedSession]:
     """A new session, locked as long as the context lasts."""
     number = plan.participant_number
     if number is None:
@@ -89,10 +83,12 @@ def opened_session(plan: SessionPlan, device: DeviceInfo, equalizer: str, clock:
         protocol_locked=plan.protocol_locked,
         seed=plan.seed,
         device=device_facts(device),
-        equalizer=equalizer,
+        equalizer=equalized.equalizer.name,
         versions=versions(),
+        equalized=equalized.facts,
     )
     with locked(folder.path):
+        keep_model(equalized, folder)
         log = EventLog.create(folder.log)
         try:
             log.append(opened)

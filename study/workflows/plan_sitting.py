@@ -5,6 +5,7 @@ from pathlib import Path
 
 from study.store.archive import check_subject
 from study.store.protocol_files import read_study_protocol
+from study.workflows.equalize_stimuli import check_playable
 from study.workflows.open_session import SessionPlan, fresh_seed
 from study.workflows.participant_code import check_code, unfinished_sessions
 
@@ -16,7 +17,9 @@ class SittingPlan:
     """Worth knowing before anybody begins."""
 
 
-def plan_sitting(protocol_name: str, subject: str, observer: str | None, seed: int | None, data: Path) -> SittingPlan:
+def plan_sitting(
+    protocol_name: str, subject: str, observer: str | None, seed: int | None, data: Path, model: Path | None = None
+) -> SittingPlan:
     """observer: name of a simulated participant; None for a person. Raises StudyError where it cannot be begun."""
     source = read_study_protocol(protocol_name, data)
     plan = SessionPlan(
@@ -27,7 +30,9 @@ def plan_sitting(protocol_name: str, subject: str, observer: str | None, seed: i
         observer=observer,
         seed=fresh_seed() if seed is None else seed,
         data=data,
+        model=model,
     )
+    check_playable(plan.protocol, model)
     check_code(data, plan.subject, simulated=observer is not None)
     notes = tuple(
         f"{unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it."

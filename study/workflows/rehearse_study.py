@@ -28,6 +28,8 @@ class Rehearsal:
     subjects: int
     seed: int
     data: Path
+    model: Path | None = None
+    """Identified model that equalizes the stimuli."""
 
 
 def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[int], None]) -> None:
@@ -96,6 +98,7 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
             seed=seed,
             data=rehearsal.data,
             participant_number=number,
+            model=rehearsal.model,
         )
         conducted = conduct_new(plan, DEVICE, participant)
     elif fold_session(begun).state.closed:

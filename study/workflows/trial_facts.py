@@ -40,6 +40,7 @@ def presented(present: Present, sitting: Sitting) -> TrialPresented:
         direction=1 if present.label == 1 else 2,
         angle_deg=present.angle_deg,
         polarity=1 if present.polarity > 0 else -1,
+        wanted_mps2=present.wanted_mps2,
     )
 
 
@@ -102,6 +103,7 @@ def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting
         "trial": {"run": present.run, "trial": present.trial, "attempt": present.attempt},
         "frequency_hz": present.frequency_hz,
         "level_n": present.level_n,
+        "wanted_mps2": present.wanted_mps2,
         "unit_vector": [float(v) for v in outcome.vector],
         "hand": "held",
         "missed_ticks": outcome.played.health.missed_ticks,

@@ -8,7 +8,7 @@ import pytest
 from protocols.explain import explain
 from protocols.loading import load_protocol
 
-NAMES = ("direction_threshold", "direction_training", "ellipsoid", "sweep")
+NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
 
 
 def fields_of(name: str):

@@ -11,7 +11,7 @@ from protocols.dumping import dump_protocol, protocol_values
 from protocols.hashing import protocol_hash
 from protocols.loading import load_protocol, protocol_from_values
 
-NAMES = ("direction_threshold", "direction_training", "ellipsoid", "sweep")
+NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
 
 
 @pytest.fixture(params=NAMES)

@@ -6,10 +6,10 @@ import pytest
 
 from protocols.explain import explain
 from protocols.loading import load_protocol
-from protocols.recording_protocol import SineSegment, SweepSegment
+from protocols.recording_segments import SineSegment, SweepSegment
 from protocols.staircase_rule import StepChange, StepPhase
 
-NAMES = ("direction_threshold", "direction_training", "ellipsoid", "sweep")
+NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
 
 
 def text_of(name: str) -> str:

@@ -88,7 +88,8 @@ class Desk:
                 ask_session(SessionFolder(Path(session)), request, self._clock)
 
     def _begin(self, order: SessionOrder) -> None:
-        plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data))
+        model = Path(order.model) if order.model else None
+        plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
         for note in plan.notes:
             self._link.send(Trouble(note))
         self._sit(lambda participant: conduct_new(plan.session, order.device, participant))

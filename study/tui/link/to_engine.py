@@ -17,6 +17,8 @@ class SessionOrder:
     data: str
     seed: int | None = None
     """None: drawn, and logged."""
+    model: str = ""
+    """File of the identified model that equalizes the stimuli; empty where forces are commanded."""
 
 
 @dataclass(frozen=True, slots=True)

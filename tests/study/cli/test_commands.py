@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from study.cli.main import main
+from study.store.protocol_files import shipped_protocols
 
 
 @pytest.fixture
@@ -219,9 +220,7 @@ def test_a_wrong_protocol_names_file_key_and_what_is_allowed(run, small_file, tm
 def test_protocols_are_listed_and_explained(run):
     code, out, _ = run("protocol", "list")
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == [
-        "direction_threshold", "direction_training", "ellipsoid", "sweep",
-    ]  # fmt: skip
+    assert [line.split()[0] for line in out.splitlines()] == list(shipped_protocols())
     code, out, _ = run("protocol", "show", "direction_threshold")
     assert "staircase.step_change = after_reversal" in out
     code, out, _ = run("protocol", "show", "direction_threshold", "--json")

@@ -60,6 +60,9 @@ def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
             assert wanted.unit == "m/s^2"
             return Signal(0.5 * wanted.samples, wanted.sample_rate_hz, "force", "N", ("fx", "fy", "fz"))
 
+        def onset(self, wanted: Signal, envelope) -> None:
+            return None
+
     vector = direction_vector(small_protocol.directions, 1)
     held = held_stimulus(small_protocol.stimulus, vector, 25.0, 4.0, HalfKilogram(), RATE_HZ)
     assert np.abs(held.loop.samples @ vector).max() == pytest.approx(2.0)

@@ -42,7 +42,8 @@ def change(path: Path) -> None:
 
 
 def test_the_shipped_protocols_are_listed_and_each_can_be_read():
-    assert shipped_protocols() == ("direction_threshold", "direction_training", "ellipsoid", "sweep")
+    studies, recordings = {"direction_threshold", "direction_training", "equalized_threshold"}, {"ellipsoid", "sweep"}
+    assert studies | recordings <= set(shipped_protocols())
     for name in shipped_protocols():
         found = read_protocol(name)
         assert (found.protocol.name, found.path, found.locked) == (name, None, False)
@@ -66,7 +67,7 @@ def test_an_unknown_name_is_refused_with_a_guess_and_the_list():
     assert caught.value.happened == (
         "'direction_treshold' is neither a file nor a shipped protocol. Did you mean direction_threshold?"
     )
-    assert caught.value.do_now.endswith("one of direction_threshold, direction_training, ellipsoid, sweep.")
+    assert caught.value.do_now.endswith(f"one of {', '.join(shipped_protocols())}.")
     assert caught.value.exit_code is ExitCode.WRONG_USE
 
 

@@ -214,7 +214,7 @@ def test_a_protocol_in_acceleration_is_refused_without_an_equalizer(sitter):
     with pytest.raises(StudyError) as error:
         sitter.whole()
     assert "needs an equalizer" in error.value.title
-    assert 'stimulus.quantity = "commanded_force"' in error.value.do_now
+    assert "--model MODEL.h5" in error.value.do_now
 
 
 def test_nothing_is_presented_when_the_log_cannot_be_written(sitter, monkeypatch):

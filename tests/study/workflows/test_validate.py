@@ -11,6 +11,7 @@ from protocols.trial import Trial
 from study.store.csv_rows import rows_to_csv
 from study.store.identified_model_file import write_identified_model
 from study.store.json_document import write_json
+from study.store.protocol_files import shipped_protocols
 from study.store.recording_file import write_recording
 from study.store.thresholds_file import write_thresholds
 from study.workflows.file_content import FileContent
@@ -81,7 +82,7 @@ def test_a_mechanical_model_is_described_with_its_effects(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", ["direction_threshold", "direction_training", "ellipsoid", "sweep"])
+@pytest.mark.parametrize("name", shipped_protocols())
 def test_the_shipped_protocols_are_sound(name):
     assert f"protocol '{name}'" in sound(SHIPPED / f"{name}.toml")
 

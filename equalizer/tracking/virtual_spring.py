@@ -1,0 +1,33 @@
+"""The spring that holds the handle at its place, taken into account where something is played against it.
+
+A model goes from the force that enters the plant to what comes out. Where a spring adds to the commands, they must
+leave to it what it will do along the planned motion: u = f - s, with the spring's force s = -(k x + b v).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class VirtualSpring:
+    stiffness_n_per_m: float = 0.0
+    damping_n_s_per_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness_n_per_m", "damping_n_s_per_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} is {value}; it must be a number that is not negative")
+
+    def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
+        """(lines,), N per m/s², of a handle that swings at these frequencies, all above zero."""
+        s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
+        return np.asarray(-(self.stiffness_n_per_m + self.damping_n_s_per_m * s) / s**2)
+
+
+NO_SPRING = VirtualSpring()

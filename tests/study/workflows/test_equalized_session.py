@@ -1,0 +1,132 @@
+"""A session whose stimuli go through a model: what a level means, what is logged, what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.plant.identified_model import IdentifiedModel
+from protocols.loading import load_protocol
+from study.devices.clock import VirtualClock
+from study.errors import StudyError
+from study.store.identified_model_file import write_identified_model
+from study.store.trial_recordings import find_trial_recording, recording_name
+from study.store.trials_file import TRIALS_NAME, read_trials
+from study.workflows.conduct_session import conduct_new, conduct_resumed
+from study.workflows.fold_session import fold_session
+from study.workflows.open_session import SessionPlan
+from study.workflows.session_results import write_tables
+from study.workflows.simulated_participant import simulated_participant
+
+MASS_KG = np.array([0.3, 0.4, 0.5])
+
+
+def rigid(band_hz=(4.0, 50.0), **changes) -> IdentifiedModel:
+    """A mass of its own along each axis: what a command gives is known in the head."""
+    model = IdentifiedModel(
+        np.zeros((3, 3)), np.diag(1 / MASS_KG), np.eye(3), np.zeros((3, 3)), 1000.0, band_hz, "N", "m/s^2",
+        ("fx", "fy", "fz"), ("ax", "ay", "az"),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def planned(small_text, folder) -> SessionPlan:
+    write_identified_model(folder / "rigid.h5", rigid())
+    text = small_text.replace("[stimulus]\n", '[stimulus]\nquantity = "delivered_acceleration"\n')
+    protocol = load_protocol(text, "small.toml")
+    return SessionPlan(protocol, text, False, "S1", "ideal", 7, folder / "data", model=folder / "rigid.h5")
+
+
+@pytest.fixture
+def plan(small_text, tmp_path):
+    return planned(small_text, tmp_path)
+
+
+def take(plan):
+    clock = VirtualClock()
+    return conduct_new(plan, "simulated", simulated_participant("ideal", 7, clock))
+
+
+@pytest.fixture(scope="module")
+def conducted(small_text, tmp_path_factory):
+    return take(planned(small_text, tmp_path_factory.mktemp("equalized")))
+
+
+def test_both_directions_are_wanted_equally_strong_and_the_harder_one_reaches_the_cap(conducted):
+    equalized = conducted.state.opened.equalized
+    assert {scale.frequency_hz for scale in equalized.levels} == {5.0, 25.0, 35.0}
+    for scale in equalized.levels:
+        assert scale.reachable_mps2 == pytest.approx(3.0 / scale.n_per_mps2)
+    # Both directions lie at 45 degrees in the yz plane; without a spring the peak is sqrt((0.4² + 0.5²) / 2) N.
+    at_35_hz = next(scale for scale in equalized.levels if scale.frequency_hz == 35.0)
+    assert at_35_hz.n_per_mps2 == pytest.approx(np.sqrt((0.4**2 + 0.5**2) / 2), rel=0.05)
+
+
+def test_every_trial_says_which_acceleration_its_level_stands_for(conducted):
+    write_tables(conducted.folder)
+    n_per_mps2 = {scale.frequency_hz: scale.n_per_mps2 for scale in conducted.state.opened.equalized.levels}
+    trials = read_trials(conducted.folder.path / TRIALS_NAME)
+    assert len(trials) > 10
+    for trial in trials:
+        assert trial.wanted_mps2 == pytest.approx(trial.level_n / n_per_mps2[trial.frequency_hz])
+
+
+def test_what_is_commanded_is_what_the_model_needs_with_the_spring_left_to_itself(conducted):
+    """A rigid mass under the protocol's spring: total force = mass times acceleration."""
+    trial = next(t for t in conducted.state.trials if t.frequency_hz == 5.0)
+    _, recording = find_trial_recording(conducted.folder, recording_name(trial.run, trial.trial, trial.attempt))
+    n = 200
+    phasor = np.fft.rfft(recording.excitation.samples[-n:], axis=0)[1] * 2 / n
+    info = conducted.state.opened.device
+    assert info.simulated
+    stiffness = 0.282 * (2 * np.pi * 3.5) ** 2
+    needed = MASS_KG[1:] - stiffness / (2 * np.pi * 5.0) ** 2
+    assert np.abs(phasor[1:]) == pytest.approx(np.abs(needed) * trial.wanted_mps2 / np.sqrt(2), rel=0.01)
+    assert abs(phasor[0]) < 1e-6
+
+
+def test_a_session_goes_on_with_the_model_it_was_begun_with(conducted):
+    (conducted.folder.path.parents[1] / "rigid.h5").unlink()
+    assert fold_session(conducted.folder).state == conducted.state
+    with pytest.raises(StudyError, match="finished"):  # and not the model, which is in the folder
+        conduct_resumed(conducted.folder, "simulated", simulated_participant("ideal", 7, VirtualClock()))
+    (conducted.folder.path / "model.h5").write_bytes(b"another")
+    with pytest.raises(StudyError, match="not the one it was begun with"):
+        conduct_resumed(conducted.folder, "simulated", simulated_participant("ideal", 7, VirtualClock()))
+
+
+def refused(plan, **changes) -> str:
+    write_identified_model(plan.model, rigid(**changes), overwrite=True)
+    with pytest.raises(StudyError) as refusal:
+        take(plan)
+    assert not plan.data.exists()
+    return str(refusal.value)
+
+
+def test_a_model_that_does_not_cover_the_protocol_is_refused(plan):
+    said = refused(plan, band_hz=(5.0, 30.0))
+    assert "was made for 5 to 30 Hz; the protocol also plays 35 Hz" in said
+    assert "--band 5 50" in said
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"A": 1.01 * np.eye(3)}, "is not stable"),
+        ({"sample_rate_hz": 2000.0}, "runs at 2000 Hz, the device at 1000 Hz"),
+        ({"place_m": (0.05, 0.0, 0.0)}, "and the study is at the centre"),
+        ({"output_unit": "m"}, "three accelerations in m/s^2"),
+    ],
+)
+def test_a_model_of_something_else_is_refused(plan, changes, said):
+    assert said in refused(plan, **changes)
+
+
+def test_a_protocol_of_commanded_forces_does_not_pretend_to_use_a_model(plan, small_protocol):
+    with pytest.raises(StudyError, match="would change nothing"):
+        take(replace(plan, protocol=small_protocol))
+
+
+def test_a_protocol_of_accelerations_needs_a_model(plan):
+    with pytest.raises(StudyError, match="no model was given"):
+        take(replace(plan, model=None))
