@@ -1,0 +1,107 @@
+"""How well a model predicts what it has not seen: free simulation over the segments that were kept for a test."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import simulate
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+LEAD_S = 2.0
+"""Simulated before a segment that is not periodic, as far as the recording has it: the state has then settled."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    error: float
+    """Root-mean-square of prediction - response over that of the response, all channels, within the model's band."""
+    noise: float | None
+    """Of the response alone, by the same measure, from period to period; None without two whole periods. An error
+    cannot fall below it, a perfect model's lies just there."""
+    seconds: float
+    """Compared."""
+
+
+def held_out(model: IdentifiedModel, recordings: Sequence[Recording]) -> HeldOut | None:
+    """Over all segments with the role "test"; None where there are none. The command is what entered the plant.
+
+    Raises ValueError where channels or rate are not the model's.
+    """
+    parts = [_compared(model, recording, segment) for recording, segment in _kept_for_a_test(recordings)]
+    if not parts:
+        return None
+    power = sum(part.power for part in parts)
+    noises = [part.noise_power for part in parts]
+    told = [noise for noise in noises if noise is not None]
+    return HeldOut(
+        error=float(np.sqrt(sum(part.error_power for part in parts) / power)),
+        noise=float(np.sqrt(sum(told) / power)) if len(told) == len(noises) else None,
+        seconds=sum(part.seconds for part in parts),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    error_power: float
+    noise_power: float | None
+    power: float
+    seconds: float
+
+
+def _kept_for_a_test(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, Segment]]:
+    for recording in recordings:
+        for segment in recording.segments:
+            if segment.role == "test":
+                yield recording, segment
+
+
+def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) -> _Part:
+    _check(model, recording)
+    rate_hz = recording.sample_rate_hz
+    start = max(0, segment.start - round(LEAD_S * rate_hz))
+    commands = recording.command.samples[start : segment.stop]
+    response = recording.response.samples[start : segment.stop]
+    if not (np.isfinite(commands).all() and np.isfinite(response).all()):
+        raise ValueError(f"samples {start} to {segment.stop} hold missing values; a test segment needs all of them")
+    predicted = simulate(model, commands)
+    last = _last_whole_part(segment) - start
+    length = segment.stop - start - last
+    measured = _in_band(response[last:], rate_hz, model.band_hz)
+    error = measured - _in_band(predicted[last:], rate_hz, model.band_hz)
+    noise = None
+    if segment.period and last - length >= segment.start - start:
+        before = _in_band(response[last - length : last], rate_hz, model.band_hz)
+        noise = _power(measured - before) / 2
+    return _Part(_power(error), noise, _power(measured), length / rate_hz)
+
+
+def _last_whole_part(segment: Segment) -> int:
+    """First sample of what is compared: the last period, the transient being over by then, or the whole segment."""
+    periods = (segment.stop - segment.start) // segment.period if segment.period else 0
+    return segment.stop - segment.period if periods >= 1 else segment.start
+
+
+def _in_band(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> ComplexArray:
+    lines = np.fft.rfftfreq(len(samples), 1 / rate_hz)
+    inside = (lines >= band_hz[0]) & (lines <= band_hz[1])
+    if not inside.any():
+        raise ValueError(f"{len(samples)} samples are too few to compare {band_hz[0]:g} to {band_hz[1]:g} Hz")
+    return np.asarray(np.fft.rfft(samples, axis=0)[inside], dtype=np.complex128)
+
+
+def _power(spectrum: ComplexArray) -> float:
+    return float((np.abs(spectrum) ** 2).sum())
+
+
+def _check(model: IdentifiedModel, recording: Recording) -> None:
+    if recording.sample_rate_hz != model.sample_rate_hz:
+        raise ValueError(
+            f"a recording at {recording.sample_rate_hz:g} Hz cannot test a model at {model.sample_rate_hz:g}"
+        )
+    shape = (len(recording.response.channels), len(recording.command.channels))
+    if shape != model.D.shape:
+        raise ValueError(f"a recording of {shape[1]} commands and {shape[0]} responses cannot test this model")
