@@ -1,0 +1,91 @@
+"""Starts for the search, each refined to its nearest best fit, and the choice among them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.modal_form import ModalForm
+from equalizer.identification.refinement import FittedForm, fitted, refine
+from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.stable_poles import largest_radius
+from equalizer.identification.warped_subspace import default_horizon, poles_and_shapes, warped_subspace
+from equalizer.identification.weighted_lines import (
+    WeightedLines,
+    bin_centres_hz,
+    binned,
+    bins_of,
+)
+from equalizer.signals.lockin import ComplexArray
+
+LINES_PER_BIN = 5
+OCTAVE_SHARE = 1 / 40
+"""Width of a bin of a wide band."""
+LARGEST_GAIN = 100.0
+"""Outside the band, over the largest inside: beyond it a model is a fit by cancellation."""
+MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """Where a search begins."""
+
+    name: str
+    form: ModalForm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """Where it ended."""
+
+    name: str
+    fitted: FittedForm
+    cost: float
+    """Squared residual over noise variance, mean over all entries of all lines: about 1 at the noise."""
+    outside_gain: float
+    """Largest gain outside the band over the largest inside."""
+
+    @property
+    def sane(self) -> bool:
+        return self.outside_gain <= LARGEST_GAIN
+
+
+def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
+    radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
+    shortest = default_horizon(settings.order, lines.response.shape[1])
+    starts = []
+    for longer in settings.longer_horizons:
+        subspace = warped_subspace(lines, shortest + longer, settings.centre_hz)
+        form = poles_and_shapes(subspace, settings.order, radius)
+        starts.append(Start(f"warped subspace, horizon {shortest + longer}", form))
+    return tuple(starts)
+
+
+def candidate(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+    """Refined on bins, which are formed anew about each pass's result, and at last on all lines of a narrow band."""
+    radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
+    bins = bins_of(lines, 1, OCTAVE_SHARE) if settings.wide else bins_of(lines, LINES_PER_BIN, 0.0)
+    centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
+    found = fitted(start.form, lines)
+    for steps in MOST_STEPS:
+        found = refine(found.form, binned(lines, bins, found.response(lines.z), found.response(centres)), radius, steps)
+    if not settings.wide:
+        found = refine(found.form, lines, radius, LAST_STEPS)
+    cost = lines.cost(found.response(lines.z)) / lines.response.size
+    return Candidate(start.name, found, cost, outside_gain(found, lines))
+
+
+def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
+    """The largest response anywhere over the largest on the lines."""
+    every = np.exp(1j * np.linspace(0, np.pi, 2000))
+    return float(_largest(found.response(every)) / _largest(found.response(lines.z)))
+
+
+def best(found: Sequence[Candidate]) -> Candidate:
+    """The cheapest of the sane ones; of none sane, the least extreme."""
+    sane = [one for one in found if one.sane]
+    return min(sane, key=lambda one: one.cost) if sane else min(found, key=lambda one: one.outside_gain)
+
+
+def _largest(response: ComplexArray) -> float:
+    return float(np.linalg.norm(response, ord=2, axis=(1, 2)).max())

@@ -1,0 +1,52 @@
+"""What identification is asked for."""
+
+from dataclasses import dataclass
+
+WIDE_OCTAVES = 4.5
+"""A band wider than this is fitted on logarithmic bins: on a linear axis its top would outnumber its bottom."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationSettings:
+    band_hz: tuple[float, float] = (5.0, 35.0)
+    order: int = 26
+    """Number of states; even, because poles are fitted in pairs."""
+    longest_decay_s: float = 0.5
+    """No pole dies out slower than this. Raise it for a device that rings longer."""
+    longer_horizons: tuple[int, ...] = (0, 2)
+    """Block rows beyond the shortest useful horizon; each is a start of its own."""
+    margin: float = 0.1
+    """Lines this far beyond the band, relative, help to hold its edges if they were measured."""
+    draws: int = 40
+    """Of the parameters from their uncertainty; 0 = none."""
+    seed: int = 1
+    """Of the draws."""
+
+    def __post_init__(self) -> None:
+        low, high = self.band_hz
+        if not 0 < low < high:
+            raise ValueError(f"band_hz is {low:g} to {high:g}; it must rise from above 0")
+        if self.order < 2 or self.order % 2:
+            raise ValueError(f"order is {self.order}; it must be even and at least 2, because poles come in pairs")
+        if not self.longest_decay_s > 0:
+            raise ValueError(f"longest_decay_s is {self.longest_decay_s:g}; it must be above 0")
+        if not self.longer_horizons or min(self.longer_horizons) < 0:
+            raise ValueError(f"longer_horizons is {self.longer_horizons}; at least one number that is not negative")
+        if self.margin < 0 or self.draws < 0:
+            raise ValueError(f"margin is {self.margin:g} and draws {self.draws}; neither may be negative")
+
+    @property
+    def fitted_hz(self) -> tuple[float, float]:
+        """The band and its margin."""
+        low, high = self.band_hz
+        return low / (1 + self.margin), high * (1 + self.margin)
+
+    @property
+    def centre_hz(self) -> float:
+        low, high = self.band_hz
+        return float((low * high) ** 0.5)
+
+    @property
+    def wide(self) -> bool:
+        low, high = self.band_hz
+        return bool(high > low * 2.0**WIDE_OCTAVES)
