@@ -1,12 +1,13 @@
 """Feedforward forces that make a model follow a trajectory best, from gains that are computed once.
 
 No measured signal is fed back. The gains do act on a state, but on that of the simulated model: leaving K x out
-altogether, as "feedback set to zero" could be read, misses the trajectory by more than its own size.
+altogether, as "feedback set to zero" could be read, misses the trajectory by most of its own size.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking import lqr_kernel, riccati_kernel
@@ -78,10 +79,23 @@ def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: Flo
 def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
     """(n,): the state at the first row of `forces`, (T, m), when they are repeated for ever. The end of a fade-in that
     is drawn there goes over into the loop without a transient. Raises TrackingError on a model that never settles."""
+    _require_stable(problem, "repeated forces lead to no periodic state")
     x = np.zeros(problem.order)
     for force in np.asarray(forces, dtype=np.float64):
         x = problem.A @ x + problem.B @ force
     around = np.eye(problem.order) - np.linalg.matrix_power(problem.A, len(forces))
-    if np.abs(np.linalg.eigvals(problem.A)).max(initial=0.0) >= 1:
-        raise TrackingError("the model is not stable, so that repeated forces lead to no periodic state")
     return np.asarray(np.linalg.solve(around, x))
+
+
+def ringing_weight(problem: TrackingProblem) -> FloatArray:
+    """(n, n): the terminal weight that counts all that is still to come. A state that differs by d from the one meant
+    at the end, with forces that go on as meant (none after a transient, the loop after a fade-in), costs d' P_N d in
+    deviations of the outputs for ever after. Raises TrackingError on a model that never settles."""
+    _require_stable(problem, "what rings after the end never dies away")
+    return np.asarray(solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C))
+
+
+def _require_stable(problem: TrackingProblem, consequence: str) -> None:
+    radius = float(np.abs(np.linalg.eigvals(problem.A)).max(initial=0.0))
+    if radius >= 1:
+        raise TrackingError(f"the model is not stable (spectral radius {radius:.6g}), so that {consequence}")

@@ -1,8 +1,8 @@
 """Room before and after a finite trajectory, and what it costs to play only the rows in between.
 
 An inverse acts before what is wanted and after it. Zeros wanted on both sides give it room. Where only the trajectory's
-own rows are played, from rest, what lies in the room before is lost: then none is best (`Padding(before_s=0)`), for the
-forces are then the best of all that begin with the first row.
+own rows are played, from rest, what lies in the room before is lost, and the forces were made for a motion that is not
+there: then no room before is best (`CAUSAL`), for the forces are then the best of all that begin with the first row.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Padding:
 
 
 CAUSAL = Padding(before_s=0.0)
-"""Nothing before the first row: a start that nobody knew of."""
+"""Nothing before the first row: for a start that nobody knew of, and where the rows alone are played."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,9 +53,9 @@ class PaddedTrack:
 def track_padded(
     problem: TrackingProblem, wanted: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
 ) -> PaddedTrack:
-    """wanted: (N, p), from rest. padding: None = 0.3 s each. gains: of the length with padding; None = computed."""
+    """wanted: (N, p), from rest. padding: None = CAUSAL. gains: of the length with padding; None = computed."""
     r = checked_wanted(problem, wanted)
-    before, after = (padding or Padding()).samples(problem.sample_rate_hz)
+    before, after = (padding or CAUSAL).samples(problem.sample_rate_hz)
     padded = np.pad(r, ((before, after), (0, 0)))
     whole = track(gains or stored_gains(problem, len(padded)), padded)
     rows = slice(before, before + len(r))

@@ -2,7 +2,8 @@
 
 The gains are those far from any end. What is not yet known is taken as zero, which is the best guess about a signal of
 which nothing else is known: this is linear-quadratic preview control. The inverse of a device that answers a constant
-force with no acceleration looks far ahead; a low-frequency weight shortens that (`TrackingWeights`).
+force with no acceleration looks far ahead; a low-frequency weight shortens that (`TrackingWeights`), to some 0.2 s, at
+the price of a larger loss with less preview than that, and a small one with all: `preview_loss` weighs them.
 """
 
 from dataclasses import dataclass

@@ -17,6 +17,13 @@ NO_CURVATURE = (
     "the force weight must be above zero"
 )
 
+NOT_STATIONARY = (
+    "there are no stationary gains: what the forces cannot reach must die away by itself, and with a delay or without "
+    "feedthrough the force weight must be above zero"
+)
+STATIONARY = 1e-6
+"""One more step may change P by so much, relative to its largest entry."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
@@ -65,11 +72,13 @@ def stationary_gains(problem: TrackingProblem) -> Gains:
     A, B, C, D, Q, R = problem.A, problem.B, problem.C, problem.D, problem.Q, problem.R
     try:
         P = solve_discrete_are(A, B, C.T @ Q @ C, R + D.T @ Q @ D, s=C.T @ Q @ D)
+        gains = backward_gains(problem, 1, (P + P.T) / 2)
     except (LinAlgError, ValueError) as error:
-        raise TrackingError(
-            f"there are no stationary gains ({error}); raise the force weight or the low-frequency weight"
-        ) from error
-    return backward_gains(problem, 1, (P + P.T) / 2)
+        raise TrackingError(NOT_STATIONARY) from error
+    steady = np.abs(np.linalg.eigvals(A - B @ gains.K[0])).max(initial=0.0) < 1
+    if not (steady and np.abs(gains.P - P).max(initial=0.0) <= STATIONARY * np.abs(P).max(initial=0.0)):
+        raise TrackingError(NOT_STATIONARY)
+    return gains
 
 
 def checked_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
