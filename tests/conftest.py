@@ -96,3 +96,13 @@ def plants() -> ModuleType:
     module = sys.modules["plants"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def rubbing() -> ModuleType:
+    """`tests/rubbing.py`, the synthetic device with dry friction. Imported late: it compiles."""
+    spec = importlib.util.spec_from_file_location("rubbing", Path(__file__).parent / "rubbing.py")
+    assert spec is not None and spec.loader is not None
+    module = sys.modules["rubbing"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,5 +1,5 @@
 """The synthetic device of `plants` with dry friction at its handle. Nothing of an estimator is in it: modes stepped
-exactly at 20 kHz, friction as a set-valued force solved at each step (J. J. Moreau's time stepping), so it truly sticks.
+exactly at 20 kHz, friction a set-valued force solved at each step (Moreau's time stepping), so it truly sticks.
 """
 
 from dataclasses import dataclass

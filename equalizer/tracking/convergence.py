@@ -1,0 +1,62 @@
+"""Whether repeating will converge, before anything is played.
+
+Forces that are corrected by u <- u + beta Gm⁻¹ e leave the error (I - beta G Gm⁻¹) e on a linear device: at every
+line its largest singular value says how much of an error survives, at worst, in any direction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Convergence:
+    frequency_hz: FloatArray
+    """(lines,): of the band alone."""
+    surviving: FloatArray
+    """(lines,): largest singular value of I - beta G Gm⁻¹; of the worst response where several were given."""
+    beta: float
+    safe_beta: float
+    """Below it every error shrinks at every line, whatever its direction; 0 where no gain does that. At most 2."""
+
+    @property
+    def converges(self) -> bool:
+        return bool(self.surviving.max() < 1)
+
+    @property
+    def worst_hz(self) -> float:
+        return float(self.frequency_hz[self.surviving.argmax()])
+
+
+def convergence(
+    model: ComplexArray,
+    device: ComplexArray,
+    frequency_hz: FloatArray,
+    band_hz: tuple[float, float],
+    beta: float = 1.0,
+) -> Convergence:
+    """model: (lines, p, p). device: (lines, p, p), or (draws, lines, p, p): a second measurement, or what the device
+    may be within the model's uncertainty. Raises ValueError on other shapes, and where no line lies in the band.
+    """
+    device = np.asarray(device)[np.newaxis] if np.ndim(device) == 3 else np.asarray(device)
+    if model.ndim != 3 or model.shape[1] != model.shape[2] or device.shape[1:] != model.shape:
+        raise ValueError(
+            f"responses have shapes {model.shape} and {device.shape[1:]}; both must be (lines, p, p): as many forces "
+            "as responses"
+        )
+    inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
+    if not inside.any():
+        raise ValueError(f"no line lies in the band of {band_hz[0]:g} to {band_hz[1]:g} Hz")
+    played = np.asarray(device[:, inside] @ np.linalg.inv(model[inside]), dtype=np.complex128)
+    survivors = np.linalg.svd(np.eye(model.shape[1]) - beta * played, compute_uv=False)[..., 0]
+    return Convergence(frequency_hz[inside], survivors.max(axis=0), beta, _safe_beta(played))
+
+
+def _safe_beta(played: ComplexArray) -> float:
+    """|I - beta T| < 1 is T + T* > beta T* T, which is T⁻¹ + T⁻* > beta."""
+    inverse = np.linalg.inv(played)
+    lowest = np.linalg.eigvalsh(inverse + inverse.conj().swapaxes(-1, -2))[..., 0].min()
+    return float(np.clip(lowest, 0.0, 2.0))
