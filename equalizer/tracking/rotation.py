@@ -38,7 +38,7 @@ class RotationBasis:
         turned = np.asarray(direction, dtype=np.float64)
         if turned.shape != self.direction_shape:
             raise TrackingError(f"a direction has shape {turned.shape}; this basis takes {self.direction_shape}")
-        combined: FloatArray = turned.reshape(-1) @ stored
+        combined: FloatArray = np.dot(turned.reshape(-1), stored)
         return combined.reshape(-1, columns)
 
 

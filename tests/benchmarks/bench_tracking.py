@@ -3,6 +3,7 @@
 import ctypes
 import sys
 import time
+import timeit
 from collections.abc import Callable
 
 import numpy as np
@@ -56,26 +57,21 @@ def plain(problem: TrackingProblem, wanted: np.ndarray) -> np.ndarray:
 
 
 def seconds(action: Callable[[], object], times: int) -> float:
-    """Of the quickest: the others were disturbed."""
-    taken = []
-    for _ in range(times):
-        start = time.perf_counter()
-        action()
-        taken.append(time.perf_counter() - start)
-    return min(taken)
+    """Per call, of the quickest batch: the others were disturbed."""
+    return min(timeit.repeat(action, number=max(1, times // 50), repeat=min(times, 50))) / max(1, times // 50)
 
 
 def forms(order: int, samples: int, dense: bool) -> dict[str, tuple[Callable[[], np.ndarray], int]]:
     """Each with how often it is timed. All give the forces for one trajectory."""
     problem, wanted = problem_of(order), np.random.default_rng(0).standard_normal((samples, 3))
-    gains, one = stored_gains(problem, samples), np.eye(3)[0]
+    gains, axes = stored_gains(problem, samples), np.eye(3)
     nine, three = rotation_basis(gains, wanted), normal_basis(gains, wanted[:, 0])
     every: dict[str, tuple[Callable[[], np.ndarray], int]] = {
-        "plain numpy recursion": (lambda: plain(problem, wanted), 3),
+        "plain numpy recursion": (lambda: plain(problem, wanted), max(2, 7500 // samples)),
         "compiled recursion": (lambda: track(stored_gains(problem, samples), wanted).forces, 20),
         "stored gains": (lambda: track(gains, wanted).forces, 100),
-        "rotation basis": (lambda: nine.forces(np.eye(3)), 3000),
-        "basis of a normal": (lambda: three.forces(one), 3000),
+        "rotation basis": (lambda: nine.forces(axes), 10_000),
+        "basis of a normal": (lambda: three.forces(axes[0]), 10_000),
     }
     if dense:
         every["dense least squares"] = (lambda: least_squares_forces(problem, wanted), 1)
