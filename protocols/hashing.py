@@ -2,12 +2,15 @@
 
 import hashlib
 import json
+from typing import Any
 
 from protocols.dumping import protocol_values
 from protocols.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.preparation import ConsentSettings, DemoSettings, PracticeSettings, SetupSettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.study_protocol import StudyProtocol
+
+Untouched = str | float | bool | list[Any]
 
 TABLES_SINCE = {
     "consent": ConsentSettings(),
@@ -23,6 +26,12 @@ TABLES_SINCE = {
 """Tables that came after the first locks and sessions, as they are where nobody writes them: then they do not count,
 or an old fingerprint would fit no more."""
 
+FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
+    "study": {"trial.device_buttons": []},
+    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": ""},
+}
+"""Likewise single fields, for each kind of protocol; `segments.role` is that of every segment."""
+
 
 def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
     """SHA-256, 64 hexadecimal digits, of all values, defaults included.
@@ -35,10 +44,22 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
         for name, untouched in TABLES_SINCE.items():
             if getattr(protocol, name) == untouched:
                 del values[name]
-        if not protocol.trial.device_buttons:
-            del values["trial"]["device_buttons"]
+    for path, untouched in FIELDS_SINCE[protocol.kind].items():
+        _leave_out(values, path.split("."), untouched)
     # JSON writes 0.0 and -0.0 apart, though the values are equal.
     text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
     plain = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
     canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def _leave_out(values: Any, path: list[str], untouched: Untouched) -> None:
+    """Remove the field, in all entries of a list, where it is as it is without being written."""
+    if isinstance(values, list):
+        for entry in values:
+            _leave_out(entry, path, untouched)
+    elif len(path) > 1:
+        if path[0] in values:
+            _leave_out(values[path[0]], path[1:], untouched)
+    elif values.get(path[0]) == untouched:
+        del values[path[0]]

@@ -6,63 +6,10 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from protocols.apparatus import SafetySettings, SpringSettings, TestDirections
-from protocols.field_types import Frequency, Name, Source, Title
+from protocols.field_types import Name, Source, Title
 from protocols.problem import Problem, refuse
+from protocols.recording_segments import Segment
 from protocols.staircase_rule import STRICT
-
-Amplitude = Annotated[float, Field(gt=0, le=3.0, description="Peak of the force, in newtons.")]
-Along = Annotated[
-    Literal["x", "y", "z", "direction_1", "direction_2"],
-    Field(description="A device axis, or one of the two test directions."),
-]
-
-
-@dataclass(frozen=True, config=STRICT)
-class SineSegment:
-    """Sinusoids one after another, each long enough to be steady before it counts."""
-
-    kind: Annotated[Literal["sine"], Field(description="Sinusoids, one after another.")]
-    frequencies_hz: Annotated[
-        tuple[Frequency, ...], Field(min_length=1, max_length=100, description="Played in this order.")
-    ]
-    amplitude_n: Amplitude
-    along: Along
-    duration_s: Annotated[float, Field(gt=0, le=600, description="Counted part of every sinusoid, whole periods.")]
-    settle_s: Annotated[
-        float,
-        Field(ge=0, le=60, description="Played before it and not counted. Default 1: resonances have died by then."),
-    ] = 1.0
-
-
-@dataclass(frozen=True, config=STRICT)
-class SweepSegment:
-    """A periodic logarithmic swept sine; the first period is there to let the transient die."""
-
-    kind: Annotated[Literal["sweep"], Field(description="A logarithmic swept sine.")]
-    from_hz: Annotated[Frequency, Field(description="Lowest frequency, where every period begins.")]
-    to_hz: Annotated[Frequency, Field(description="Highest frequency, where every period ends.")]
-    amplitude_n: Amplitude
-    along: Along
-    duration_s: Annotated[float, Field(gt=0, le=600, description="One period.")]
-    periods: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=100,
-            description="Periods played, the transient's included. Default 2: one for the transient, one to count.",
-        ),
-    ] = 2
-
-    @model_validator(mode="after")
-    def _upwards(self) -> Self:
-        if self.to_hz <= self.from_hz:
-            refuse(
-                [Problem("to_hz", f"is {self.to_hz} Hz, not above from_hz", f"above {self.from_hz} Hz, the from_hz")]
-            )
-        return self
-
-
-Segment = Annotated[SineSegment | SweepSegment, Field(discriminator="kind")]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -81,7 +28,10 @@ class RecordingProtocol:
     spring: SpringSettings = Field(default_factory=SpringSettings)
     hand: Annotated[
         Literal["none", "held"],
-        Field(description="Whether somebody holds the handle. Default 'none': a spring repeats, a grip does not."),
+        Field(
+            description="Whether somebody holds the handle. Default 'none', because a spring repeats and a grip does "
+            "not; only a protocol that says 'held' is ever played into a hand."
+        ),
     ] = "none"
     rest_s: Annotated[
         float,
@@ -104,6 +54,22 @@ class RecordingProtocol:
         float,
         Field(gt=0, le=5, description="Every excitation rises and falls over this time. Default 0.1: no click."),
     ] = 0.1
+    lower_on_clip: Annotated[
+        bool,
+        Field(
+            description="Whether an excitation at which the accelerometer or the total force reaches its limit is "
+            "played again with less. Default true: what was cut off tells nothing about the device."
+        ),
+    ] = True
+    least_amplitude_n: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=3.0,
+            description="No excitation is lowered below this. Default 0.2: about the friction of such a device, below "
+            "which it hardly moves.",
+        ),
+    ] = 0.2
 
     @model_validator(mode="after")
     def _within_caps(self) -> Self:

@@ -2,7 +2,8 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import cache
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -31,3 +32,15 @@ def bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
     with Progress(*columns, console=Console(file=sys.stderr)) as progress:
         task = progress.add_task(title, total=total)
         yield lambda done: progress.update(task, completed=done)
+
+
+@contextmanager
+def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
+    """As `bar`, but nothing is drawn before the first progress: something may have to be read or asked first."""
+    with ExitStack() as stack:
+
+        @cache
+        def started() -> Callable[[float], None]:
+            return stack.enter_context(bar(title, total))
+
+        yield lambda done: started()(done)

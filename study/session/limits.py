@@ -4,13 +4,19 @@ import math
 from dataclasses import dataclass
 
 from protocols.apparatus import SafetySettings
-from protocols.recording_protocol import RecordingProtocol, SineSegment
+from protocols.recording_protocol import RecordingProtocol
+from protocols.recording_segments import MultisineSegment, highest_hz
 from protocols.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
 """Room for the centring spring: 150 N/m pulled away at 0.6 m/s, faster than a hand moves in a trial."""
 
 SLEW_MARGIN = 1.05
+
+BETWEEN_SAMPLES = math.sqrt(2)
+"""A multisine's peak is that of its samples. The wave through them is at most so much higher while its lines lie below
+a quarter of the rate (Ehlich and Zeller 1964), and Bernstein's inequality then bounds its slope as a sine's. Above a
+quarter, two samples of opposite sign change by less than that bound anyway."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +40,9 @@ def limits_of_study(protocol: StudyProtocol) -> Limits:
 def limits_of_recording(protocol: RecordingProtocol) -> Limits:
     """Slew just above the steepest excitation of this recording."""
     slews = [
-        _slew(max(s.frequencies_hz) if isinstance(s, SineSegment) else s.to_hz, s.amplitude_n, protocol.fade_s)
-        for s in protocol.segments
+        (BETWEEN_SAMPLES if isinstance(segment, MultisineSegment) else 1.0)
+        * _slew(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
+        for segment in protocol.segments
     ]
     return _limits(protocol.safety, max(slews))
 

@@ -7,17 +7,19 @@ from pathlib import Path
 from typing import Any
 
 from equalizer.signals.joining import join
-from equalizer.signals.recording import Recording
 from protocols.hashing import protocol_hash
 from protocols.recording_protocol import RecordingProtocol
 from study.devices.clock import RealClock, VirtualClock
-from study.devices.device import Device, DeviceSettings, Fault, Health
+from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import DEVICES, open_device
 from study.errors import DeviceError, LeftError, StudyError
+from study.session.handle_notice import handle_notice
 from study.session.limits import limits_of_recording
-from study.session.recording_plan import Piece, pieces
+from study.session.recording_plan import pieces
 from study.store.provenance import gather_provenance
 from study.store.recording_file import write_recording
+from study.workflows.play_pieces import Take, play_pieces
+from study.workflows.take_facts import segment_facts, spring_facts, warnings_of
 
 NOMINAL_RATE_HZ = 1000.0
 
@@ -41,8 +43,18 @@ class WrittenRecording:
     warnings: tuple[str, ...]
 
 
-def record_device(plan: RecordingPlan, on_progress: Callable[[float], None]) -> WrittenRecording:
-    """Record everything the protocol asks for. `on_progress(seconds)` counts recorded time.
+def _unsaid(notice: str) -> None:
+    """For whoever knows that nobody is near the device."""
+
+
+def record_device(
+    plan: RecordingPlan,
+    on_progress: Callable[[float], None],
+    before_moving: Callable[[str], None] = _unsaid,
+) -> WrittenRecording:
+    """Record everything the protocol asks for. `on_progress(seconds)` counts recorded time, and steps back where
+    something is played again. `before_moving(notice)` is called before a real device moves, with what must be said
+    to those around it; what it raises keeps the device still.
 
     Interrupted (KeyboardInterrupt), the pieces that are whole are written, and LeftError says so.
     Raises StudyError before anything moves where `out` exists already.
@@ -50,19 +62,31 @@ def record_device(plan: RecordingPlan, on_progress: Callable[[float], None]) -> 
     check_free(plan.out)
     clock = VirtualClock() if plan.device in DEVICES else RealClock()
     with contextlib.closing(open_device(plan.device, _settings(plan), clock, plan.seed)) as device:
-        done: list[tuple[Piece, Recording, Health]] = []
-        try:
-            _play_all(plan.protocol, device, done, on_progress)
-        except KeyboardInterrupt as interruption:
-            _write_whole_pieces(plan, device, done)
-            if device.fault() is Fault.FORCE_LEFT:
-                raise _still_on(plan, len(done)) from interruption
-            raise _left(plan, len(done)) from interruption
-        except DeviceError as error:
-            _write_whole_pieces(plan, device, done)
-            error.saved = _saved(plan, len(done))
-            raise
-        return _write(plan, device, done, interrupted=False)
+        return record_on(device, plan, on_progress, before_moving)
+
+
+def record_on(
+    device: Device,
+    plan: RecordingPlan,
+    on_progress: Callable[[float], None],
+    before_moving: Callable[[str], None] = _unsaid,
+) -> WrittenRecording:
+    """As `record_device`, on a device that is open."""
+    done: list[Take] = []
+    try:
+        if not device.info.simulated:
+            before_moving(handle_notice(plan.protocol, device.info.name, plan.total_s))
+        play_pieces(plan.protocol, device, done, on_progress)
+    except KeyboardInterrupt as interruption:
+        _write_whole_pieces(plan, device, done)
+        if device.fault() is Fault.FORCE_LEFT:
+            raise _still_on(plan, len(done)) from interruption
+        raise _left(plan, len(done)) from interruption
+    except DeviceError as error:
+        _write_whole_pieces(plan, device, done)
+        error.saved = _saved(plan, len(done))
+        raise
+    return _write(plan, device, done, interrupted=False)
 
 
 def check_free(out: Path) -> None:
@@ -81,27 +105,6 @@ def check_free(out: Path) -> None:
             "Make the folder first, or choose another name with --out.",
             saved="Nothing moved.",
         )
-
-
-def _play_all(
-    protocol: RecordingProtocol,
-    device: Device,
-    done: list[tuple[Piece, Recording, Health]],
-    on_progress: Callable[[float], None],
-) -> None:
-    before_s = 0.0
-    for piece in pieces(protocol, device.info.sample_rate_hz):
-        length_s, started_s = piece.commands.duration_s, before_s
-        played = device.play(piece.commands, lambda share: on_progress(started_s + share * length_s))  # noqa: B023
-        if played.recording is None or played.health.fault is not Fault.NONE:
-            raise DeviceError(
-                "The device let go",
-                f"While recording along {piece.along}: {played.health.fault.value}.",
-                "Check the device and record again.",
-            )
-        done.append((piece, played.recording, played.health))
-        before_s += length_s
-        on_progress(before_s)
 
 
 def _left(plan: RecordingPlan, done: int) -> LeftError:
@@ -124,7 +127,7 @@ def _saved(plan: RecordingPlan, done: int) -> str:
     return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
 
 
-def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[tuple[Piece, Recording, Health]]) -> None:
+def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[Take]) -> None:
     if done:
         _write(plan, device, done, interrupted=True)
 
@@ -140,50 +143,24 @@ def _settings(plan: RecordingPlan) -> DeviceSettings:
     )
 
 
-def _write(
-    plan: RecordingPlan, device: Device, done: list[tuple[Piece, Recording, Health]], interrupted: bool
-) -> WrittenRecording:
-    parts = [replace(recording, segments=(piece.segment,)) for piece, recording, _ in done]
+def _write(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bool) -> WrittenRecording:
+    parts = [replace(take.recording, segments=(take.piece.segment,)) for take in done]
     write_recording(plan.out, join(parts, _meta(plan, device, done, interrupted)))
-    return WrittenRecording(plan.out, _warnings(done))
+    return WrittenRecording(plan.out, tuple(warning for take in done for warning in warnings_of(take)))
 
 
-def _meta(
-    plan: RecordingPlan, device: Device, done: list[tuple[Piece, Recording, Health]], interrupted: bool
-) -> dict[str, Any]:
+def _meta(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bool) -> dict[str, Any]:
     protocol = plan.protocol
     return {
         "protocol": protocol.name,
         "place_m": list(plan.place_m),
         "hand": protocol.hand,
-        "feedback": {
-            "kind": "virtual spring about the place",
-            "natural_frequency_hz": protocol.spring.natural_frequency_hz,
-            "damping_n_s_per_m": protocol.spring.damping_n_s_per_m,
-            "effective_mass_kg": device.info.effective_mass_kg,
-        },
+        "feedback": spring_facts(protocol.spring, device.info.effective_mass_kg),
         # As mounted: what is off by the mounting's tolerance is not known to whoever records.
         "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
         "interrupted": interrupted,
-        "segments": [
-            {"frequency_hz": p.frequency_hz, "along": p.along, "unit_vector": list(p.unit_vector)} for p, _, _ in done
-        ],
+        "segments": [segment_facts(take) for take in done],
         "provenance": gather_provenance(
             protocol_hash=protocol_hash(protocol), seeds={"device": plan.seed}, parents=()
         ).as_dict(),
     }
-
-
-def _warnings(done: list[tuple[Piece, Recording, Health]]) -> tuple[str, ...]:
-    found = []
-    for piece, _, health in done:
-        what = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
-        if health.sensor_clipped:
-            found.append(f"The accelerometer clipped in {health.sensor_clipped} samples ({what} along {piece.along}).")
-        if health.total_clipped or health.stimulus_clipped:
-            found.append(f"The force was limited at its cap ({what} along {piece.along}).")
-        if health.missed_ticks:
-            found.append(f"{health.missed_ticks} ticks were missed ({what} along {piece.along}); they are NaN.")
-        if health.slew_limited:
-            found.append(f"The force was slowed by the slew limit ({what} along {piece.along}).")
-    return tuple(found)

@@ -30,7 +30,7 @@ def test_the_wheel_holds_the_four_packages_and_the_launcher_only(wheel):
 
 def test_the_wheel_carries_the_shipped_protocols_and_the_report_template(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    shipped = {"direction_threshold", "direction_training", "ellipsoid", "sweep"}
+    shipped = {"direction_threshold", "direction_training", "ellipsoid", "sweep", "sweep_band", "multisine"}
     assert {f"protocols/{name}.toml" for name in shipped} <= set(names)
     assert any(name.startswith("analysis/reports/") and name.endswith((".html", ".jinja", ".j2")) for name in names)
 

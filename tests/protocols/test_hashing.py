@@ -64,6 +64,39 @@ def test_the_fingerprint_of_the_published_study_is_known(threshold):
     assert protocol_hash(threshold) == "acd7b086777d3ab2a13d6d3ac8ca8f763093621a92033bd07c5eb0613ff4478a"
 
 
+OLD = {
+    "direction_training": "454d9291f97b422a36353ed98613827a48a4076c85fa6222e2d6b812574187e8",
+    "ellipsoid": "543512b88948b805e8afc06945dae10ffdd03b72064a031e8ee1f2fc004588cc",
+    "sweep": "67ca8ad4be7cb4afe553dbf9856be0b424ade33447e93aa22b38e9bd271e287f",
+}
+"""As they were before recordings knew roles, multisines and lowered amplitudes."""
+
+
+def text_of(name: str) -> str:
+    return files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", OLD)
+def test_fields_that_came_later_leave_old_fingerprints_alone(name):
+    assert protocol_hash(load_protocol(text_of(name), name)) == OLD[name]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ("rest_s = 1.0", "rest_s = 1.0\nlower_on_clip = true\nleast_amplitude_n = 0.2", True),
+        ("rest_s = 1.0", "rest_s = 1.0\nlower_on_clip = false", False),
+        ("rest_s = 1.0", "rest_s = 1.0\nleast_amplitude_n = 0.3", False),
+        ('along = "y"', 'along = "y"\nrole = ""', True),
+        ('along = "y"', 'along = "y"\nrole = "test"', False),
+    ],
+)
+def test_a_field_that_came_later_counts_only_where_it_changes_something(old, new, same):
+    assert old in text_of("sweep")
+    changed = protocol_hash(load_protocol(text_of("sweep").replace(old, new), "mine.toml"))
+    assert (changed == OLD["sweep"]) is same
+
+
 @given(title=st.text(min_size=1, max_size=40), source=st.text(max_size=40))
 @settings(max_examples=80, deadline=None)
 def test_any_text_survives_being_written(threshold, title, source):

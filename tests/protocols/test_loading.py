@@ -205,6 +205,8 @@ RECORDINGS = [
     ("amplitude_n = 1.0", "amplitude_n = 2.5", "segments[1].amplitude_n", "is 2.5 N, above safety.stimulus_cap_n"),
     ("to_hz = 100.0", "to_hz = 1", "segments[2].to_hz", "is 1.0 Hz, not above from_hz"),
     ("to_hz = 100.0", "to_hz = 1000", "segments[2].to_hz", "is 1000, which is too large"),
+    ("to_hz = 100.0", 'to_hz = 100.0\nrole = "training"', "segments[2].role", 'is "training"'),
+    ("[safety]", "[safety]\nleast_amplitude_n = 0.0", "safety.least_amplitude_n", "is no key of [safety]"),
 ]
 
 
@@ -217,7 +219,7 @@ def test_recordings_are_refused_with_the_segment_counted_from_one(old, new, key,
 
 
 def test_what_a_recording_allows_is_said():
-    assert refused(changed(RECORDING, 'kind = "sine"', 'kind = "sin"')).allowed == '"sine" or "sweep"'
+    assert refused(changed(RECORDING, 'kind = "sine"', 'kind = "sin"')).allowed == '"multisine" or "sine" or "sweep"'
     assert refused(changed(RECORDING, "amplitude_n = 1.0", "amplitude_n = 2.5")).allowed == (
         "above 0 and at most 2.0 N, the cap"
     )
@@ -228,7 +230,41 @@ def test_an_entry_that_is_no_table_is_refused():
     text = RECORDING[: RECORDING.index("[[segments]]")].replace("[safety]", "segments = [3]\n[safety]")
     error = refused(text)
     assert (error.key, error.problem) == ("segments[1]", "is 3")
-    assert error.allowed == 'a table whose kind is "sine" or "sweep"'
+    assert error.allowed == 'a table whose kind is "multisine", "sine" or "sweep"'
+
+
+MULTISINE = """
+
+[[segments]]
+kind = "multisine"
+along = "all"
+from_hz = 5.0
+to_hz = 35.0
+duration_s = 2.0
+amplitude_n = 1.0
+"""
+
+
+def test_a_multisine_may_be_along_all_axes_and_has_its_defaults():
+    segment = load_protocol(RECORDING + MULTISINE, "mine.toml").segments[-1]
+    assert (segment.along, segment.odd_only, segment.periods, segment.realisations) == ("all", True, 2, 1)
+    assert segment.role == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem", "allowed"),
+    [
+        ("duration_s = 2.0", "duration_s = 0.02", "is 0.02 s, too short for the band", "which lie 100 Hz apart here"),
+        ("to_hz = 35.0", "to_hz = 5.4", "is 2.0 s, too short for the band", "which lie 1 Hz apart here"),
+        ("to_hz = 35.0", "to_hz = 5.0", "is 5.0 Hz, not above from_hz", "above 5.0 Hz, the from_hz"),
+        ("amplitude_n = 1.0", "amplitude_n = 2.5", "is 2.5 N, above safety.stimulus_cap_n", "at most 2.0 N"),
+    ],
+)
+def test_a_multisine_that_cannot_be_is_refused(old, new, problem, allowed):
+    error = refused(RECORDING + changed(MULTISINE, old, new))
+    assert len(error.problems) == 1
+    assert problem in error.problem
+    assert allowed in error.allowed
 
 
 def test_whole_numbers_do_for_real_ones(threshold_text):

@@ -6,7 +6,8 @@ import pytest
 
 from protocols.explain import explain
 from protocols.loading import load_protocol
-from protocols.recording_segments import SineSegment, SweepSegment
+from protocols.recording_protocol import RecordingProtocol
+from protocols.recording_segments import MultisineSegment, SineSegment, SweepSegment
 from protocols.staircase_rule import StepChange, StepPhase
 
 NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
@@ -97,3 +98,40 @@ def test_the_sweep_recording_is_the_published_one():
         (1.0, 500.0, 30.0, 2, 1.0)
     }
     assert (protocol.spring.natural_frequency_hz, protocol.hand) == (3.5, "none")
+
+
+@pytest.mark.parametrize(
+    ("name", "sweeps_hz", "tested_hz", "hand"),
+    [
+        ("sweep_band", (4.5, 37.0), (5.0, 35.0), "none"),
+        ("sweep_study", (4.5, 55.0), (5.0, 50.0), "none"),
+        ("sweep_hand", (4.5, 55.0), (5.0, 50.0), "held"),
+    ],
+)
+def test_sweeps_of_a_band_are_fitted_and_a_multisine_on_all_axes_is_held_out(name, sweeps_hz, tested_hz, hand):
+    protocol = load_protocol(text_of(name), name)
+    *sweeps, held_out = protocol.segments
+    assert [(sweep.along, sweep.role) for sweep in sweeps] == [("x", "fit"), ("y", "fit"), ("z", "fit")]
+    assert {(sweep.from_hz, sweep.to_hz) for sweep in sweeps} == {sweeps_hz}
+    assert min(sweep.periods for sweep in sweeps) >= 3
+    assert isinstance(held_out, MultisineSegment)
+    assert (held_out.along, held_out.role, held_out.duration_s) == ("all", "test", 10.0)
+    assert (held_out.from_hz, held_out.to_hz) == tested_hz
+    assert protocol.hand == hand
+
+
+def test_one_recording_only_is_made_in_a_hand_and_it_pushes_less():
+    protocols = [load_protocol(text_of(name), name) for name in NAMES]
+    recordings = [protocol for protocol in protocols if isinstance(protocol, RecordingProtocol)]
+    assert [protocol.name for protocol in recordings if protocol.hand == "held"] == ["sweep_hand"]
+    caps_n = {protocol.name: (protocol.safety.stimulus_cap_n, protocol.safety.total_cap_n) for protocol in recordings}
+    in_hand = caps_n.pop("sweep_hand")
+    assert all(in_hand[0] < stimulus_n and in_hand[1] < total_n for stimulus_n, total_n in caps_n.values())
+
+
+def test_the_multisine_recording_tells_noise_from_distortion():
+    protocol = load_protocol(text_of("multisine"), "multisine.toml")
+    assert [segment.along for segment in protocol.segments] == ["x", "y", "z"]
+    assert all(s.odd_only and s.periods >= 3 and s.realisations >= 2 for s in protocol.segments)
+    assert len({segment.seed for segment in protocol.segments}) == 3
+    assert {(segment.from_hz, segment.to_hz) for segment in protocol.segments} == {(1.0, 200.0)}

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from protocols.apparatus import SafetySettings
-from protocols.recording_protocol import RecordingProtocol, SineSegment, SweepSegment
+from protocols.recording_protocol import RecordingProtocol
+from protocols.recording_segments import SineSegment, SweepSegment
 from study.errors import LeftError, StudyError
 from study.store.recording_file import read_recording
 from study.workflows.record_device import RecordingPlan, record_device

@@ -1,0 +1,105 @@
+"""The pieces of a recording, one after another; one that drove a sensor or the force to its limit is played again
+with less."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from equalizer.signals.recording import Recording
+from protocols.recording_protocol import RecordingProtocol
+from study.devices.device import Device, Fault, Health
+from study.errors import DeviceError
+from study.session.recording_plan import Piece, pieces
+
+LOWERED_TO = 0.7
+"""3 dB less: after five times a sixth is left, and little of a clean amplitude is given away."""
+
+MOST_TRIES = 6
+"""Of one piece: a sensor that clips at a sixth, too, is broken or set for another device."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Take:
+    """A piece as it was played in the end, clean unless `clipped`."""
+
+    piece: Piece
+    requested_n: float
+    tries: int
+    sensor_clipped_before: int
+    """Samples that the accelerometer cut off in the takes that were thrown away."""
+    total_clipped_before: int
+    """Likewise ticks at the cap of the total force."""
+    recording: Recording
+    health: Health
+
+    @property
+    def played_n(self) -> float:
+        return self.piece.segment.amplitude
+
+    @property
+    def clipped(self) -> bool:
+        return is_clipped(self.health)
+
+
+def is_clipped(health: Health) -> bool:
+    """Whether something was at its limit, so that the take tells less about the device than it seems to."""
+    return bool(health.sensor_clipped or health.total_clipped)
+
+
+def play_pieces(
+    protocol: RecordingProtocol, device: Device, done: list[Take], on_progress: Callable[[float], None]
+) -> None:
+    """Play all of the protocol, appending to `done` whatever is whole. `on_progress(seconds)` steps back where a piece
+    is played again. Where a piece had to be lowered, it is so from the start when its segment comes round again.
+
+    Raises `DeviceError` when the device lets go.
+    """
+    before_s = 0.0
+    shares: dict[tuple[int, float | None], float] = {}
+    for piece in pieces(protocol, device.info.sample_rate_hz):
+        length_s, started_s = piece.commands.duration_s, before_s
+        same = (piece.number, piece.frequency_hz)
+        take = _take(
+            protocol,
+            device,
+            piece,
+            shares.get(same, 1.0),
+            lambda share: on_progress(started_s + share * length_s),  # noqa: B023
+        )
+        shares[same] = take.played_n / take.requested_n
+        done.append(take)
+        before_s += length_s
+        on_progress(before_s)
+
+
+def _take(
+    protocol: RecordingProtocol, device: Device, piece: Piece, share: float, on_share: Callable[[float], None]
+) -> Take:
+    """The first clean take, or the last one."""
+    requested_n = piece.segment.amplitude
+    least_n = min(protocol.least_amplitude_n, requested_n)
+    amplitude_n, sensor_before, total_before = share * requested_n, 0, 0
+    for tries in range(1, MOST_TRIES + 1):
+        played = piece if amplitude_n == requested_n else piece.at(amplitude_n)
+        recording, health = _once(device, played, on_share)
+        last = tries == MOST_TRIES or amplitude_n <= least_n or not protocol.lower_on_clip
+        if last or not is_clipped(health):
+            break
+        sensor_before += health.sensor_clipped
+        total_before += health.total_clipped
+        amplitude_n = max(LOWERED_TO * amplitude_n, least_n)
+    return Take(played, requested_n, tries, sensor_before, total_before, recording, health)
+
+
+def _once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:
+    played = device.play(piece.commands, on_share)
+    if played.recording is None or played.health.fault is not Fault.NONE:
+        raise DeviceError(
+            "The device let go",
+            f"While recording along {along_in_words(piece)}: {played.health.fault.value}.",
+            "Check the device and record again.",
+        )
+    return played.recording, played.health
+
+
+def along_in_words(piece: Piece) -> str:
+    return "all axes" if piece.along == "all" else piece.along
