@@ -1,0 +1,174 @@
+"""The high band: acceleration matching with one degree of freedom, along the direction that costs the least force.
+
+Above the limit of direction perception a person feels how strong a vibration is and hardly where it points. So what is
+wanted becomes one signal of the same spectral energy, and one direction of force plays it: each line is divided by the
+length of what the device answers there. Which direction is free, and is chosen so that the largest force is least.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
+"""Of the force, against |G|²: below, noise at an antiresonance is inverted; above, weak lines fall short."""
+WEIGHT = 1e-3
+DIRECTIONS = 64
+"""Of force, tried over the half sphere besides the axes."""
+
+
+class ResponseSource(Protocol):
+    """A response at any frequency, (lines,) to (lines, p, m)."""
+
+    def at(self, frequency_hz: FloatArray) -> ComplexArray: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelledResponse:
+    model: IdentifiedModel
+
+    def at(self, frequency_hz: FloatArray) -> ComplexArray:
+        return model_response(self.model, frequency_hz)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredResponse:
+    """Between its lines length and phase are drawn straight; outside, the first and last line hold."""
+
+    frequency_hz: FloatArray
+    """(lines,), rising"""
+    response: ComplexArray
+    """(lines, p, m)"""
+
+    def at(self, frequency_hz: FloatArray) -> ComplexArray:
+        flat = self.response.reshape(len(self.frequency_hz), -1)
+        columns = []
+        for column in flat.T:
+            length = np.interp(frequency_hz, self.frequency_hz, np.abs(column))
+            phase = np.interp(frequency_hz, self.frequency_hz, np.unwrap(np.angle(column)))
+            columns.append(length * np.exp(1j * phase))
+        return np.stack(columns, axis=1).reshape(len(frequency_hz), *self.response.shape[1:])
+
+
+@dataclass(frozen=True, slots=True)
+class HighBandSettings:
+    """Raises ValueError for a weight outside 1e-3 to 1e-2."""
+
+    weight: float = WEIGHT
+    shared: bool = True
+    """Whether directions between the axes may be taken; False = a single axis."""
+    causal: bool = False
+    """From the first row on and not before: the length is matched, the phase is the least there can be."""
+
+    def __post_init__(self) -> None:
+        if not SMALLEST_WEIGHT <= self.weight <= LARGEST_WEIGHT:
+            raise ValueError(f"weight is {self.weight}; it must be within {SMALLEST_WEIGHT:g} and {LARGEST_WEIGHT:g}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HighBandForces:
+    forces: FloatArray
+    """(N, m)"""
+    direction: FloatArray
+    """(m,), unit length, of the force"""
+    peak_n: float
+    """Of these and the other forces together"""
+    peak_by_axis_n: FloatArray
+    """(m,): what it would have been along each axis alone"""
+
+
+def one_dof(wanted: FloatArray) -> FloatArray:
+    """(N,) from (N, p): line by line the length of all axes together, with the phase of their sum. Energy is kept
+    (Landin et al., Dimensional reduction of high-frequency accelerations for haptic rendering, 2010)."""
+    spectrum = np.fft.rfft(wanted, axis=0)
+    length = np.linalg.norm(spectrum, axis=1)
+    # A sum over axes can vanish where two of them oppose; the stronger axis then says the phase.
+    total = spectrum.sum(axis=1)
+    strongest = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
+    phase = np.angle(np.where(np.abs(total) > 1e-9 * length, total, strongest))
+    return np.asarray(np.fft.irfft(length * np.exp(1j * phase), len(wanted)))
+
+
+def one_dof_at_once(wanted: FloatArray) -> FloatArray:
+    """(N,) from (N, p): the part along the direction in which most happens, with the energy of all. Nothing comes
+    before its time, unlike `one_dof`."""
+    direction = np.linalg.svd(wanted, full_matrices=False)[2][0]
+    along = wanted @ direction
+    size = float(np.linalg.norm(along))
+    return np.asarray(along * (np.linalg.norm(wanted) / size) if size > 0 else along)
+
+
+def high_band_forces(
+    wanted: FloatArray,
+    sample_rate_hz: float,
+    source: ResponseSource,
+    others: FloatArray | None = None,
+    settings: HighBandSettings | None = None,
+) -> HighBandForces:
+    """wanted: (N,), one degree of freedom; quiet at both ends, unless causal: the inverse is two-sided and wraps
+    around. others: (N, m), forces that are commanded besides; the direction spares what they need. source: m/s²
+    per N."""
+    settings = settings or HighBandSettings()
+    n = 2 * len(wanted) if settings.causal else len(wanted)
+    response = source.at(lines_hz(n, sample_rate_hz))
+    there = np.zeros((len(wanted), response.shape[2])) if others is None else np.asarray(others, dtype=np.float64)
+    spectrum = np.fft.rfft(wanted, n)
+    candidates = _candidates(response.shape[2], settings.shared)
+    played = [_played(spectrum, n, response @ direction, settings) for direction in candidates]
+    # Which way round is not felt, but it matters beside the other forces.
+    ways = [sign * scalar[:, None] * d for scalar, d in zip(played, candidates, strict=True) for sign in (1.0, -1.0)]
+    peaks = np.array([np.linalg.norm(forces + there, axis=1).max(initial=0.0) for forces in ways])
+    best = int(peaks.argmin())
+    by_axis = peaks.reshape(-1, 2).min(axis=1)[: response.shape[2]]
+    return HighBandForces(ways[best], candidates[best // 2], float(peaks[best]), by_axis)
+
+
+def delivered(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
+    """(N, p), m/s²: what the source says of forces (N, m), from rest."""
+    n = 2 * len(forces)
+    spectrum = np.fft.rfft(forces, n, axis=0)[:, :, None]
+    answer = (source.at(lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
+    return np.asarray(np.fft.irfft(answer, n, axis=0)[: len(forces)])
+
+
+def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
+    return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
+
+
+def _played(spectrum: ComplexArray, n: int, answer: ComplexArray, settings: HighBandSettings) -> FloatArray:
+    """Force along a direction, (N,). answer: (lines, p), the device's to that direction."""
+    length = np.linalg.norm(answer, axis=1)
+    inverse = (length / (length**2 + settings.weight)).astype(np.complex128)
+    if settings.causal:
+        # From twice the length, so that what the filter plays on does not wrap around to the start.
+        return np.asarray(np.fft.irfft(spectrum * minimum_phase(inverse.real), n)[: n // 2])
+    strongest = np.take_along_axis(answer, np.abs(answer).argmax(axis=1)[:, None], axis=1)[:, 0]
+    # The strongest axis comes in phase with what is wanted.
+    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest)), n))
+
+
+def minimum_phase(gain: FloatArray) -> ComplexArray:
+    """(lines,): the causal filter of that gain, (lines,) of a real FFT of even length, that is soonest done.
+
+    By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing)."""
+    n = 2 * (len(gain) - 1)
+    cepstrum = np.fft.irfft(np.log(gain), n)
+    cepstrum[1 : n // 2] *= 2
+    cepstrum[n // 2 + 1 :] = 0
+    return np.asarray(np.exp(np.fft.rfft(cepstrum)))
+
+
+def _candidates(inputs: int, shared: bool) -> list[FloatArray]:
+    """The axes; then a spiral over the half sphere."""
+    axes = list(np.eye(inputs))
+    if not shared or inputs != 3:
+        return axes
+    z = 1 - (2 * np.arange(DIRECTIONS) + 1) / (2 * DIRECTIONS)
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(DIRECTIONS)
+    ring = np.sqrt(1 - z**2)
+    return axes + list(np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1))

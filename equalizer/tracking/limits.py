@@ -1,0 +1,78 @@
+"""Predicted forces against the cap: what is too large is refused with the factor that would fit, never clipped."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+
+class ForceLimitError(ValueError):
+    """`peaks`: what was found."""
+
+    def __init__(self, message: str, peaks: "Peaks") -> None:
+        super().__init__(message)
+        self.peaks = peaks
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks:
+    """Of the length of the force vector, not of a single axis: the cap holds in every direction."""
+
+    cap_n: float
+    peak_n: float
+    at_sample: int
+    """Row of the first largest force."""
+    share_over: float
+    """Of all rows, 0 to 1."""
+
+    @property
+    def fits(self) -> bool:
+        return self.peak_n <= self.cap_n
+
+    @property
+    def largest_scale(self) -> float:
+        """The factor on what is wanted that just fits; forces are proportional to it. Infinite where none is needed."""
+        return self.cap_n / self.peak_n if self.peak_n > 0 else float("inf")
+
+
+def predicted_peaks(forces: FloatArray, cap_n: float) -> Peaks:
+    """forces: (N, m). Raises ValueError for a cap that is no positive number and for forces that are not finite."""
+    checked_cap(cap_n)
+    lengths = np.linalg.norm(forces, axis=1)
+    if not np.isfinite(lengths).all():
+        raise ValueError("forces hold values that are not finite numbers")
+    if not len(lengths):
+        return Peaks(cap_n, 0.0, 0, 0.0)
+    return Peaks(cap_n, float(lengths.max()), int(lengths.argmax()), float((lengths > cap_n).mean()))
+
+
+def require_within(forces: FloatArray, cap_n: float, sample_rate_hz: float) -> Peaks:
+    """Raises ForceLimitError where a row of forces, (N, m), is longer than the cap."""
+    peaks = predicted_peaks(forces, cap_n)
+    if not peaks.fits:
+        # Rounded down, so that the factor that is read still fits.
+        scale = np.floor(peaks.largest_scale * 1e4) / 1e4
+        raise ForceLimitError(
+            f"the forces reach {peaks.peak_n:.3g} N at {peaks.at_sample / sample_rate_hz:.3f} s, above the cap of "
+            f"{peaks.cap_n:g} N ({peaks.share_over:.1%} of the time above it); nothing was clipped. What is wanted "
+            f"fits when scaled by {scale:.4f} or less; or ask for the constrained solution, which states its loss",
+            peaks,
+        )
+    return peaks
+
+
+def checked_cap(cap_n: float) -> float:
+    if not (np.isfinite(cap_n) and cap_n > 0):
+        raise ValueError(f"cap_n is {cap_n}; it must be a positive number")
+    return cap_n
+
+
+def within_cap(forces: FloatArray, cap_n: float) -> FloatArray:
+    """Each row of (N, m) shortened to the cap where it is longer: the nearest vectors that are allowed."""
+    lengths = np.linalg.norm(forces, axis=1, keepdims=True)
+    # A hair below the cap, so that rounding leaves no row above it.
+    shorter = np.minimum(
+        1.0, cap_n * (1 - 8 * np.finfo(np.float64).eps) / np.maximum(lengths, np.finfo(np.float64).tiny)
+    )
+    return np.asarray(np.where(lengths > cap_n, forces * shorter, forces))

@@ -1,0 +1,60 @@
+"""The device where it moves as one piece: force = mass a + damping v + stiffness x."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+WORST_CONDITION = 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidModel:
+    """Each matrix is (m, m). Raises ValueError where they do not fit each other."""
+
+    mass_kg: FloatArray
+    damping_n_s_per_m: FloatArray
+    stiffness_n_per_m: FloatArray
+    delay_s: float = 0.0
+    """From a command to the acceleration it gives, beyond the hold's half sample."""
+
+    def __post_init__(self) -> None:
+        shapes = {np.shape(part) for part in (self.mass_kg, self.damping_n_s_per_m, self.stiffness_n_per_m)}
+        if len(shapes) != 1 or (shape := next(iter(shapes))) != shape[:1] * 2:
+            raise ValueError(f"mass, damping and stiffness must be square matrices of one shape, not {sorted(shapes)}")
+
+    def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, m, m), N per m/s²; frequencies above zero."""
+        s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
+        force = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
+        return np.asarray(force * np.exp(s * self.delay_s))
+
+
+def fit_rigid_model(
+    frequency_hz: FloatArray, response: ComplexArray, sample_rate_hz: float, delay_s: float = 0.0
+) -> RigidModel:
+    """Least squares on the relative error of the force, line by line.
+
+    frequency_hz: (lines,), above zero, below the first resonance; response: (lines, m, m), m/s² per N, sampled as
+    recordings are. delay_s is not fitted: so low it cannot be told from damping and mass. Raises ValueError with fewer
+    than two lines or an input that moves nothing.
+    """
+    frequency_hz = np.asarray(frequency_hz, dtype=np.float64)
+    if len(frequency_hz) < 2 or not (frequency_hz > 0).all():
+        raise ValueError("a rigid model needs the response at two or more frequencies above zero")
+    if np.linalg.cond(response).max() > WORST_CONDITION:
+        raise ValueError("the response at a line does not move all axes, so that it has no inverse")
+    m, s = response.shape[1], 2j * np.pi * frequency_hz
+    # A held command acts half a sample late on average, whatever the device.
+    late = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]
+    inverse = np.linalg.inv(response / late)
+    weight = 1 / np.linalg.norm(inverse, axis=(1, 2))
+    force = inverse.reshape(len(s), -1) * weight[:, None]
+    basis = np.stack([np.ones_like(s), 1 / s, 1 / s**2], axis=1) * weight[:, None]
+    real, right = np.vstack([basis.real, basis.imag]), np.vstack([force.real, force.imag])
+    scale = np.linalg.norm(real, axis=0)
+    parts = np.linalg.lstsq(real / scale, right, rcond=None)[0] / scale[:, None]
+    mass, damping, stiffness = parts.reshape(3, m, m)
+    return RigidModel(mass, damping, stiffness, delay_s)
