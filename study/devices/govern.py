@@ -2,10 +2,8 @@
 
 The order within a tick: hear what was asked, aim (stimulus and spring), limit, and confine once more whatever came
 out. The last step trusts none of the others: a force is never written that is above the cap or not a number.
-
 All that decides stands in this one file. numba keeps compiled code on disk until the file of that very function
-changes: with its parts in several files, a changed limit could go on running as it was.
-"""
+changes: with its parts in several files, a changed limit could go on running as it was."""
 
 import math
 
@@ -23,8 +21,7 @@ from study.devices.rig import SENSOR_CLIPPED
 (
     # Letter box: written from Python at any time, even in the middle of a block.
     STOP_ASKED, RELEASE_ASKED, LET_GO_ASKED, SIGN_OF_LIFE,
-    # What is played: written while nothing moves. Times in ticks; LENGTH is inf for a loop, whose first LEAD rows
-    # are played once only.
+    # What is played: written while nothing moves. In ticks; LENGTH is inf for a loop, LEAD rows of it are played once.
     START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, LEAD, LONGEST, RECORD_FROM,
     # How it goes.
     PHASE, FAULT, TICK, LAST_SIGN, RELEASED_AT, LET_GO_AT, STIMULUS_GAIN, SPRING_GAIN,
@@ -182,9 +179,8 @@ def _aim(state: FloatArray, settings: FloatArray, loop: FloatArray, reading: Flo
     tick = int(state[TICK])
     _clear(force)
     if 0 <= tick < state[LENGTH]:
-        row, lead = tick, int(state[LEAD])
-        if tick >= lead:
-            row = lead + (tick - lead) % (loop.shape[0] - lead)
+        lead = int(state[LEAD])
+        row = tick if tick < lead else lead + (tick - lead) % (loop.shape[0] - lead)
         for i in range(3):
             force[i] = loop[row, i]
     if not (_below(force, IMPLAUSIBLE_N) and _below(reading, IMPLAUSIBLE_M)):

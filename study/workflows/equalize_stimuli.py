@@ -22,6 +22,7 @@ from study.store.archive import SessionFolder
 from study.store.atomic_write import write_atomically
 from study.store.identified_model_file import read_identified_model
 from study.store.provenance import sha256_of
+from study.workflows.spring_beside_model import spring_beside
 
 MODEL_NAME = "model.h5"
 NEAR_M = 0.02
@@ -126,7 +127,8 @@ def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo
             "Identify it from recordings of this device.",
         )
     stiffness = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
-    return ModelEqualizer(model, VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m))
+    acting = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
+    return ModelEqualizer(model, spring_beside(model, acting))
 
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.tracking.model_equalizer import ModelEqualizer
 from protocols.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
@@ -13,6 +14,7 @@ from study.store.identified_model_file import write_identified_model
 from study.store.trial_recordings import find_trial_recording, recording_name
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.workflows.conduct_session import conduct_new, conduct_resumed
+from study.workflows.equalize_stimuli import level_scales
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan
 from study.workflows.session_results import write_tables
@@ -99,7 +101,6 @@ def refused(plan, **changes) -> str:
     write_identified_model(plan.model, rigid(**changes), overwrite=True)
     with pytest.raises(StudyError) as refusal:
         take(plan)
-    assert not plan.data.exists()
     return str(refusal.value)
 
 
@@ -107,6 +108,22 @@ def test_a_model_that_does_not_cover_the_protocol_is_refused(plan):
     said = refused(plan, band_hz=(5.0, 30.0))
     assert "was made for 5 to 30 Hz; the protocol also plays 35 Hz" in said
     assert "--band 5 50" in said
+
+
+def test_a_spring_that_is_in_the_model_is_not_accounted_for_twice(conducted, plan):
+    """Under the same spring the model is the device: no force is left to the spring; another spring is refused."""
+    info = conducted.state.opened.device
+    stiffness = 0.28173 * (2 * np.pi * 3.5) ** 2
+    held = {"input": "excitation", "feedback": {"stiffness_n_per_m": stiffness, "damping_n_s_per_m": 0.0}}
+    bare = level_scales(plan.protocol, ModelEqualizer(rigid()), info.sample_rate_hz)
+    assert equalized_levels(plan, held) == pytest.approx([scale.n_per_mps2 for scale in bare])
+    other = {"input": "excitation", "feedback": {"stiffness_n_per_m": 50.0, "damping_n_s_per_m": 0.0}}
+    assert "It holds a spring of 50 N/m" in refused(plan, provenance=other)
+
+
+def equalized_levels(plan, provenance) -> list[float]:
+    write_identified_model(plan.model, rigid(provenance=provenance), overwrite=True)
+    return [scale.n_per_mps2 for scale in take(plan).state.opened.equalized.levels]
 
 
 @pytest.mark.parametrize(
@@ -120,6 +137,7 @@ def test_a_model_that_does_not_cover_the_protocol_is_refused(plan):
 )
 def test_a_model_of_something_else_is_refused(plan, changes, said):
     assert said in refused(plan, **changes)
+    assert not plan.data.exists()
 
 
 def test_a_protocol_of_commanded_forces_does_not_pretend_to_use_a_model(plan, small_protocol):

@@ -1,0 +1,55 @@
+"""`hapteq identify`: a state-space model of the device from its recordings."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def identify(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings of sweeps or multisines, all at one place.")],
+    out: Annotated[Path, typer.Option(help="The model to write, MODEL.h5.")],
+    band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (5.0, 35.0),
+    order: Annotated[int, typer.Option(min=2, max=200, help="Number of states; even.")] = 26,
+    smooth: Annotated[
+        bool | None,
+        typer.Option(
+            "--smooth/--no-smooth", help="Fit to local averages over lines [default: where they scatter beyond noise]."
+        ),
+    ] = None,
+    with_spring: Annotated[
+        bool,
+        typer.Option(
+            "--with-spring", help="Take the recording's spring as a part of the device: for a study under it."
+        ),
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option(help="Folder for a page with transfer functions, bands and the choice of order.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a stable model to the band, test it on what was kept for a test, and write it."""
+    import json
+
+    from study.cli.progress import bar
+    from study.workflows.identify_model import IdentifyPlan, check_free, identify_model, summary, summary_lines
+    from study.workflows.report_identification import report_identification
+
+    plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring)
+    check_free(out)
+    with bar("Identifying (%)", total=100) as show:
+        device = identify_model(plan, lambda share: show(round(100 * share)))
+    if as_json:
+        typer.echo(json.dumps(summary(device), indent=2))
+    else:
+        typer.echo(str(out))
+        for line in summary_lines(device):
+            typer.echo(line)
+    for remark in device.remarks:
+        typer.echo(f"Note: {remark}", err=True)
+    if report is not None:
+        with bar("Report (%)", total=100) as show:
+            page = report_identification(device, report, lambda share: show(round(100 * share)))
+        typer.echo(f"Report: {page}", err=True)

@@ -1,0 +1,202 @@
+"""From recordings to a model file: estimate, fit, test on what was kept for it, and a page that shows it all."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.held_out import HeldOut, held_out
+from equalizer.identification.identify import UNEXPLAINED, Identified, identify
+from equalizer.identification.local_polynomial import smoothed
+from equalizer.identification.refusals import IdentificationRefused
+from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.transfer_estimate import TransferEstimateError, transfer_estimate
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.recording import Recording
+from study.errors import StudyError, WrongUseError
+from study.store.identified_model_file import write_identified_model
+from study.store.provenance import gather_provenance
+from study.store.recording_file import read_recording
+
+NEAR_M = 0.001
+"""Places farther apart than this are two places, and a model is of one."""
+
+
+SMOOTHED = (
+    "The lines scatter more than noise explains, as on a device with friction: the fit was made to a local average "
+    "over neighbouring lines (--no-smooth fits the lines themselves)."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifyPlan:
+    recordings: tuple[Path, ...]
+    out: Path
+    band_hz: tuple[float, float] = (5.0, 35.0)
+    order: int = 26
+    smooth: bool | None = None
+    """Local polynomials over neighbouring lines before the fit; None: where lines scatter more than their noise, as
+    they do on a device that is not linear, whose distortions are no noise."""
+    with_spring: bool = False
+    """From the excitation, with the spring's force a part of the device: for playing under the same spring, without
+    trusting encoders to see what the handle does."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentifiedDevice:
+    """What was written, and everything that a page about it needs."""
+
+    plan: IdentifyPlan
+    recordings: tuple[Recording, ...]
+    estimate: FrequencyResponse
+    identified: Identified
+    model: IdentifiedModel
+    tested: HeldOut | None
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        return (*self.estimate.remarks, *self.identified.remarks)
+
+
+def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
+    """Reads, estimates, fits and writes. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    settings = _settings(plan)
+    check_free(plan.out)
+    recordings = tuple(read_recording(path) for path in plan.recordings)
+    if plan.with_spring:
+        recordings = tuple(_from_excitation(recording) for recording in recordings)
+    try:
+        estimate = transfer_estimate(recordings)
+        identified = _fit(plan, estimate, settings, recordings, on_progress)
+        model = _at_place(plan, recordings, identified.model)
+        tested = held_out(model, recordings)
+    except (TransferEstimateError, IdentificationRefused) as refusal:
+        raise _no_model(str(refusal)) from refusal
+    except ValueError as problem:
+        raise _no_model(f"{problem}.") from problem
+    write_identified_model(plan.out, model)
+    return IdentifiedDevice(plan, recordings, estimate, identified, model, tested)
+
+
+def _fit(
+    plan: IdentifyPlan,
+    estimate: FrequencyResponse,
+    settings: IdentificationSettings,
+    recordings: tuple[Recording, ...],
+    on_progress: Callable[[float], None],
+) -> Identified:
+    if plan.smooth is not None:
+        return identify(smoothed(estimate) if plan.smooth else estimate, settings, recordings, on_progress)
+    identified = identify(estimate, settings, recordings, lambda share: on_progress(share / 2))
+    if identified.cost > UNEXPLAINED:
+        identified = identify(smoothed(estimate), settings, recordings, lambda share: on_progress(0.5 + share / 2))
+        identified = replace(identified, remarks=(SMOOTHED, *identified.remarks))
+    on_progress(1.0)
+    return identified
+
+
+def check_free(out: Path) -> None:
+    """Before any work. Raises StudyError."""
+    if out.exists():
+        raise StudyError(
+            "The model was not made",
+            f"{out} exists already, and models are never overwritten.",
+            "Choose another name with --out.",
+            saved="Nothing was written.",
+        )
+    if not out.absolute().parent.is_dir():
+        raise StudyError(
+            "The model was not made",
+            f"There is no folder {out.parent} to write {out.name} into.",
+            "Make the folder first, or choose another name with --out.",
+            saved="Nothing was written.",
+        )
+
+
+def summary(device: IdentifiedDevice) -> dict[str, Any]:
+    """The figures, for a person's lines and a program's JSON alike."""
+    model, tested = device.model, device.tested
+    low, high = model.band_hz
+    return {
+        "model": str(device.plan.out),
+        "order": model.order,
+        "band_hz": [low, high],
+        "spectral_radius": model.spectral_radius,
+        "lines": device.identified.lines,
+        "rms_relative_error": device.identified.rms_relative_error,
+        "worst_relative_error": device.identified.worst_relative_error,
+        "held_out_error": tested.error if tested else None,
+        "held_out_noise": tested.noise if tested else None,
+        "held_out_s": tested.seconds if tested else None,
+        "remarks": list(device.remarks),
+    }
+
+
+def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
+    found = summary(device)
+    low, high = found["band_hz"]
+    lines = [
+        f"Order {found['order']}, {low:g} to {high:g} Hz, stable (slowest pole {found['spectral_radius']:.5f}), "
+        f"from {found['lines']} lines.",
+        f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
+        f"{100 * found['worst_relative_error']:.2f} %; the estimate's own noise is in both.",
+    ]
+    if device.tested is None:
+        lines.append("No recording was kept for a test (role 'test'): how well the model predicts is not known.")
+    else:
+        noise = f", of which noise {100 * device.tested.noise:.2f} %" if device.tested.noise is not None else ""
+        lines.append(
+            f"Held-out {device.tested.seconds:g} s: error {100 * device.tested.error:.2f} % in the band{noise}."
+        )
+    return tuple(lines)
+
+
+def _settings(plan: IdentifyPlan) -> IdentificationSettings:
+    try:
+        return IdentificationSettings(band_hz=plan.band_hz, order=plan.order)
+    except ValueError as problem:
+        raise WrongUseError(
+            "There is no such model", f"{problem}.", "Correct --band or --order.", saved="Nothing was written."
+        ) from problem
+
+
+def _at_place(plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel) -> IdentifiedModel:
+    """With the place where all recordings were made, and where they come from."""
+    provenance = {
+        **model.provenance,
+        **gather_provenance(parents=plan.recordings).as_dict(),
+        "device": recordings[0].device,
+        "hand": sorted({str(recording.meta.get("hand", "")) for recording in recordings}),
+        "feedback": recordings[0].meta.get("feedback"),
+        "input": "excitation" if plan.with_spring else "command",
+    }
+    return replace(model, place_m=_place(recordings), provenance=provenance)
+
+
+def _from_excitation(recording: Recording) -> Recording:
+    """As if the feedback were a part of the device: what was decided beforehand is what enters it."""
+    if recording.excitation is None:
+        raise _no_model("The recording does not hold its excitation, so the spring's share is not known.")
+    return replace(recording, command=recording.excitation)
+
+
+def _place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
+    places = [recording.meta["place_m"] for recording in recordings if recording.meta.get("place_m") is not None]
+    if not places:
+        return None
+    if np.ptp(np.array(places, dtype=float), axis=0).max() > NEAR_M:
+        raise ValueError("the recordings were made at different places; identify one model per place")
+    x, y, z = (float(component) for component in places[0])
+    return x, y, z
+
+
+def _no_model(happened: str) -> StudyError:
+    return StudyError(
+        "No model can be made from these recordings",
+        happened[:1].upper() + happened[1:],
+        "Record what is missing (hapteq record), or ask for another --band or --order.",
+        saved="Nothing was written.",
+    )

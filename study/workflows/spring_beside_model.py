@@ -1,0 +1,31 @@
+"""Which spring is still to be accounted for where a model drives a device: none that is in the model already."""
+
+import math
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.tracking.virtual_spring import NO_SPRING, VirtualSpring
+from study.errors import StudyError
+
+SAME = 0.01
+"""Springs that differ by less, relatively, are one."""
+
+
+def spring_beside(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:
+    """spring: what will act while the model's forces are played. Raises StudyError where the model holds another."""
+    if model.provenance.get("input") != "excitation":
+        return spring
+    feedback = model.provenance.get("feedback")
+    held = feedback if isinstance(feedback, dict) else {}
+    inside = VirtualSpring(float(held.get("stiffness_n_per_m", 0.0)), float(held.get("damping_n_s_per_m", 0.0)))
+    if not (
+        math.isclose(inside.stiffness_n_per_m, spring.stiffness_n_per_m, rel_tol=SAME)
+        and math.isclose(inside.damping_n_s_per_m, spring.damping_n_s_per_m, rel_tol=SAME)
+    ):
+        raise StudyError(
+            "This model was made under another spring",
+            f"It holds a spring of {inside.stiffness_n_per_m:.4g} N/m and {inside.damping_n_s_per_m:.3g} N s/m, but "
+            f"one of {spring.stiffness_n_per_m:.4g} N/m and {spring.damping_n_s_per_m:.3g} N s/m will act.",
+            "Record and identify under the same spring, or identify without --with-spring.",
+            saved="Nothing moved.",
+        )
+    return NO_SPRING
