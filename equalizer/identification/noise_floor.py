@@ -40,7 +40,7 @@ def scatter_over_lines(response: ComplexArray) -> FloatArray:
 
 def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
-    smooth: FloatArray = uniform_filter1d(power, min(lines, len(power)), axis=0, mode="nearest")
+    smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
     return smooth
 
 

@@ -45,7 +45,7 @@ def judge_lines(
         )
     dark = ~excited & ~stiff
     if dark.any():
-        remarks.append(f"Not reliable for want of excitation: {_spans(frequency_hz, dark)}.")
+        remarks.append(f"Not reliable for want of excitation in every direction: {_spans(frequency_hz, dark)}.")
     worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
     noisy = (worst < rules.least_coherence) & excited & ~stiff
     if noisy.any():

@@ -1,0 +1,25 @@
+"""How much a response mixes its axes."""
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+
+def worst_coupling(response: ComplexArray) -> FloatArray:
+    """What goes across over what goes along when one axis is pushed, for the worst axis.
+
+    response: (..., axes, axes), inputs and outputs in the same frame. Returns (...). Raises ValueError if not square.
+    """
+    require_equal_axes(response)
+    power = np.abs(response) ** 2
+    along = np.einsum("...ii->...i", power)
+    across = np.maximum(power.sum(axis=-2) - along, 0.0)
+    ratio: FloatArray = np.sqrt(across / np.maximum(along, np.finfo(np.float64).tiny)).max(axis=-1)
+    return ratio
+
+
+def require_equal_axes(response: ComplexArray) -> None:
+    outputs, inputs = response.shape[-2:]
+    if outputs != inputs:
+        raise ValueError(f"coupling compares equal axes, but there are {outputs} outputs and {inputs} inputs")

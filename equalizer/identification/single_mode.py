@@ -1,0 +1,70 @@
+"""One resonance fitted to lines round a peak: all entries share the pole, each has residues of its own."""
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_STARTING_ROUNDS, _NEWTON_ROUNDS = 3, 8
+
+
+def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Natural frequency (draws,) in Hz and damping ratio (draws,); NaN where no resonance fits.
+
+    entries (draws, lines, entries): G = (a parabola in s per entry) / (s² + c1 s + c0) in least squares; the parabola
+    takes in whatever lies further off. Started by re-weighted linear equations (Sanathanan and Koerner), which noise
+    biases towards more or less damping; finished by Gauss and Newton's steps on the fit itself, which it does not
+    (variable projection, after Kaufman). frequency_hz: (lines,), at least six.
+    """
+    middle = float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
+    s = np.asarray(1j * frequency_hz / middle, dtype=np.complex128)
+    numerator = np.stack([np.ones_like(s), s, s**2], axis=1)
+    c1, c0 = np.zeros(len(entries)), np.ones(len(entries))
+    over: ComplexArray = np.ones((len(entries), len(s)), dtype=np.complex128)
+    for _ in range(_STARTING_ROUNDS):
+        basis = _basis(numerator, over)
+        known, first, second = (_left(basis, entries * (factor * over)[:, :, None]) for factor in (s**2, s, 1.0))
+        c1, c0 = _two_unknowns(first, second, -known)
+        over = _over(s, c1, c0)
+    for _ in range(_NEWTON_ROUNDS):
+        basis = _basis(numerator, over)
+        remainder = _left(basis, entries)
+        fitted = (entries - remainder) * over[:, :, None]
+        step1, step0 = _two_unknowns(_left(basis, fitted * s[:, None]), _left(basis, fitted), -remainder)
+        c1, c0 = c1 + np.clip(step1, -0.05, 0.05), c0 + np.clip(step0, -0.05, 0.05)
+        over = _over(s, c1, c0)
+    root = np.sqrt(np.maximum(c0, np.finfo(np.float64).tiny))
+    natural, damping = middle * root, c1 / (2 * root)
+    fits = (c1 > 0) & (natural > frequency_hz[0]) & (natural < frequency_hz[-1])
+    return np.where(fits, natural, np.nan), np.where(fits, damping, np.nan)
+
+
+def _over(s: ComplexArray, c1: FloatArray, c0: FloatArray) -> ComplexArray:
+    """(draws, lines): one over the denominator."""
+    over: ComplexArray = 1 / (s**2 + c1[:, None] * s + c0[:, None])
+    return over
+
+
+def _basis(numerator: ComplexArray, over: ComplexArray) -> ComplexArray:
+    """(draws, lines, 3), orthonormal: what numerators over the denominator can make."""
+    basis: ComplexArray = np.linalg.qr(numerator * over[:, :, None])[0]
+    return basis
+
+
+def _left(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
+    """What no numerator can take up."""
+    remainder: ComplexArray = values - basis @ (np.conj(basis.swapaxes(1, 2)) @ values)
+    return remainder
+
+
+def _two_unknowns(first: ComplexArray, second: ComplexArray, right: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Real least squares of first x + second y = right, draw by draw."""
+
+    def dot(one: ComplexArray, other: ComplexArray) -> FloatArray:
+        product: FloatArray = np.sum((np.conj(one) * other).real, axis=(1, 2))
+        return product
+
+    aa, ab, bb = dot(first, first), dot(first, second), dot(second, second)
+    ar, br = dot(first, right), dot(second, right)
+    determinant = np.maximum(aa * bb - ab**2, np.finfo(np.float64).tiny)
+    return (ar * bb - br * ab) / determinant, (br * aa - ar * ab) / determinant
