@@ -14,13 +14,13 @@ def shipped(name: str):
 def test_without_a_hand_nobody_may_hold_the_handle():
     said = handle_notice(shipped("sweep_band"), "omega.3", 298.0)
     assert said.startswith("Nobody may hold the handle: 'omega.3' is going to move by itself for about 5 min")
-    assert "up to 2 N" in said
+    assert "up to 3 N" in said
 
 
 def test_in_a_hand_the_hand_is_asked_for():
     said = handle_notice(shipped("sweep_hand"), "omega.3", 269.0)
     assert "hold the handle of 'omega.3' now" in said
-    assert "up to 1.4 N" in said
+    assert "up to 1.5 N" in said
     assert "Nobody" not in said
 
 
