@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from equalizer.identification.canonical_variate import canonical_variate, decimation, driven_records
+from equalizer.identification.canonical_variate import poles_and_shapes as from_records
 from equalizer.identification.modal_form import ModalForm
 from equalizer.identification.refinement import FittedForm, fitted, refine
 from equalizer.identification.settings import IdentificationSettings
@@ -17,6 +19,7 @@ from equalizer.identification.weighted_lines import (
     bins_of,
 )
 from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording
 
 LINES_PER_BIN = 5
 OCTAVE_SHARE = 1 / 40
@@ -61,18 +64,42 @@ def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> t
     return tuple(starts)
 
 
+def record_starts(
+    recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
+) -> tuple[Start, ...]:
+    """From the time domain; none where the band leaves nothing to decimate."""
+    factor = decimation(lines.sample_rate_hz, settings.band_hz[1])
+    if factor < 2:
+        return ()
+    records = driven_records(recordings, factor)
+    p, m = lines.response.shape[1:]
+    radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
+    starts = []
+    for horizon in settings.record_horizons:
+        observed = canonical_variate(records, m, horizon) if horizon * p > settings.order + p else None
+        if observed is not None:
+            form = from_records(observed, p, settings.order, factor, radius)
+            starts.append(Start(f"canonical variates, horizon {horizon}", form))
+    return tuple(starts)
+
+
 def candidate(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
     """Refined on bins, which are formed anew about each pass's result, and at last on all lines of a narrow band."""
     radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
-    bins = bins_of(lines, 1, OCTAVE_SHARE) if settings.wide else bins_of(lines, LINES_PER_BIN, 0.0)
-    centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
     found = fitted(start.form, lines)
     for steps in MOST_STEPS:
-        found = refine(found.form, binned(lines, bins, found.response(lines.z), found.response(centres)), radius, steps)
+        found = refine(found.form, bins_about(found, lines, settings), radius, steps)
     if not settings.wide:
         found = refine(found.form, lines, radius, LAST_STEPS)
     cost = lines.cost(found.response(lines.z)) / lines.response.size
     return Candidate(start.name, found, cost, outside_gain(found, lines))
+
+
+def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
+    """The lines in bins, their means taken about a model that is nearly right."""
+    bins = bins_of(lines, 1, OCTAVE_SHARE) if settings.wide else bins_of(lines, LINES_PER_BIN, 0.0)
+    centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
+    return binned(lines, bins, found.response(lines.z), found.response(centres))
 
 
 def outside_gain(found: FittedForm, lines: WeightedLines) -> float:

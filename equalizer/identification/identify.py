@@ -5,14 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.candidates import Candidate, best, candidate, subspace_starts
+from equalizer.identification.candidates import Candidate, best, bins_about, candidate, record_starts, subspace_starts
 from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.refinement import FittedForm
-from equalizer.identification.refusals import lines_or_refusal
+from equalizer.identification.model_uncertainty import parameter_draws, response_deviation
+from equalizer.identification.refusals import IdentificationRefused, lines_or_refusal
 from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.stable_poles import largest_radius
 from equalizer.identification.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
 
 UNEXPLAINED = 1.5
 """Residual over noise above which a model is said to leave something."""
@@ -29,6 +32,9 @@ class Identified:
     """Model against estimate over the lines of the band; the estimate's own noise is in it."""
     worst_relative_error: float
     """The worst line's, relative to the root mean square of the response."""
+    expected_error: float | None
+    """Of the model against the device, as the noise makes it: root mean square over the lines, relative to the
+    response's; from the draws, None without them. What no linear model of this order can follow is not in it."""
     lines: int
     candidates: tuple[Candidate, ...]
     chosen: Candidate
@@ -51,39 +57,59 @@ def identify(
     tell = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = lines_or_refusal(responses, settings)
-    starts = subspace_starts(lines, settings)
+    _refuse_foreign(records, responses[0])
+    starts = (*subspace_starts(lines, settings), *record_starts(records, lines, settings))
     found = []
     for number, start in enumerate(starts):
-        tell(number / len(starts))
+        tell(number / (len(starts) + 1))
         found.append(candidate(start, lines, settings))
-    chosen = best(found)
+    tell(len(starts) / (len(starts) + 1))
+    identified = _identified(tuple(found), lines, responses[0], settings)
     tell(1.0)
-    return _identified(chosen, tuple(found), lines, responses[0], settings)
+    return identified
 
 
 def _identified(
-    chosen: Candidate,
-    found: tuple[Candidate, ...],
-    lines: WeightedLines,
-    like: FrequencyResponse,
-    settings: IdentificationSettings,
+    found: tuple[Candidate, ...], lines: WeightedLines, like: FrequencyResponse, settings: IdentificationSettings
 ) -> Identified:
+    chosen = best(found)
     low, high = settings.band_hz
     p, m = lines.response.shape[1:]
     unknowns = settings.order * (p + m) + p * m
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
     inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
     error = lines.relative_error(chosen.fitted.response(lines.z))[inside]
+    model = _model(chosen, lines, cost, like, settings)
     return Identified(
-        model=_model(chosen.fitted, like, settings),
+        model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((error**2).mean())),
         worst_relative_error=float(error.max()),
+        expected_error=_expected_error(model, lines.frequency_hz[inside]),
         lines=int(inside.sum()),
         candidates=found,
         chosen=chosen,
         remarks=tuple(_remarks(chosen, cost, settings)),
     )
+
+
+def _expected_error(model: IdentifiedModel, frequency_hz: FloatArray) -> float | None:
+    if model.samples is None:
+        return None
+    some = frequency_hz[:: max(1, len(frequency_hz) // 200)]
+    size = np.sqrt((np.abs(model_response(model, some)) ** 2).sum())
+    return float(np.sqrt((response_deviation(model, some) ** 2).sum()) / size)
+
+
+def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:
+    for record in records:
+        told = (record.sample_rate_hz, record.command.channels, record.response.channels)
+        if told != (like.sample_rate_hz, like.input_channels, like.output_channels):
+            raise IdentificationRefused(
+                f"a record of {', '.join(told[2])} per {', '.join(told[1])} at {told[0]:g} Hz does not belong to a "
+                f"response of {', '.join(like.output_channels)} per {', '.join(like.input_channels)} at "
+                f"{like.sample_rate_hz:g} Hz; give the records that the response was estimated from"
+            )
 
 
 def _remarks(chosen: Candidate, cost: float, settings: IdentificationSettings) -> list[str]:
@@ -101,7 +127,16 @@ def _remarks(chosen: Candidate, cost: float, settings: IdentificationSettings) -
     return remarks
 
 
-def _model(fitted: FittedForm, like: FrequencyResponse, settings: IdentificationSettings) -> IdentifiedModel:
+def _model(
+    chosen: Candidate, lines: WeightedLines, cost: float, like: FrequencyResponse, settings: IdentificationSettings
+) -> IdentifiedModel:
+    fitted = chosen.fitted
+    samples = None
+    if settings.draws:
+        radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
+        noise_factor = float(np.sqrt(max(cost, 1.0)))
+        bins = bins_about(fitted, lines, settings)
+        samples = parameter_draws(fitted, bins, radius, noise_factor, settings.draws, settings.seed)
     return IdentifiedModel(
         A=fitted.form.state_matrix,
         B=fitted.B,
@@ -113,8 +148,11 @@ def _model(fitted: FittedForm, like: FrequencyResponse, settings: Identification
         output_unit=like.output_unit,
         input_channels=like.input_channels,
         output_channels=like.output_channels,
+        samples=samples,
         provenance={
-            "method": "warped frequency-domain subspace, refined by maximum likelihood",
+            "method": "subspace identification, refined by maximum likelihood on the lines of the response",
+            "start": chosen.name,
+            "residual_over_noise": cost,
             "longest_decay_s": settings.longest_decay_s,
         },
     )

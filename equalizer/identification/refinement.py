@@ -18,6 +18,9 @@ from equalizer.signals.signal import FloatArray
 LEAST_GAIN = 1e-7
 """Relative fall of the cost over a step that is not worth another step."""
 
+UNSEEN = 1e-13
+"""Share of a state's column that is its own, below which it counts as not there."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedForm:
@@ -103,6 +106,9 @@ def _point(form: ModalForm, lines: WeightedLines) -> _Point:
     measured = by_input(lines.weight * lines.response)
     along = np.einsum("jrs,jr->js", basis, measured)
     residual = np.einsum("jrs,js->jr", basis, along) - measured
+    # A state that nothing shows (its column is zero, or another's) would stop the fit here.
+    unseen = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) < UNSEEN
+    triangle = triangle + np.eye(triangle.shape[1]) * np.where(unseen, 1.0, 0.0)[:, None]
     solved = np.linalg.solve(triangle, along[:, :, None])[:, :, 0] / size[:, 0]
     return _Point(form, basis, solved, residual, float((residual**2).sum()))
 

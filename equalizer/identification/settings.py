@@ -15,9 +15,11 @@ class IdentificationSettings:
     """No pole dies out slower than this. Raise it for a device that rings longer."""
     longer_horizons: tuple[int, ...] = (0, 2)
     """Block rows beyond the shortest useful horizon; each is a start of its own."""
+    record_horizons: tuple[int, ...] = (16,)
+    """Past and future samples of the starts from time records, where there are any."""
     margin: float = 0.1
     """Lines this far beyond the band, relative, help to hold its edges if they were measured."""
-    draws: int = 40
+    draws: int = 30
     """Of the parameters from their uncertainty; 0 = none."""
     seed: int = 1
     """Of the draws."""

@@ -55,7 +55,7 @@ def warped_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Sub
     noise = np.kron(np.linalg.cholesky((powers.T @ powers.conj()).real / len(zeta)), np.eye(p))
     vectors, values, _ = np.linalg.svd(np.linalg.solve(noise, unexplained))
     coloured = np.tile(of_output, horizon)[:, None] * (noise @ vectors)
-    return Subspace(coloured, values / np.sqrt(2 * len(zeta) * m / 2), p, c)
+    return Subspace(coloured, values / np.sqrt(len(zeta) * m), p, c)
 
 
 def _without_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatArray:
