@@ -1,5 +1,6 @@
 """`hapteq identify`: a state-space model of the device from its recordings."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -31,8 +32,6 @@ def identify(
     as_json: JsonOption = False,
 ) -> None:
     """Fit a stable model to the band, test it on what was kept for a test, and write it."""
-    import json
-
     from study.cli.progress import bar
     from study.workflows.identify_model import IdentifyPlan, check_free, identify_model, summary, summary_lines
     from study.workflows.report_identification import report_identification
@@ -44,9 +43,7 @@ def identify(
     if as_json:
         typer.echo(json.dumps(summary(device), indent=2))
     else:
-        typer.echo(str(out))
-        for line in summary_lines(device):
-            typer.echo(line)
+        typer.echo("\n".join((str(out), *summary_lines(device))))
     for remark in device.remarks:
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:

@@ -1,0 +1,58 @@
+"""What an order buys and costs: singular values, error on held-out lines, work per tick."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
+from equalizer.identification.order_report import OrderReport
+
+
+def model_order_picture(report: OrderReport, chosen: int) -> Picture:
+    """chosen: the order of the model that was made."""
+    return Picture(
+        name="model-order",
+        title="What the order of the model buys and costs",
+        caption="Left: singular values of the data, in units of the noise; states above the dashed line are seen. "
+        "Right: error on lines that the fit did not see, with its floor, the noise (dashed), and the multiplications "
+        f"that a tick costs. This model has order {chosen}; the lowest that is as good as the best is "
+        f"{report.suggested_order}.",
+        figure=draw_model_order(report, chosen),
+    )
+
+
+def draw_model_order(report: OrderReport, chosen: int) -> Figure:
+    figure = new_figure(8.6, 3.2)
+    left, right = figure.subplots(1, 2)
+    _draw_singular_values(left, report)
+    _draw_errors(right, report, chosen)
+    return figure
+
+
+def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
+    plain_axes(axes)
+    values = report.singular_values
+    number = np.arange(1, len(values) + 1)
+    seen = number <= report.visible_order
+    axes.semilogy(number[seen], values[seen], "o", color=BLUE, markersize=4, label="seen")
+    axes.semilogy(number[~seen], values[~seen], "o", color=GREY, markersize=4, markerfacecolor="none", label="noise")
+    axes.axhline(1.0, color=GREY, linestyle="--", linewidth=1)
+    axes.set_xlabel("Number")
+    axes.set_ylabel("Singular value")
+    axes.legend(frameon=False, fontsize=9)
+
+
+def _draw_errors(axes: Axes, report: OrderReport, chosen: int) -> None:
+    plain_axes(axes)
+    orders = [row.order for row in report.rows]
+    axes.semilogy(orders, [100 * row.held_out_error for row in report.rows], "o-", color=VERMILLION, markersize=5)
+    axes.axhline(100 * report.held_out_noise, color=GREY, linestyle="--", linewidth=1)
+    axes.axvline(chosen, color=GREY, linewidth=1)
+    axes.set_xlabel("Order")
+    axes.set_ylabel("Error, held-out lines (%)", color=VERMILLION)
+    cost = axes.twinx()
+    cost.plot(orders, [row.multiply_adds_per_tick for row in report.rows], "s:", color=ORANGE, markersize=5)
+    cost.set_ylabel("Multiplications per tick", color=ORANGE)
+    cost.set_ylim(bottom=0)
+    cost.spines["top"].set_visible(False)
