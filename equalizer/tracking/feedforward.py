@@ -11,7 +11,7 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.band_split import BandEdges, LinearPhaseSplit
-from equalizer.tracking.constrained import TrackingLoss, constrained_track
+from equalizer.tracking.constrained import CapSettings, TrackingLoss, constrained_track
 from equalizer.tracking.limits import Peaks, predicted_peaks, require_within
 from equalizer.tracking.padding import CAUSAL, answer, band_error, track_padded
 from equalizer.tracking.periodic_inverse import check_wanted
@@ -19,6 +19,10 @@ from equalizer.tracking.tracking_problem import TrackingError, TrackingProblem, 
 
 EDGE_ROOM_HZ = 1.0
 """Beyond the model's band, so that all of it is played."""
+
+
+PROVED = 1e-3
+"""Forces under the cap are taken whose cost is proved to be so close to the best."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,5 +93,6 @@ def _solved(
     if not settings.constrain or predicted_peaks(free, settings.cap_n).fits:
         return free, None
     after = CAUSAL.samples(problem.sample_rate_hz)[1]
-    capped = constrained_track(problem, np.pad(wanted, ((0, after), (0, 0))), settings.cap_n)
+    padded = np.pad(wanted, ((0, after), (0, 0)))
+    capped = constrained_track(problem, padded, settings.cap_n, settings=CapSettings(gap=PROVED))
     return capped.forces[: len(wanted)], capped.loss
