@@ -23,7 +23,7 @@ from equalizer.tracking.high_band import (
     one_dof_at_once,
 )
 from equalizer.tracking.limits import require_within
-from equalizer.tracking.low_band import CORNER_HZ, PlannedMotion, low_band_forces, plan_motion, plan_motion_causally
+from equalizer.tracking.low_band import CORNER_HZ, SlowMotion, low_band_forces, plan_motion, plan_motion_causally
 from equalizer.tracking.lqr import stored_gains, track
 from equalizer.tracking.rigid_model import RigidModel
 from equalizer.tracking.stylus import StylusActuator, StylusShare, share_with_stylus
@@ -145,11 +145,11 @@ class BandedEqualizer:
         after = next_fast_len(len(wanted) + before + self._padding + around) - len(wanted) - before - around
         return np.pad(np.asarray(wanted, dtype=np.float64), ((before, after), (0, 0)))
 
-    def _planned(self, acceleration: FloatArray, corner_hz: float) -> PlannedMotion:
+    def _planned(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
         plan = plan_motion_causally if self.causal else plan_motion
         return plan(acceleration, self._rate_hz, corner_hz)
 
-    def _low_forces(self, wanted: FloatArray) -> tuple[FloatArray, PlannedMotion | None]:
+    def _low_forces(self, wanted: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
         if self.low is None:
             return np.zeros((len(wanted), self.middle.B.shape[1])), None
         motion = self._planned(wanted, self.low.corner_hz)
@@ -166,7 +166,7 @@ class BandedEqualizer:
         settings = replace(self.high.settings, causal=self.causal)
         return high_band_forces(signal, self._rate_hz, self.high.source, others, settings), share
 
-    def _rendered(self, motion: PlannedMotion | None, middle: FloatArray) -> FloatArray:
+    def _rendered(self, motion: SlowMotion | None, middle: FloatArray) -> FloatArray:
         """What the spring does by itself along the motion of the two lower bands; the high band's is too small."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m
         if k == b == 0:
@@ -176,7 +176,7 @@ class BandedEqualizer:
         return force
 
     def _predicted(
-        self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: PlannedMotion | None, answer: FloatArray
+        self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, answer: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         if self.high is not None:
             low, middle, high = (delivered(forces, self._rate_hz, self.high.source) for forces in by_band)

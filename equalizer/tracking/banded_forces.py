@@ -7,7 +7,7 @@ from equalizer.tracking.band_split import Bands
 from equalizer.tracking.constrained import TrackingLoss
 from equalizer.tracking.high_band import HighBandForces
 from equalizer.tracking.limits import Peaks
-from equalizer.tracking.low_band import PlannedMotion
+from equalizer.tracking.low_band import SlowMotion
 from equalizer.tracking.stylus import StylusShare
 
 
@@ -32,7 +32,7 @@ class BandedForces:
     """Of `entering`; None without a cap"""
     loss: TrackingLoss | None
     """What the cap cost in the middle band; None where nothing was constrained"""
-    motion: PlannedMotion | None
+    motion: SlowMotion | None
     high: HighBandForces | None
     stylus: StylusShare | None
 

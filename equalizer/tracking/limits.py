@@ -72,7 +72,5 @@ def within_cap(forces: FloatArray, cap_n: float) -> FloatArray:
     """Each row of (N, m) shortened to the cap where it is longer: the nearest vectors that are allowed."""
     lengths = np.linalg.norm(forces, axis=1, keepdims=True)
     # A hair below the cap, so that rounding leaves no row above it.
-    shorter = np.minimum(
-        1.0, cap_n * (1 - 8 * np.finfo(np.float64).eps) / np.maximum(lengths, np.finfo(np.float64).tiny)
-    )
+    shorter = cap_n * (1 - 8 * np.finfo(np.float64).eps) / np.maximum(lengths, cap_n)
     return np.asarray(np.where(lengths > cap_n, forces * shorter, forces))

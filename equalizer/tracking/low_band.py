@@ -19,7 +19,7 @@ CORNER_HZ = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlannedMotion:
+class SlowMotion:
     """Each (N, m), and consistent: velocity and acceleration are the position's derivatives."""
 
     position_m: FloatArray
@@ -39,10 +39,10 @@ class LowBandForces:
     """(N, m), N: what must enter the device along the motion"""
     superposed: FloatArray
     """(N, m), N: what is added to the rendered spring's force to give `total`"""
-    motion: PlannedMotion
+    motion: SlowMotion
 
 
-def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> PlannedMotion:
+def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
     """wanted: (N, m), m/s², known beforehand and quiet at both ends.
 
     Two-sided, so that there is no phase error: x = a / (s² - w²), an exponential kernel that decays both ways. Of the
@@ -54,10 +54,10 @@ def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CO
     s = 2j * np.pi * np.fft.rfftfreq(len(padded), 1 / sample_rate_hz)[:, None]
     position = np.fft.rfft(padded, axis=0) / (s**2 - corner**2)
     parts = [np.fft.irfft(part, len(padded), axis=0)[run:][: len(a)] for part in (position, s * position)]
-    return PlannedMotion(parts[0], parts[1], a + corner**2 * parts[0])
+    return SlowMotion(parts[0], parts[1], a + corner**2 * parts[0])
 
 
-def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> PlannedMotion:
+def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
     """wanted: (N, m), m/s², from rest at the first row, as after a contact. x = a / (s + w)²: it leads by
     2 atan(corner / f)."""
     a, corner = np.asarray(wanted, dtype=np.float64), _checked_corner(corner_hz, sample_rate_hz)
@@ -67,11 +67,11 @@ def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: f
     position = lfilter(*integral, velocity_like, axis=0)
     # s / (s + w) = 1 - w / (s + w), so that the three are derivatives of each other to rounding.
     velocity = velocity_like - corner * position
-    return PlannedMotion(position, velocity, a - 2 * corner * velocity_like + corner**2 * position)
+    return SlowMotion(position, velocity, a - 2 * corner * velocity_like + corner**2 * position)
 
 
 def low_band_forces(
-    motion: PlannedMotion, rigid: RigidModel, sample_rate_hz: float, spring: VirtualSpring = NO_SPRING
+    motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float, spring: VirtualSpring = NO_SPRING
 ) -> LowBandForces:
     """Inverse dynamics along the motion, early by the rigid model's delay: to first order, which is enough where the
     band is slow."""
