@@ -10,11 +10,18 @@ from study.errors import DeviceError
 SIMULATED = "simulated"
 
 DEVICES = (SIMULATED,)
+"""What a study or a recording may be made on."""
+
+FRICTIONLESS = "simulated-frictionless"
+"""The simulated device with no friction in its drives: what friction costs is seen by comparing. Offered nowhere."""
+
+SIMULATIONS = (*DEVICES, FRICTIONLESS)
+"""Those that need no real clock."""
 
 
 def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int) -> Device:
     """`seed` drives what is random in a simulated device. Raises `DeviceError`."""
-    if name not in DEVICES:
+    if name not in SIMULATIONS:
         raise DeviceError(
             f"There is no device called {name!r}",
             "This version has no driver for a real device yet: it opens a simulated omega.3 only.",

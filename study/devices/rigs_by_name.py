@@ -10,13 +10,25 @@ from study.errors import DeviceError
 
 def simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
     """Raises `DeviceError` for a place where there is no workspace."""
+    return _simulated(settings, seed, friction=True)
+
+
+def frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
+    """As `simulated_rig`."""
+    return _simulated(settings, seed, friction=False)
+
+
+def _simulated(settings: DeviceSettings, seed: int, friction: bool) -> CompiledRig:
     try:
-        return build_omega3(seed=seed, hand=settings.hand_on_handle, place_m=settings.place_m)
+        return build_omega3(seed=seed, hand=settings.hand_on_handle, place_m=settings.place_m, friction=friction)
     except ValueError as error:
         raise DeviceError(
             "The simulated device cannot be opened", f"It refused its settings: {error}.", "Choose another place."
         ) from error
 
 
-RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {"simulated": simulated_rig}
-"""Rig of a name, its settings and a seed; the same names as `study.devices.opening.DEVICES`."""
+RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
+    "simulated": simulated_rig,
+    "simulated-frictionless": frictionless_rig,
+}
+"""Rig of a name, its settings and a seed; the same names as `study.devices.opening.SIMULATIONS`."""

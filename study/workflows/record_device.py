@@ -11,7 +11,7 @@ from protocols.hashing import protocol_hash
 from protocols.recording_protocol import RecordingProtocol
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
-from study.devices.opening import DEVICES, open_device
+from study.devices.opening import SIMULATIONS, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.handle_notice import handle_notice
 from study.session.limits import limits_of_recording
@@ -60,7 +60,7 @@ def record_device(
     Raises StudyError before anything moves where `out` exists already.
     """
     check_free(plan.out)
-    clock = VirtualClock() if plan.device in DEVICES else RealClock()
+    clock = VirtualClock() if plan.device in SIMULATIONS else RealClock()
     with contextlib.closing(open_device(plan.device, _settings(plan), clock, plan.seed)) as device:
         return record_on(device, plan, on_progress, before_moving)
 

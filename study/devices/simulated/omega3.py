@@ -1,6 +1,7 @@
 """The simulated omega.3 as a rig. What it is and is not: docs/simulated_omega3.md."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,17 +16,21 @@ NAME = "simulated omega.3"
 MAX_FORCE_N = 12.0
 
 
-def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0)) -> CompiledRig:
+def build_omega3(seed: int, hand: bool, place_m: Vector = (0.0, 0.0, 0.0), friction: bool = True) -> CompiledRig:
     """A device at rest at place_m, gravity compensated. `seed`: of the accelerometer's noise, any integer >= 0.
+
+    Without `friction` it is no stand-in for a device, but a means of telling what friction costs.
 
     Raises ValueError for a place within the stops.
     """
     parameters = Omega3Parameters()
+    if not friction:
+        parameters = replace(parameters, drives=replace(parameters.drives, friction_n_m=0.0))
     if not math.dist(place_m, (0.0, 0.0, 0.0)) < parameters.stops.radius_m:
         raise ValueError(f"place_m must be within {parameters.stops.radius_m} m of the centre, not {place_m}")
     packed = pack_parameters(parameters, hand, place_m)
     info = DeviceInfo(
-        name=NAME,
+        name=NAME if friction else f"{NAME} without friction",
         simulated=True,
         sample_rate_hz=1.0 / TICK_S,
         max_force_n=MAX_FORCE_N,

@@ -10,7 +10,7 @@ import pytest
 
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceSettings
-from study.devices.opening import DEVICES, open_device
+from study.devices.opening import DEVICES, FRICTIONLESS, SIMULATIONS, open_device
 from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.errors import DeviceError, ExitCode
 from study.session.limits import Limits
@@ -95,7 +95,14 @@ def test_with_a_hand_nobody_can_say_so():
 
 
 def test_every_device_that_is_offered_can_be_built():
-    assert set(DEVICES) == set(RIGS_BY_NAME)
+    assert set(DEVICES) <= set(SIMULATIONS) == set(RIGS_BY_NAME)
+
+
+def test_the_device_without_friction_says_so_and_is_offered_nowhere():
+    device = open_device(FRICTIONLESS, SETTINGS, VirtualClock(), seed=1)
+    assert (device.info.simulated, device.info.name) == (True, "simulated omega.3 without friction")
+    assert FRICTIONLESS not in DEVICES
+    device.close()
 
 
 def test_the_door_is_light_until_something_is_opened():
