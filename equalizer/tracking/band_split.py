@@ -116,7 +116,8 @@ class CausalSplit:
 
     With q a lowpass of one pole, (q + (1 - q))^order is 1: the half of its terms with the higher powers of 1 - q is
     the band above the crossover, the rest what is below. Steep bands that add up to the input overlap and partly
-    cancel near a crossover, where each exceeds the input: see `largest_gain`.
+    cancel near a crossover, where each exceeds the input: see `largest_gain`. That price is high: the bands' own errors
+    no longer cancel. Where a wide-band model is known, playing it without a split is better from a contact on.
     """
 
     edges: BandEdges
