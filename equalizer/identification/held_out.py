@@ -20,7 +20,7 @@ class HeldOut:
     error: float
     """Root-mean-square of prediction - response over that of the response, all channels, within the model's band."""
     noise: float | None
-    """Of the response alone, by the same measure, from period to period; None without two whole periods. An error
+    """Of the response alone, by the same measure, from period to period; None with fewer than three. An error
     cannot fall below it, a perfect model's lies just there."""
     seconds: float
     """Compared."""
@@ -73,7 +73,7 @@ def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) ->
     measured = _in_band(response[last:], rate_hz, model.band_hz)
     error = measured - _in_band(predicted[last:], rate_hz, model.band_hz)
     noise = None
-    if segment.period and last - length >= segment.start - start:
+    if segment.period and last - 2 * length >= segment.start - start:  # the first one holds the transient
         before = _in_band(response[last - length : last], rate_hz, model.band_hz)
         noise = _power(measured - before) / 2
     return _Part(_power(error), noise, _power(measured), length / rate_hz)

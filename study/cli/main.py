@@ -19,6 +19,7 @@ import typer
 from study.cli import (
     analyze,
     doctor,
+    identify,
     noise,
     note,
     protocol,
@@ -49,6 +50,7 @@ app.command("serve", context_settings=serve.PASSES_OPTIONS_ON)(serve.serve)
 app.command("rehearse")(rehearse.rehearse)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
+app.command("identify")(identify.identify)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
 app.command("watch")(watch.watch)

@@ -1,12 +1,11 @@
 """From a folder of sessions to thresholds.csv, detection.csv, anova.json, figures and one report."""
 
-import io
 from pathlib import Path
 
 import numpy as np
 
 from analysis.ellipsoid import EllipsoidResult, ellipsoids
-from analysis.figures.picture import Picture, picture_svg
+from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
 from analysis.reports.study_report import render_study_report
 from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
@@ -15,7 +14,6 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.devices.clock import RealClock
 from study.errors import StudyError
-from study.store.atomic_write import write_atomically
 from study.store.file_errors import CannotWriteError
 from study.store.json_document import write_json
 from study.store.provenance import Provenance, gather_provenance
@@ -23,12 +21,11 @@ from study.store.recording_file import read_recording
 from study.store.text_file import write_text
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.workflows.collect_sessions import Collected, collect_sessions
+from study.workflows.picture_files import write_pictures
 from study.workflows.written_analysis import WrittenAnalysis
 
 ANALYSIS_NAME = "analysis"
 """Where an analysis goes, in the folder that was analysed, if nobody says otherwise."""
-
-FIGURE_DPI = 150
 
 OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
 """Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""
@@ -143,18 +140,9 @@ def _write(
     document = anova_document(analysis)
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
-    for picture in pictures:
-        write_text(figures / f"{picture.name}.svg", picture_svg(picture), overwrite=True)
-        if not picture.folded:
-            write_atomically(figures / f"{picture.name}.png", _png(picture), overwrite=True)
+    write_pictures(figures, pictures)
     page = render_study_report(analysis, pictures, _shown(provenance, collected), RealClock().utc(), shapes)
     write_text(out / "report.html", page, overwrite=True)
-
-
-def _png(picture: Picture) -> bytes:
-    buffer = io.BytesIO()
-    picture.figure.savefig(buffer, format="png", dpi=FIGURE_DPI)
-    return buffer.getvalue()
 
 
 def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:

@@ -52,13 +52,17 @@ class IdentifiedDevice:
     plan: IdentifyPlan
     recordings: tuple[Recording, ...]
     estimate: FrequencyResponse
+    fitted: FrequencyResponse
+    """What the model was fitted to: the estimate, or its local averages."""
     identified: Identified
     model: IdentifiedModel
     tested: HeldOut | None
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        return (*self.estimate.remarks, *self.identified.remarks)
+        """Sentences."""
+        found = (*self.estimate.remarks, *self.identified.remarks)
+        return tuple(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in found)
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
@@ -70,7 +74,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         recordings = tuple(_from_excitation(recording) for recording in recordings)
     try:
         estimate = transfer_estimate(recordings)
-        identified = _fit(plan, estimate, settings, recordings, on_progress)
+        fitted, identified = _fit(plan, estimate, settings, recordings, on_progress)
         model = _at_place(plan, recordings, identified.model)
         tested = held_out(model, recordings)
     except (TransferEstimateError, IdentificationRefused) as refusal:
@@ -78,7 +82,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     except ValueError as problem:
         raise _no_model(f"{problem}.") from problem
     write_identified_model(plan.out, model)
-    return IdentifiedDevice(plan, recordings, estimate, identified, model, tested)
+    return IdentifiedDevice(plan, recordings, estimate, fitted, identified, model, tested)
 
 
 def _fit(
@@ -87,15 +91,18 @@ def _fit(
     settings: IdentificationSettings,
     recordings: tuple[Recording, ...],
     on_progress: Callable[[float], None],
-) -> Identified:
+) -> tuple[FrequencyResponse, Identified]:
+    """What was fitted to, and the fit."""
     if plan.smooth is not None:
-        return identify(smoothed(estimate) if plan.smooth else estimate, settings, recordings, on_progress)
+        fitted = smoothed(estimate) if plan.smooth else estimate
+        return fitted, identify(fitted, settings, recordings, on_progress)
     identified = identify(estimate, settings, recordings, lambda share: on_progress(share / 2))
-    if identified.cost > UNEXPLAINED:
-        identified = identify(smoothed(estimate), settings, recordings, lambda share: on_progress(0.5 + share / 2))
-        identified = replace(identified, remarks=(SMOOTHED, *identified.remarks))
-    on_progress(1.0)
-    return identified
+    if identified.cost <= UNEXPLAINED:
+        on_progress(1.0)
+        return estimate, identified
+    fitted = smoothed(estimate)
+    identified = identify(fitted, settings, recordings, lambda share: on_progress(0.5 + share / 2))
+    return fitted, replace(identified, remarks=(SMOOTHED, *identified.remarks))
 
 
 def check_free(out: Path) -> None:
@@ -172,8 +179,15 @@ def _at_place(plan: IdentifyPlan, recordings: Sequence[Recording], model: Identi
         "hand": sorted({str(recording.meta.get("hand", "")) for recording in recordings}),
         "feedback": recordings[0].meta.get("feedback"),
         "input": "excitation" if plan.with_spring else "command",
+        "amplitude_n": _amplitude_n(recordings),
     }
     return replace(model, place_m=_place(recordings), provenance=provenance)
+
+
+def _amplitude_n(recordings: Sequence[Recording]) -> float:
+    """The largest of the segments that were fitted: friction left its equivalent at that amplitude in the model."""
+    segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
+    return max((segment.amplitude for segment in segments), default=0.0)
 
 
 def _from_excitation(recording: Recording) -> Recording:
