@@ -12,7 +12,9 @@ from equalizer.identification.weighted_lines import WeightedLines, weighted_line
 LEAST_SIGNAL_TO_NOISE = 2.0
 """Of amplitudes, the typical line's strongest entry."""
 LARGEST_GAP = 0.1
-"""Of the band, in octaves, without a line."""
+"""Of the band, in octaves, without a line..."""
+SPACINGS = 3.0
+"""...if it is also this many times the usual step from line to line."""
 
 
 class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
@@ -72,15 +74,24 @@ def _refuse_an_empty_band(
             f"no data in {low:g} to {high:g} Hz: {which}{f' ({reasons})' if reasons else ''}; "
             f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz"
         )
+    _refuse_a_hole(lines, settings)
+
+
+def _refuse_a_hole(lines: WeightedLines, settings: IdentificationSettings) -> None:
+    low, high = settings.band_hz
     ends = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
-    gaps = np.diff(np.log2(ends))
-    widest = int(np.argmax(gaps))
-    if gaps[widest] > LARGEST_GAP + 1.5 * np.median(gaps):
-        raise IdentificationRefused(
-            f"between {ends[widest]:.3g} and {ends[widest + 1]:.3g} Hz no line can be used, but the band is {low:g} to "
-            f"{high:g} Hz; record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz, or choose a band that the "
-            f"lines cover ({lines.frequency_hz[0]:.3g} to {lines.frequency_hz[-1]:.3g} Hz)"
-        )
+    octaves, steps = np.diff(np.log2(ends)), np.diff(ends)
+    usual = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
+    widest = int(np.argmax(octaves))
+    if octaves[widest] <= LARGEST_GAP or steps[widest] <= SPACINGS * usual:
+        return
+    below, above = ends[widest], ends[widest + 1]
+    left, right = max((low, below), (above, high), key=lambda side: float(side[1] / side[0]))
+    raise IdentificationRefused(
+        f"between {below:.3g} and {above:.3g} Hz no line can be used, but the band is {low:g} to {high:g} Hz; "
+        f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz, or choose a band that the lines cover "
+        f"({left:.3g} to {right:.3g} Hz)"
+    )
 
 
 def _refuse_noise(lines: WeightedLines, settings: IdentificationSettings) -> None:

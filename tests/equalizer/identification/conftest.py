@@ -11,9 +11,18 @@ import pytest
 @pytest.fixture(scope="session")
 def synthetic() -> ModuleType:
     """`synthetic_recordings.py` of this folder."""
-    path = Path(__file__).parent / "synthetic_recordings.py"
-    spec = importlib.util.spec_from_file_location("synthetic_recordings", path)
+    return _beside("synthetic_recordings")
+
+
+@pytest.fixture(scope="session")
+def measuring() -> ModuleType:
+    """`measured_lines.py` of this folder."""
+    return _beside("measured_lines")
+
+
+def _beside(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / f"{name}.py")
     assert spec is not None and spec.loader is not None
-    module = sys.modules["synthetic_recordings"] = importlib.util.module_from_spec(spec)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
