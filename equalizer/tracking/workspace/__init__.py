@@ -1,0 +1,1 @@
+"""One device at many places: models identified at several points, and forces for a place between them."""

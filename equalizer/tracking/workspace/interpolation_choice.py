@@ -1,0 +1,139 @@
+"""Which interpolation is used: decided by places that were identified and are kept out of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.periodic_inverse import WEIGHT
+from equalizer.tracking.quality import Quality, quality
+from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, modal_interpolation
+from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+from equalizer.tracking.workspace.place_weights import OUTSIDE_M, place_weights
+from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
+
+Interpolation = Literal["blended forces", "modal"]
+LINES = 300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOutPlace:
+    """What the device truly answers, as well as that is known, at a place that no given model stands for."""
+
+    place_m: Place
+    frequency_hz: FloatArray
+    """(lines,), within the models' band."""
+    response: ComplexArray
+    """(lines, p, m)"""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceCheck:
+    place_m: Place
+    blended: Quality
+    modal: Quality | None
+    """None where resonances could not be matched without this place."""
+    blended_error: float
+    """Largest singular value, over all lines, of what is delivered minus what is wanted; 0.01 = 1 %."""
+    modal_error: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InterpolationChoice:
+    interpolation: Interpolation
+    reason: str
+    """A sentence for the user."""
+    checks: tuple[PlaceCheck, ...]
+    workspace: WorkspaceModels
+    modal: ModalInterpolation | None
+    """Of all models; None where it is not used."""
+
+    def at(self, place_m: Place) -> ModelsAtPlace:
+        return self.modal.at(place_m) if self.modal else blended_at(self.workspace, place_m)
+
+
+def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
+    """A model of a place, taken as the truth there. Raises ValueError without a place."""
+    if model.place_m is None:
+        raise ValueError("the model that is held out does not say where it was identified")
+    frequency_hz = np.geomspace(*band_hz, LINES)
+    return HeldOutPlace(model.place_m, frequency_hz, model_response(model, frequency_hz))
+
+
+def choose_interpolation(
+    workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
+) -> InterpolationChoice:
+    """With `held_out` by those; else each model that lies between the others is held out in turn, which judges a
+    coarser grid than the one that is used. Blended forces where nothing can be checked, or modes do not match."""
+    try:
+        modal = modal_interpolation(workspace) if len(workspace) > 1 else None
+    except ModesDoNotMatchError as error:
+        return InterpolationChoice("blended forces", f"forces are blended, because {error}", (), workspace, None)
+    if modal is None:
+        return InterpolationChoice("blended forces", "there is only one model", (), workspace, None)
+    checks = tuple(
+        [_check(workspace, modal, place, weight) for place in held_out]
+        if held_out
+        else [_check(*left, weight) for left in _left_out(workspace)]
+    )
+    return _chosen(workspace, modal, checks)
+
+
+def _chosen(
+    workspace: WorkspaceModels, modal: ModalInterpolation, checks: tuple[PlaceCheck, ...]
+) -> InterpolationChoice:
+    if not checks:
+        reason = "forces are blended, because no model lies between the others to check anything better by"
+        return InterpolationChoice("blended forces", reason, checks, workspace, None)
+    blended = max(check.blended_error for check in checks)
+    modal_errors = [check.modal_error for check in checks if check.modal_error is not None]
+    if len(modal_errors) < len(checks):
+        reason = "forces are blended, because resonances could not be matched with a check place left out"
+        return InterpolationChoice("blended forces", reason, checks, workspace, None)
+    worst = max(modal_errors)
+    places = f"{len(checks)} place{'s' * (len(checks) > 1)} held out"
+    numbers = f"worst error at {places}: {100 * worst:.1f} % modal, {100 * blended:.1f} % blended"
+    if worst < blended:
+        return InterpolationChoice("modal", f"resonances are interpolated ({numbers})", checks, workspace, modal)
+    return InterpolationChoice("blended forces", f"forces are blended ({numbers})", checks, workspace, None)
+
+
+def _left_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
+    found: list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]] = []
+    for index, model in enumerate(workspace.models):
+        if len(workspace) < 3:
+            break
+        rest = workspace.without(index)
+        if place_weights(rest.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
+            continue
+        try:
+            modal: ModalInterpolation | None = modal_interpolation(rest)
+        except ModesDoNotMatchError:
+            modal = None
+        found.append((rest, modal, held_out_model(model, workspace.band_hz)))
+    return found
+
+
+def _check(
+    workspace: WorkspaceModels, modal: ModalInterpolation | None, place: HeldOutPlace, weight: float
+) -> PlaceCheck:
+    blended = _delivered(blended_at(workspace, place.place_m), place, weight)
+    if modal is None:
+        return PlaceCheck(place.place_m, quality(blended), None, _error(blended), None)
+    moved = _delivered(modal.at(place.place_m), place, weight)
+    return PlaceCheck(place.place_m, quality(blended), quality(moved), _error(blended), _error(moved))
+
+
+def _delivered(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
+    return np.asarray(place.response @ at.inverse(place.frequency_hz, weight))
+
+
+def _error(delivered: ComplexArray) -> float:
+    return float(np.linalg.norm(delivered - np.eye(delivered.shape[1]), ord=2, axis=(1, 2)).max())

@@ -1,0 +1,152 @@
+"""A model for a place between models: resonances move from one to the next instead of being mixed.
+
+Resonances of the band are matched, and their frequency, damping and residues interpolated; what is left of each
+model's response is smooth and is interpolated linearly. The sum becomes a model again, on a fixed set of real poles.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.workspace.band_modes import BandLines, BandMode, band_lines, band_modes
+from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, matched_modes
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+from equalizer.tracking.workspace.place_weights import place_weights
+from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
+
+REAL_POLES_PER_OCTAVE = 2.0
+"""Of the model of the remainder."""
+POLES_FROM, POLES_TO = 0.3, 4.5
+"""Lowest and highest of them, relative to the band's ends."""
+RANK_SHARE = 0.1
+"""Singular values of a residue below this share of the largest are what interpolation adds to it."""
+POOR_FIT = 0.02
+"""Relative error of the remainder's model from which the user is told."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModalInterpolation:
+    workspace: WorkspaceModels
+    tracks: tuple[tuple[BandMode, ...], ...]
+    """Each resonance through all models, in their order."""
+    lines: BandLines
+    remainders: ComplexArray
+    """(models, lines, p, m)"""
+
+    def at(self, place_m: Place) -> ModelsAtPlace:
+        weights = place_weights(self.workspace.places_m, place_m)
+        modes = [_interpolated(track, weights.smooth) for track in self.tracks]
+        remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
+        total = remainder + sum((mode.response(self.lines.z) for mode in modes), np.zeros_like(remainder))
+        model, error = _model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
+        remarks = [weights.remark] if weights.remark else []
+        if error > POOR_FIT:
+            remarks.append(f"the model between the given ones is {100 * error:.1f} % off where it is worst")
+        placed = replace(model, place_m=place_m)
+        return ModelsAtPlace(place_m, (placed,), (1.0,), tuple(remarks))
+
+
+def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
+    """Raises ModesDoNotMatchError where it is doubtful which resonances of neighbouring models are the same."""
+    band_hz = workspace.band_hz
+    modes = [band_modes(model, band_hz) for model in workspace.models]
+    tracks = _tracks(workspace, modes)
+    lines = [band_lines(model, band_hz) for model in workspace.models]
+    remainders = []
+    for index, one in enumerate(lines):
+        resonant = sum((track[index].response(one.z) for track in tracks), np.zeros_like(one.response))
+        remainders.append(one.response - resonant)
+    return ModalInterpolation(workspace, tracks, lines[0], np.array(remainders))
+
+
+def _tracks(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
+    """Followed from neighbour to neighbour, along the shortest net that joins all places."""
+    places = workspace.places_m
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    net = minimum_spanning_tree(apart)
+    order, before = breadth_first_order(net, 0, directed=False)
+    found: dict[int, dict[int, int]] = {start: {0: start} for start in range(len(modes[0]))}
+    for node in order[1:]:
+        nearer = int(before[node])
+        try:
+            pairs = dict(matched_modes(modes[nearer], modes[node], workspace.band_hz))
+        except ModesDoNotMatchError as error:
+            raise ModesDoNotMatchError(f"models {nearer + 1} (first) and {node + 1} (second): {error}") from error
+        for track in found.values():
+            if track.get(nearer) in pairs:
+                track[int(node)] = pairs[track[nearer]]
+    whole = [track for track in found.values() if len(track) == len(modes)]
+    return tuple(tuple(modes[k][track[k]] for k in range(len(modes))) for track in whole)
+
+
+def _interpolated(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
+    natural = float(np.exp(weights @ np.log([mode.natural_hz for mode in track])))
+    damping = float(np.exp(weights @ np.log([mode.damping_ratio for mode in track])))
+    # A residue of an acceleration grows with the frequency: that part moves with the frequency, not with the place.
+    residue = natural * np.einsum("k,kpm->pm", weights, np.array([mode.residue / mode.natural_hz for mode in track]))
+    rank = max(_rank(mode.residue) for mode in track)
+    u, s, v = np.linalg.svd(residue)
+    share = float(weights @ [mode.share for mode in track])
+    return BandMode(natural, damping, (u[:, :rank] * s[:rank]) @ v[:rank], share, track[0].sample_rate_hz)
+
+
+def _rank(residue: ComplexArray) -> int:
+    sizes = np.linalg.svd(residue, compute_uv=False)
+    return int((sizes > RANK_SHARE * sizes[0]).sum())
+
+
+def _model(
+    prepared: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, size: FloatArray
+) -> tuple[IdentifiedModel, float]:
+    """Resonances as they are, the remainder in least squares on fixed poles; and its worst relative error."""
+    first, lines = prepared.workspace.models[0], prepared.lines
+    poles = _smooth_poles(prepared.workspace.band_hz, first.sample_rate_hz)
+    basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / size[:, None]
+    wanted = remainder.reshape(len(size), -1) / size[:, None]
+    real_basis = np.vstack([basis.real, basis.imag])
+    scale = np.linalg.norm(real_basis, axis=0)
+    solved = np.linalg.lstsq(real_basis / scale, np.vstack([wanted.real, wanted.imag]), rcond=1e-7)[0] / scale[:, None]
+    error = float(np.linalg.norm(basis @ solved - wanted, axis=1).max())
+    p, m = remainder.shape[1:]
+    gains = solved.reshape(len(poles) + 1, p, m)
+    blocks = [_real_mode(mode) for mode in modes]
+    A = block_diag(*(block[0] for block in blocks), np.kron(np.diag(poles), np.eye(m)))
+    B = np.vstack(
+        [*(block[1] for block in blocks), np.tile(np.eye(m), (len(poles), 1)) * np.repeat(1 - poles, m)[:, None]]
+    )
+    C = np.hstack([*(block[2] for block in blocks), *gains[:-1]])
+    provenance = {
+        "method": "modal interpolation",
+        "places_m": prepared.workspace.places_m.tolist(),
+        "resonances_hz": [mode.natural_hz for mode in modes],
+        "worst_relative_error": error,
+    }
+    band_hz = prepared.workspace.band_hz
+    return replace(
+        first, A=A, B=B, C=C, D=gains[-1], band_hz=band_hz, covariance=None, samples=None, provenance=provenance
+    ), error
+
+
+def _smooth_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
+    low, high = POLES_FROM * band_hz[0], min(POLES_TO * band_hz[1], 0.4 * rate_hz)
+    count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
+    return np.asarray(np.exp(-2 * np.pi * np.geomspace(low, high, count) / rate_hz))
+
+
+def _real_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """R / (z - p) and its conjugate with real matrices; two states for each rank of R."""
+    u, s, v = np.linalg.svd(mode.residue)
+    rank = int((s > 1e-9 * s[0]).sum())
+    p = mode.pole
+    turn = np.array([[p.real, p.imag], [-p.imag, p.real]])
+    A = np.kron(np.eye(rank), turn)
+    shapes, inputs = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * v[:rank]
+    B = np.concatenate([np.stack([2 * row.real, -2 * row.imag]) for row in inputs])
+    C = np.hstack([np.column_stack([column.real, column.imag]) for column in shapes.T])
+    return A, B, C

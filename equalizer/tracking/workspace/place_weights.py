@@ -1,0 +1,105 @@
+"""How much each of several points counts at a place between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.optimize import nnls
+from scipy.spatial import Delaunay
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.workspace.workspace_models import Place
+
+FLAT = 0.05
+"""Points that spread less than this share of their largest spread in some direction are taken to lie flat in it:
+else triangulation would make slivers of hand-placed points, and neighbours would not be neighbours."""
+OUTSIDE_M = 1e-3
+"""Nearer to the points' hull than this counts as inside."""
+SUM_TO_ONE = 1e6
+"""Weight of that condition against distances, of order 1, when the nearest point of the hull is sought."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaceWeights:
+    linear: FloatArray
+    """(points,): none negative, sum 1; linear between neighbours, continuous, exact at the points."""
+    smooth: FloatArray
+    """(points,): sum 1, exact at the points, and their slope is continuous; some may be negative. For quantities that
+    vary smoothly with the place, such as a frequency: of second order where `linear` is of first."""
+    outside_m: float
+    """How far the place lies outside the points' hull; the weights are those of the nearest place inside."""
+
+    @property
+    def remark(self) -> str | None:
+        if self.outside_m <= OUTSIDE_M:
+            return None
+        return (
+            f"the place is {1e3 * self.outside_m:.1f} mm outside the points where models were identified: "
+            "the nearest place between them was used"
+        )
+
+
+def place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWeights:
+    """points_m: (points, 3), all different. Along a line, over a surface or in a volume, as the points lie: on their
+    Delaunay triangulation. Not by inverse distance, whose slope vanishes at every point."""
+    points = np.asarray(points_m, dtype=np.float64)
+    place = np.asarray(place_m, dtype=np.float64)
+    if len(points) == 1:
+        alone = np.ones(1)
+        return PlaceWeights(alone, alone, float(np.linalg.norm(place - points[0])))
+    centre = points.mean(axis=0)
+    scale = float(np.linalg.norm(points - centre, axis=1).max())
+    flat = _flattening(points - centre)
+    spread, wanted = (points - centre) @ flat.T / scale, flat @ (place - centre) / scale
+    inside = _nearest_in_hull(spread, wanted)
+    nearest = inside @ flat * scale + centre
+    outside_m = float(np.linalg.norm(place - nearest))
+    return PlaceWeights(_linear(spread, inside), _smooth(spread, inside), outside_m)
+
+
+def _flattening(offsets: FloatArray) -> FloatArray:
+    """(dimensions, 3): the directions in which the points spread, as many as keep them apart."""
+    _, spreads, directions = np.linalg.svd(offsets, full_matrices=False)
+    rank = int((spreads > FLAT * spreads[0]).sum())
+    full = int((spreads > 1e-9 * spreads[0]).sum())
+    whole = _closest(offsets)
+    while rank < full and _closest(offsets @ directions[:rank].T) < 0.5 * whole:
+        rank += 1
+    return np.asarray(directions[:rank])
+
+
+def _closest(points: FloatArray) -> float:
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return float(apart[np.triu_indices(len(points), 1)].min())
+
+
+def _nearest_in_hull(points: FloatArray, place: FloatArray) -> FloatArray:
+    system = np.vstack([points.T, np.full(len(points), SUM_TO_ONE)])
+    weights, _ = nnls(system, np.append(place, SUM_TO_ONE))
+    return np.asarray(weights @ points / weights.sum())
+
+
+def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
+    count, dimensions = points.shape
+    if dimensions == 1:
+        order = np.argsort(points[:, 0])
+        along = points[order, 0]
+        return np.array([np.interp(place[0], along, one) for one in np.eye(count)[:, order]])
+    mesh = Delaunay(points)
+    simplex = int(mesh.find_simplex(place, tol=1e-9))
+    if simplex < 0:
+        # On the hull to rounding: a step of a millionth towards the middle is inside.
+        place = place + 1e-6 * (points.mean(axis=0) - place)
+        simplex = int(mesh.find_simplex(place, tol=1e-6))
+    transform = mesh.transform[simplex]
+    first = np.clip(transform[:dimensions] @ (place - transform[dimensions]), 0.0, 1.0)
+    corners = np.append(first, max(0.0, 1.0 - first.sum()))
+    weights = np.zeros(count)
+    weights[mesh.simplices[simplex]] = corners / corners.sum()
+    return weights
+
+
+def _smooth(points: FloatArray, place: FloatArray) -> FloatArray:
+    """Cubic radial functions with a linear part: along a line the natural cubic spline."""
+    cardinal = RBFInterpolator(points, np.eye(len(points)), kernel="cubic", degree=1)
+    return np.asarray(cardinal(place[None])[0])

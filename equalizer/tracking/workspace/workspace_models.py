@@ -1,0 +1,83 @@
+"""The models of one device, each identified at a place of its own."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray
+
+Place = tuple[float, float, float]
+"""x, y, z in metres."""
+
+SAME_PLACE_M = 1e-4
+
+
+class WorkspaceError(ValueError):
+    """These models cannot be used together, or not at places."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WorkspaceModels:
+    """Raises WorkspaceError where models differ in rate, channels or units, share no band, or lack a place.
+
+    A single model needs no place: it is used everywhere.
+    """
+
+    models: tuple[IdentifiedModel, ...]
+
+    def __post_init__(self) -> None:
+        if not self.models:
+            raise WorkspaceError("no model was given; at least one is needed")
+        for number, model in enumerate(self.models, start=1):
+            _check_alike(self.models[0], model, number)
+        if len(self.models) > 1:
+            _check_places(self.models)
+        low, high = self.band_hz
+        if not low < high:
+            bands = ", ".join("{:g} to {:g} Hz".format(*model.band_hz) for model in self.models)
+            raise WorkspaceError(f"the models have no band in common: {bands}; identify them on the same band")
+
+    def __len__(self) -> int:
+        return len(self.models)
+
+    @property
+    def places_m(self) -> FloatArray:
+        """(models, 3); a single model without a place is put at the origin."""
+        return np.array([model.place_m or (0.0, 0.0, 0.0) for model in self.models], dtype=np.float64)
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """What all models cover."""
+        return max(model.band_hz[0] for model in self.models), min(model.band_hz[1] for model in self.models)
+
+    def without(self, index: int) -> "WorkspaceModels":
+        return WorkspaceModels(self.models[:index] + self.models[index + 1 :])
+
+
+def _check_alike(first: IdentifiedModel, model: IdentifiedModel, number: int) -> None:
+    for what, one, other in (
+        ("sample rate", first.sample_rate_hz, model.sample_rate_hz),
+        ("input channels", first.input_channels, model.input_channels),
+        ("output channels", first.output_channels, model.output_channels),
+        ("input unit", first.input_unit, model.input_unit),
+        ("output unit", first.output_unit, model.output_unit),
+    ):
+        if one != other:
+            raise WorkspaceError(f"model {number} has the {what} {other}, but the first has {one}")
+    if model.spectral_radius >= 1:
+        raise WorkspaceError(f"model {number} is not stable, so nothing can be played through it")
+
+
+def _check_places(models: tuple[IdentifiedModel, ...]) -> None:
+    missing = [str(number) for number, model in enumerate(models, start=1) if model.place_m is None]
+    if missing:
+        raise WorkspaceError(
+            f"of {len(models)} models, number {', '.join(missing)} does not say where it was identified; "
+            "record with --place X Y Z, and identify again"
+        )
+    places = np.array([model.place_m for model in models], dtype=np.float64)
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
+    one, other = np.unravel_index(int(apart.argmin()), apart.shape)
+    if apart[one, other] < SAME_PLACE_M:
+        raise WorkspaceError(f"models {one + 1} and {other + 1} were identified at the same place; give one of them")
