@@ -36,7 +36,7 @@ class OnsetRule:
     def sentence(self) -> str:
         return (
             f"lowest frequency at which the worst ratio of acceleration across to acceleration along, averaged over "
-            f"1/{1 / self.octaves:.3g} octave, passes {self.threshold:.0%}"
+            f"1/{1 / self.octaves:.3g} octave, passes {100 * self.threshold:g} %"
         )
 
 
@@ -48,7 +48,10 @@ class CouplingOnset:
     """95 %, from resampled noise; None where the noise is not known."""
     from_the_start: bool
     """Coupled at the lowest reliable line already: the onset may lie below."""
+    threshold: float
+    """Across over along."""
     rule: str
+    """The whole rule in words."""
 
 
 def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -> CouplingOnset:
@@ -62,17 +65,17 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     told = _told(lines, local, smooth, rule)
     if not told.any():
         raise ValueError(
-            f"coupling cannot be judged: at no line is the noise small against {rule.threshold:.0%} of the response; "
-            "record more periods, or with a stronger excitation"
+            f"coupling cannot be judged: at no line is the noise small against {100 * rule.threshold:g} % of the "
+            "response; record more periods, or with a stronger excitation"
         )
     found = _onset(lines.frequency_hz[told], worst_coupling(smooth[told]), rule)
     if found is None:
-        return CouplingOnset(None, None, from_the_start=False, rule=rule.sentence)
+        return CouplingOnset(None, None, False, rule.threshold, rule.sentence)
     near = lines.frequency_hz <= max(_LOOKED_BEYOND * found, lines.frequency_hz[2 * rule.neighbours])
     known = bool(np.isfinite(lines.noise_variance).all())
     drawn = _resampled(lines.of_lines(near), smooth[near], told[near], rule) if known else None
     interval = None if drawn is None else _bias_corrected(found, drawn)
-    return CouplingOnset(found, interval, bool(found == lines.frequency_hz[told][0]), rule.sentence)
+    return CouplingOnset(found, interval, bool(found == lines.frequency_hz[told][0]), rule.threshold, rule.sentence)
 
 
 def _told(lines: FrequencyResponse, local: LocalPolynomial, smooth: ComplexArray, rule: OnsetRule) -> BoolArray:

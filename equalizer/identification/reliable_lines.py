@@ -50,7 +50,7 @@ def judge_lines(
     noisy = (worst < rules.least_coherence) & excited & ~stiff
     if noisy.any():
         remarks.append(
-            f"Not reliable, because noise is more than {1 - rules.least_coherence:.0%} of an output's power: "
+            f"Not reliable, because noise is more than {100 * (1 - rules.least_coherence):g} % of an output's power: "
             f"{_spans(frequency_hz, noisy)}."
         )
     return Judgement(~(stiff | dark | noisy), tuple(remarks))

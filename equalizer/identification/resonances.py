@@ -6,8 +6,8 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.octave_bins import OctaveBins, octave_bins
 from equalizer.identification.single_mode import fit_single_mode
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 GAIN, COUPLING = "gain", "coupling"
@@ -40,15 +40,6 @@ class Resonance:
     """GAIN: a peak of the largest singular value; COUPLING: of all off-axis entries together."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Binned:
-    """Averages of neighbouring lines, in bins of equal width in octaves."""
-
-    frequency_hz: FloatArray
-    response: ComplexArray
-    noise_variance: FloatArray
-
-
 @dataclass(frozen=True, slots=True)
 class _Peak:
     frequency_hz: float
@@ -68,7 +59,7 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
     ends = np.flatnonzero(response.reliable)[[0, -1]]
     lines = response.of_lines(np.isin(np.arange(len(response)), np.arange(ends[0], ends[1] + 1)))
     found: list[Resonance] = []
-    for peak in sorted(_peaks(_binned(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db):
+    for peak in sorted(_peaks(octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db):
         resonance = _fitted(lines, peak, search)
         if resonance is None:
             continue
@@ -80,22 +71,7 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
     return tuple(sorted(found, key=lambda resonance: resonance.frequency_hz))
 
 
-def _binned(lines: FrequencyResponse, octaves: float) -> _Binned:
-    number = np.floor(np.log2(lines.frequency_hz / lines.frequency_hz[0]) / octaves).astype(np.int64)
-    _, starts, counts = np.unique(number, return_index=True, return_counts=True)
-
-    def mean(values: ComplexArray) -> ComplexArray:
-        shape = (-1, *[1] * (values.ndim - 1))
-        return np.asarray(np.add.reduceat(values, starts, axis=0) / counts.reshape(shape), dtype=np.complex128)
-
-    return _Binned(
-        np.asarray(mean(lines.frequency_hz.astype(np.complex128)).real),
-        mean(lines.response),
-        np.asarray(mean(lines.noise_variance.astype(np.complex128)).real / counts[:, None, None]),
-    )
-
-
-def _peaks(binned: _Binned, search: ResonanceSearch) -> list[_Peak]:
+def _peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
     curves = {GAIN: np.linalg.norm(binned.response, ord=2, axis=(1, 2))}
     if binned.response.shape[1] == binned.response.shape[2]:
         off_axis = binned.response * (1 - np.eye(binned.response.shape[1]))
@@ -114,11 +90,11 @@ def _fitted(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> R
     factor = 2**search.reach_octaves
     near = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
     # A hundred points are plenty for one mode; averages of more lines say the same sooner.
-    binned = _binned(near, 2 * search.reach_octaves / 100) if len(near) >= 6 else None
+    binned = octave_bins(near, 2 * search.reach_octaves / 100) if len(near) >= 6 else None
     if binned is None or len(binned.frequency_hz) < 6:
         return None
     entries = binned.response.reshape(1, len(binned.frequency_hz), -1)
-    noise = np.nan_to_num(binned.noise_variance).reshape(entries.shape)
+    noise = np.nan_to_num(binned.noise_variance / binned.lines[:, None, None]).reshape(entries.shape)
     natural, damping = fit_single_mode(binned.frequency_hz, entries)
     if not np.isfinite(natural[0]):
         return None

@@ -70,7 +70,7 @@ def test_lines_that_are_too_noisy_are_not_judged():
 
 
 def test_all_lines_too_noisy_is_refused_with_what_would_do():
-    with pytest.raises(ValueError, match="at no line is the noise small against 25% .*record more periods"):
+    with pytest.raises(ValueError, match="at no line is the noise small against 25 % .*record more periods"):
         coupling_onset(response_of(0.05 + 0 * LINES, LINES, noise=1.0))
 
 
@@ -107,7 +107,7 @@ def test_the_synthetic_device_couples_from_nine_hertz_on(plants, synthetic):
     found = coupling_onset(transfer_estimate((synthetic.sweeps(plants, 4.5, 37.0, 30.0),)))
     assert found.frequency_hz == pytest.approx(true, abs=0.04)
     assert found.interval_hz[0] < true < found.interval_hz[1]
-    assert "25%" in found.rule and "1/12 octave" in found.rule
+    assert "25 %" in found.rule and "1/12 octave" in found.rule
 
 
 def test_unequal_axes_have_no_coupling():

@@ -1,0 +1,121 @@
+"""Where the axes couple, where directions are felt, and how each band is driven (the published figure 1)."""
+
+from collections.abc import Sequence
+from textwrap import fill
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, plain_axes
+from equalizer.identification.coupling import worst_coupling
+from equalizer.identification.coupling_onset import CouplingOnset
+from equalizer.identification.frequency_bands import FrequencyBand
+from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.octave_bins import octave_bins
+
+_COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
+_HALF, _TALLER = 0.4, 0.35
+"""Half the height of a row; how much more the row of the methods has to either side."""
+_LETTERS = 110
+"""That fit into the width of the figure."""
+_Shade = tuple[str, float]
+"""Colour and opacity."""
+
+
+def frequency_bands_picture(
+    response: FrequencyResponse, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float
+) -> Picture:
+    """response: with inputs and outputs in one frame. bands: by `frequency_bands`, at least one."""
+    return Picture(
+        name="frequency-bands",
+        title="Frequency bands",
+        caption=f"Above: what goes across over what goes along when one axis is pushed, for the worst axis. Coupling "
+        f"onset: {onset.rule}; the mark's width is its 95 % interval. Below: what the device does, what the person "
+        "feels, and how each band is driven. " + " ".join(f"{band.name.capitalize()}: {band.why}" for band in bands),
+        figure=draw_frequency_bands(response, onset, bands, direction_limit_hz),
+    )
+
+
+def draw_frequency_bands(
+    response: FrequencyResponse, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float
+) -> Figure:
+    figure = new_figure(8.6, 4.6)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1])
+    lowest, highest = bands[0].low_hz, bands[-1].high_hz
+    _draw_coupling(above, response.within(lowest, highest), onset)
+    _draw_rows(below, onset, bands, direction_limit_hz)
+    for axes in (above, below):
+        for edge in [band.low_hz for band in bands[1:]]:
+            axes.axvline(edge, color=BLACK, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
+    below.set_xscale("log")
+    below.set_xlim(lowest, highest)
+    below.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    below.xaxis.set_minor_formatter(NullFormatter())
+    below.set_xlabel("Frequency (Hz)")
+    return figure
+
+
+def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset) -> None:
+    plain_axes(axes)
+    lines = response.of_lines(response.reliable)
+    if len(lines):
+        bins = octave_bins(lines, 1 / 24)
+        axes.plot(bins.frequency_hz, 100 * worst_coupling(bins.response), color=BLUE, linewidth=1.3)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylabel("Worst coupling,\nacross / along")
+    axes.axhline(100 * onset.threshold, color=GREY, linewidth=1, linestyle="--")
+    axes.annotate(
+        f"{100 * onset.threshold:g} %", (1, 100 * onset.threshold), xycoords=("axes fraction", "data"), xytext=(-3, 3),
+        textcoords="offset points", ha="right", fontsize=8.5, color=GREY,
+    )  # fmt: skip
+    if onset.frequency_hz is not None:
+        _mark_onset(axes, onset.frequency_hz, onset)
+
+
+def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
+    level = 100 * onset.threshold
+    if onset.interval_hz is not None:
+        axes.axvspan(*onset.interval_hz, color=VERMILLION, alpha=0.3, linewidth=0)
+    axes.plot(frequency_hz, level, "o", color=VERMILLION, markersize=6, zorder=4)
+    begins = "coupled from the start" if onset.from_the_start else f"coupling begins: {frequency_hz:.1f} Hz"
+    axes.annotate(
+        begins, (frequency_hz, level), xytext=(-8, 14), textcoords="offset points", ha="right", fontsize=9,
+        color=VERMILLION,
+    )  # fmt: skip
+
+
+def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float) -> None:
+    lowest, highest = bands[0].low_hz, bands[-1].high_hz
+    coupled_hz = highest if onset.frequency_hz is None else min(max(onset.frequency_hz, lowest), highest)
+    _bar(axes, 2, (lowest, coupled_hz), "axes hardly couple", _shade(GREY, 0.18))
+    _bar(axes, 2, (coupled_hz, highest), "axes couple", _shade(GREY, 0.45))
+    _bar(axes, 1, (lowest, direction_limit_hz), "directions are felt", _shade(ORANGE, 0.45))
+    _bar(axes, 1, (direction_limit_hz, highest), "hardly felt", _shade(ORANGE, 0.18))
+    for band in bands:
+        room = int(_LETTERS * np.log(band.high_hz / band.low_hz) / np.log(highest / lowest))
+        words = f"{band.name}\n{fill(band.method, max(room, 10))}"
+        _bar(axes, 0, (band.low_hz, band.high_hz), words, _shade(_COLOURS[band.name], 0.35))
+    axes.set_yticks([2, 1, -_TALLER], ["Device", "Person", "Driven by"])
+    axes.set_ylim(-1.2, 2.5)
+    axes.tick_params(axis="y", length=0)
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+
+
+def _bar(axes: Axes, row: int, band_hz: tuple[float, float], words: str, colour: _Shade) -> None:
+    low_hz, high_hz = band_hz
+    if high_hz <= low_hz:
+        return
+    half = _HALF + (_TALLER if row == 0 else 0.0)
+    middle = row - (_TALLER if row == 0 else 0.0)
+    axes.fill_between([low_hz, high_hz], middle - half, middle + half, color=colour, linewidth=0)
+    axes.text(float(np.sqrt(low_hz * high_hz)), middle, words, ha="center", va="center", fontsize=8.5, linespacing=1.1)
+
+
+def _shade(colour: str, strength: float) -> _Shade:
+    return colour, strength

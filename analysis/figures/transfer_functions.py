@@ -1,0 +1,128 @@
+"""Measured transfer functions of all channels over frequency (the published figure 4)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, new_figure, plain_axes, say_nothing_to_draw
+from equalizer.identification.frequency_response import BoolArray, FrequencyResponse
+from equalizer.identification.octave_bins import OctaveBins, octave_bins
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_BIN_OCTAVES = 1 / 24
+_DIM = "#B8B8B8"
+_BAND = "#EEF3E6"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResponseCurve:
+    """A response to lay over the measured one, as of a model."""
+
+    name: str
+    frequency_hz: FloatArray
+    response: ComplexArray
+    """(lines, outputs, inputs)"""
+
+
+def transfer_functions_picture(
+    response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
+) -> Picture:
+    """band_hz: marked in every panel, as the band of a fit."""
+    return Picture(
+        name="transfer-functions",
+        title="Transfer functions of all channels",
+        caption="From each commanded force (columns) to each measured acceleration (rows), at the handle. Line: mean "
+        "over 1/24 octave; shade: from the weakest to the strongest single line in it; dotted: expected error of a "
+        "single line. Grey: lines that should not be used. " + " ".join(response.remarks),
+        figure=draw_transfer_functions(response, model, band_hz),
+    )
+
+
+def draw_transfer_functions(
+    response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
+) -> Figure:
+    if not len(response):
+        return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no line to draw.")
+    outputs, inputs = response.response.shape[1:]
+    figure = new_figure(8.6, 0.9 + 2.05 * outputs)
+    grid = figure.subplots(outputs, inputs, sharex=True, sharey=True, squeeze=False)
+    bins = octave_bins(response, _BIN_OCTAVES)
+    for row, output in enumerate(response.output_channels):
+        for column, entry in enumerate(response.input_channels):
+            axes: Axes = grid[row][column]
+            _draw_entry(axes, bins, row, column)
+            if band_hz is not None:
+                axes.axvspan(*band_hz, color=_BAND, zorder=0)
+            if model is not None:
+                axes.plot(model.frequency_hz, np.abs(model.response[:, row, column]), "--", color=VERMILLION, lw=1.2)
+            axes.set_title(f"{entry} → {output}", fontsize=9, loc="left", pad=3)
+    _scale(grid[0][0], bins)
+    figure.supylabel(f"Magnitude ({_pretty(response.output_unit)} per {_pretty(response.input_unit)})", fontsize=10)
+    figure.supxlabel("Frequency (Hz)", fontsize=10)
+    handles = _legend(bins, model, band_hz)
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8.5, frameon=False)
+    return figure
+
+
+def _draw_entry(axes: Axes, bins: OctaveBins, row: int, column: int) -> None:
+    plain_axes(axes)
+    mean = np.abs(bins.response[:, row, column])
+    low, high = bins.lowest[:, row, column], bins.highest[:, row, column]
+    for where, line, shade in ((~bins.reliable, _DIM, "#E6E6E6"), (bins.reliable, BLUE, SKY)):
+        wide = _widened(where)
+        axes.fill_between(bins.frequency_hz, low, high, where=wide.tolist(), color=shade, alpha=0.45, linewidth=0)
+        axes.plot(bins.frequency_hz, np.where(wide, mean, np.nan), color=line, linewidth=1.2)
+    floor = np.sqrt(bins.noise_variance[:, row, column])
+    axes.plot(bins.frequency_hz, floor, ":", color=ORANGE, linewidth=1.1)
+
+
+def _widened(where: BoolArray) -> BoolArray:
+    """With the next bin, so that a curve that changes its colour has no gap."""
+    wide = where.copy()
+    wide[1:] |= where[:-1]
+    return wide
+
+
+def _scale(axes: Axes, bins: OctaveBins) -> None:
+    """The axes are shared: one is set for all."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(max(1.0, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
+    shown = bins.frequency_hz >= 1.0
+    magnitude = np.abs(bins.response[shown & bins.reliable if (shown & bins.reliable).any() else shown])
+    axes.set_ylim(0.5 * float(np.quantile(magnitude, 0.01)), 2.0 * float(magnitude.max()))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _legend(
+    bins: OctaveBins, model: ResponseCurve | None, band_hz: tuple[float, float] | None
+) -> Sequence[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=BLUE, linewidth=1.4, label="measured"),
+        Patch(color=SKY, alpha=0.45, label="single lines"),
+        Line2D([], [], color=ORANGE, linestyle=":", linewidth=1.4, label="noise of a line"),
+    ]
+    if not bins.reliable.all():
+        handles.append(Line2D([], [], color=_DIM, linewidth=1.4, label="not reliable"))
+    if model is not None:
+        handles.append(Line2D([], [], color=VERMILLION, linestyle="--", linewidth=1.4, label=model.name))
+    if band_hz is not None:
+        handles.append(
+            Patch(facecolor=_BAND, edgecolor=GREY, linewidth=0.4, label=f"{band_hz[0]:g} to {band_hz[1]:g} Hz")
+        )
+    return handles
+
+
+def _pretty(unit: str) -> str:
+    return unit.replace("^2", "²")
