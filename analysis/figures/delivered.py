@@ -41,7 +41,7 @@ def draw_delivered(trials: Sequence[Trial]) -> Figure:
     for column in range(columns):
         below = [index for index in range(column, len(frequencies), columns)]
         if below:
-            panels[below[-1]].set_xlabel("Commanded force (N)")
+            panels[below[-1]].set_xlabel("Level (N)")
             panels[below[-1]].tick_params(labelbottom=True)
     return figure
 

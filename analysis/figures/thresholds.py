@@ -44,7 +44,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     axes.set_xlim(-0.6, len(table.frequencies_hz) - 0.4)
     axes.set_ylim(0, 1.12 * cap_n)
     axes.set_xlabel("Frequency (Hz)")
-    axes.set_ylabel("Threshold: commanded force amplitude (N)")
+    axes.set_ylabel("Threshold (N)")
     figure.legend(handles=_legend(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False)
     return figure
 

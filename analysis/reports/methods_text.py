@@ -14,8 +14,10 @@ _DRAWS = {
     "balanced": "drawn so that both occurred equally often within every eight trials",
 }
 _LEVELS = {
-    "commanded_force": "commanded force",
-    "delivered_acceleration": "delivered acceleration",
+    "commanded_force": "The level of a trial is the amplitude of the commanded force.",
+    "delivered_acceleration": "Stimuli were accelerations of the handle, equal for both directions, commanded through "
+    "an identified model of the device. The level of a trial is the highest force that either direction needs for that "
+    "acceleration; the table of trials has the acceleration that was wanted and the one that was measured.",
 }
 _STEP_CHANGES = {
     StepChange.AFTER_REVERSAL: "the reversal that completed a phase still moved by that phase's step",
@@ -67,8 +69,8 @@ def _stimulus(protocol: StudyProtocol) -> str:
     polarity = "to either side at random" if stimulus.onset_polarity == "random" else "always to the same side"
     return (
         f"The amplitude rose over {stimulus.fade_in_s:g} s ({stimulus.fade_shape.replace('_', ' ')}), was held until "
-        f"the answer, and fell over {stimulus.fade_out_s:g} s; the first half-wave went {polarity}. The level of a "
-        f"trial is the amplitude of the {_LEVELS[stimulus.quantity]}."
+        f"the answer, and fell over {stimulus.fade_out_s:g} s; the first half-wave went {polarity}. "
+        + _LEVELS[stimulus.quantity]
         + (
             f" A virtual spring of {protocol.spring.natural_frequency_hz:g} Hz kept the handle near the centre."
             if protocol.spring.natural_frequency_hz

@@ -18,6 +18,7 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("title", state.protocol.title),
         ("device", _device(opened)),
         ("equalizer", opened.equalizer),
+        ("within reach", _reach(opened)),
         ("begun", _when(opened.utc)),
         ("finished" if state.closed else "last entry", _when(_last_utc(folded))),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
@@ -28,6 +29,13 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
     ]
     return tuple((what, value) for what, value in facts if value)
+
+
+def _reach(opened: SessionOpened) -> str:
+    """What both directions reach at the cap."""
+    if opened.equalized is None:
+        return ""
+    return ", ".join(f"{s.reachable_mps2:.1f} m/s² at {s.frequency_hz:g} Hz" for s in opened.equalized.levels)
 
 
 def _device(opened: SessionOpened) -> str:

@@ -79,7 +79,7 @@ def test_a_run_that_was_broken_off_is_drawn_and_said(draw, simulate_study):
 
 def test_delivered_acceleration_has_its_units_and_both_parts(draw, simulate_study):
     said = texts(draw(simulate_study(subjects=1))["delivered"].figure)
-    for words in ("Measured (m/s²)", "Commanded force (N)", "along the direction", "off the direction"):
+    for words in ("Measured (m/s²)", "Level (N)", "along the direction", "off the direction"):
         assert words in said
 
 

@@ -39,7 +39,11 @@ def test_the_numbers_of_the_protocol_are_in_the_text(protocol):
         ("trial", {"time_limit_s": 8.0}, "within 8 s"),
         ("trial", {"feedback": "after_answer"}, "and was told whether"),
         ("stimulus", {"onset_polarity": "positive"}, "always to the same side"),
-        ("stimulus", {"quantity": "delivered_acceleration"}, "amplitude of the delivered acceleration"),
+        (
+            "stimulus",
+            {"quantity": "delivered_acceleration"},
+            "Stimuli were accelerations of the handle, equal for both directions",
+        ),
         ("schedule", {"order": "williams"}, "balanced for carry-over"),
         ("schedule", {"directions": "balanced"}, "equally often within every eight trials"),
         ("training", {"frequencies_hz": (5.0,)}, "Training came first (5 Hz) and enters no result."),

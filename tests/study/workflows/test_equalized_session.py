@@ -17,6 +17,7 @@ from study.workflows.conduct_session import conduct_new, conduct_resumed
 from study.workflows.equalize_stimuli import level_scales
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan
+from study.workflows.session_facts import session_facts
 from study.workflows.session_results import write_tables
 from study.workflows.simulated_participant import simulated_participant
 
@@ -62,6 +63,13 @@ def test_both_directions_are_wanted_equally_strong_and_the_harder_one_reaches_th
     # Both directions lie at 45 degrees in the yz plane; without a spring the peak is sqrt((0.4² + 0.5²) / 2) N.
     at_35_hz = next(scale for scale in equalized.levels if scale.frequency_hz == 35.0)
     assert at_35_hz.n_per_mps2 == pytest.approx(np.sqrt((0.4**2 + 0.5**2) / 2), rel=0.05)
+
+
+def test_what_is_within_reach_is_shown(conducted):
+    facts = dict(session_facts(fold_session(conducted.folder)))
+    reach = {scale.frequency_hz: scale.reachable_mps2 for scale in conducted.state.opened.equalized.levels}
+    assert f"{reach[35.0]:.1f} m/s² at 35 Hz" in facts["within reach"]
+    assert facts["equalizer"] == "identified model, order 3, 4 to 50 Hz"
 
 
 def test_every_trial_says_which_acceleration_its_level_stands_for(conducted):
