@@ -50,15 +50,29 @@ class Repetition:
     """Of one play, rms in the band, in the unit of `wanted`; None = the first two plays are alike and tell it."""
     cap: float | None = None
     """Largest length of a force, N."""
+    judged: tuple[int, int] | None = None
+    """First row and the one behind the last that residuals are taken over; None = all. What lies outside is corrected
+    too, but where a handle sticks after the motion no force within reason is the right one."""
+
+    def residual(self, missing: FloatArray) -> float:
+        """rms over the judged rows."""
+        start, stop = self.judged or (0, len(missing))
+        return rms(missing[start:stop])
+
+    @property
+    def level(self) -> float:
+        """Of what is wanted, likewise."""
+        return self.residual(self.part(self.wanted))
 
     def part(self, samples: FloatArray) -> FloatArray:
         return band_part(samples, self.sample_rate_hz, self.band_hz)
 
     @property
     def degrees_of_freedom(self) -> float:
-        """Independent numbers in a record's part in the band."""
+        """Independent numbers in the judged rows' part in the band."""
         low, high = self.band_hz
-        return 2 * (high - low) * self.wanted.size / self.sample_rate_hz
+        start, stop = self.judged or (0, len(self.wanted))
+        return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,8 +99,7 @@ class IterationState:
     @property
     def errors(self) -> tuple[float, ...]:
         """Residuals over the wanted."""
-        level = rms(self.repetition.part(self.repetition.wanted))
-        return tuple(residual / level for residual in self.residuals)
+        return tuple(residual / self.repetition.level for residual in self.residuals)
 
     @property
     def remark(self) -> str:
@@ -103,7 +116,7 @@ class IterationState:
 def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
     """first: (N, m), forces to begin with; None = the model's inverse of what is wanted. Raises ValueError where the
     first forces are above the cap, or what is wanted has nothing in the band."""
-    if rms(repetition.part(repetition.wanted)) == 0:
+    if repetition.level == 0:
         low, high = repetition.band_hz
         raise ValueError(f"what is wanted has nothing in the band of {low:g} to {high:g} Hz")
     forces = repetition.invert(repetition.wanted) if first is None else np.asarray(first, dtype=np.float64)
@@ -153,7 +166,7 @@ def rms(samples: FloatArray) -> float:
 def _judged(state: IterationState, measured: FloatArray, floor: float, plays: int) -> IterationState:
     repetition = state.repetition
     missing = repetition.part(repetition.wanted - measured)
-    residual, noise = rms(missing), floor / np.sqrt(plays)
+    residual, noise = repetition.residual(missing), floor / np.sqrt(plays)
     setbacks = state.setbacks + (residual > state.residuals[-1] if state.residuals else 0)
     state = replace(state, residuals=(*state.residuals, residual), setbacks=setbacks)
     diverged = residual > DIVERGED * state.best_residual
@@ -168,7 +181,7 @@ def _judged(state: IterationState, measured: FloatArray, floor: float, plays: in
         return _over(state, Verdict.AT_FLOOR)
     if diverged:
         return _over(state, Verdict.DIVERGING)
-    signal_share = max(0.0, 1 - (noise / rms(left)) ** 2)
+    signal_share = max(0.0, 1 - (noise / repetition.residual(left)) ** 2)
     gain = min(repetition.first_gain / (1 + setbacks), signal_share)
     if gain < LOWEST_GAIN:
         return _over(state, Verdict.BEST_KEPT)

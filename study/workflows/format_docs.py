@@ -21,7 +21,7 @@ from protocols.schema import protocol_schema
 from protocols.trial import Trial
 from study.session.events import EVENTS
 from study.session.live import Live
-from study.store import identified_model_file, live_file, mechanical_model_file, recording_layout
+from study.store import identified_model_file, live_file, mechanical_model_file, recording_layout, repeats_file
 from study.store.csv_rows import columns, in_words
 from study.store.layout import Entry
 from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
@@ -64,6 +64,12 @@ SCHEMAS: tuple[Schema, ...] = (
         "diagnosis.json",
         "`diagnosis.json`",
         lambda: document_schema(document.diagnosis_schema(), document.FORMAT, document.VERSION),
+    ),
+    Schema(
+        "repeats.json",
+        f"`*{repeats_file.SUFFIX}`, beside a table of forces that was found by repeating: errors per play, what the "
+        "forces belong to",
+        lambda: document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
     ),
     Schema(
         "live.json",

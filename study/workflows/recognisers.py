@@ -14,6 +14,8 @@ from study.store.file_errors import UnusableFileError
 from study.store.identified_model_file import read_identified_model
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
+from study.store.repeats_file import FORMAT as REPEATS_FORMAT
+from study.store.repeats_file import read_repeats
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_HEADER, read_thresholds
 from study.store.trajectory_file import read_trajectory
 from study.store.trials_file import TRIALS_HEADER, read_trials
@@ -83,6 +85,16 @@ def recognise_diagnosis(content: FileContent) -> str | None:
     return f"diagnosis, {found.verdict}: {', '.join(effect.effect for effect in found.effects) or 'no effects'}"
 
 
+def recognise_repeats(content: FileContent) -> str | None:
+    if content.json_format != REPEATS_FORMAT:
+        return None
+    found = read_repeats(content.path)
+    return (
+        f"repeats, {_count(len(found.errors), 'play')}, error {found.errors[0]:.2%} to {found.errors[found.kept]:.2%}, "
+        f"noise {found.noise_floor:.2%}"
+    )
+
+
 def recognise_trajectory(content: FileContent) -> str | None:
     if content.header[:1] != TRAJECTORY.header[:1]:
         return None
@@ -114,6 +126,7 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_identified_model,
     recognise_mechanical_model,
     recognise_diagnosis,
+    recognise_repeats,
     recognise_trajectory,
     recognise_trials,
     recognise_thresholds,

@@ -217,3 +217,14 @@ def test_a_sharp_tone_in_the_band_passes_whole_and_one_outside_not():
     inside, outside = (np.sin(2 * np.pi * hz * time_s)[:, None] * window for hz in (15.0, 60.0))
     np.testing.assert_allclose(band_part(inside, RATE_HZ, BAND_HZ), inside, atol=1e-3)
     assert rms(band_part(outside, RATE_HZ, BAND_HZ)) < 1e-4
+
+
+def test_rows_that_are_not_judged_do_not_hold_up_a_verdict(plants, repetition, wanted):
+    plant, rows = plants.omega_like(), len(wanted) - AROUND
+    spoilt = np.zeros_like(wanted)
+    spoilt[rows:] = 0.5 * np.sin(2 * np.pi * 15 * np.arange(AROUND) / RATE_HZ)[:, None]
+    states = []
+    for judged in (None, (0, rows - 100)):
+        state = begin(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, judged=judged))
+        states.append(next_forces(state, plant.measured(state.forces, 3) + spoilt))
+    assert [state.verdict for state in states] == [Verdict.CONTINUE, Verdict.AT_FLOOR]

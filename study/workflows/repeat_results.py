@@ -1,0 +1,132 @@
+"""What repeating is asked for and what it found, kept as a table of forces with a document beside it."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.iteration import IterationState, Verdict
+from equalizer.tracking.model_inverse import InverseOfLength
+from equalizer.tracking.trajectory import FORCES, Trajectory, trajectory_csv
+from equalizer.tracking.virtual_spring import NO_SPRING, VirtualSpring
+from study.devices.device import DeviceSettings, Played
+from study.errors import StudyError
+from study.store.provenance import gather_provenance
+from study.store.repeats_file import Repeats, beside, read_repeats, write_repeats
+from study.store.trajectory_file import read_trajectory, write_trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RepeatPlan:
+    wanted: Trajectory
+    """Accelerations, from rest to rest; their part in the band is played."""
+    inverse: InverseOfLength
+    band_hz: tuple[float, float]
+    model_sha256: str
+    """Of what the inverse was made from: forces are taken up again for the same only."""
+    settings: DeviceSettings
+    """Without a hand on the handle. The stimulus' cap is kept by every correction."""
+    device: str
+    repeats: int = 10
+    """After the first play."""
+    first_gain: float = 1.0
+    """See `equalizer.tracking.convergence`."""
+    spring: VirtualSpring = NO_SPRING
+    """What acts on the device and is not in the model already."""
+    first: FloatArray | None = None
+    """(N, 3): forces to begin with, one to one with what is wanted; None = the model's."""
+    seed: int = 0
+    out: Path | None = None
+    """Table of forces to write; the repeats are written beside it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Repeated:
+    forces: Trajectory
+    """The best, one to one with what is wanted."""
+    errors: tuple[float, ...]
+    """Of each play as the accelerometer has it, in the band, relative; noise included."""
+    noise_floor: float
+    """Likewise, of noise alone."""
+    verdict: Verdict
+    kept: int
+    """Which play's forces these are, from 0."""
+    remark: str
+    played: tuple[Played, ...]
+
+
+def repeated(plan: RepeatPlan, state: IterationState, played: list[Played]) -> Repeated:
+    verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
+    return Repeated(
+        forces=_table(plan, state),
+        errors=state.errors,
+        noise_floor=_floor(state),
+        verdict=verdict,
+        kept=int(np.argmin(state.residuals)),
+        remark=state.remark,
+        played=tuple(played),
+    )
+
+
+def _table(plan: RepeatPlan, state: IterationState) -> Trajectory:
+    rows, rate_hz = len(plan.wanted.signal), plan.wanted.signal.sample_rate_hz
+    signal = Signal(state.best[:rows], rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
+    return Trajectory(signal, plan.wanted.start_s)
+
+
+def _floor(state: IterationState) -> float:
+    return (state.noise_floor or 0.0) / state.repetition.level
+
+
+def write_repeated(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
+    if plan.out is None:
+        return
+    table = _table(plan, state)
+    write_trajectory(plan.out, table)
+    verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
+    repeats = Repeats(
+        trajectory_sha256=trajectory_sha256(plan.wanted),
+        model_sha256=plan.model_sha256,
+        forces_sha256=_text_sha256(trajectory_csv(table)),
+        device=plan.device,
+        place_m=plan.settings.place_m,
+        band_hz=plan.band_hz,
+        errors=state.errors,
+        kept=int(np.argmin(state.residuals)),
+        noise_floor=_floor(state),
+        gains=state.gains,
+        fitted=state.fitted,
+        verdict=verdict.name.lower(),
+        remark=state.remark,
+        interrupted=interrupted,
+    )
+    write_repeats(beside(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
+
+
+def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> FloatArray:
+    """(N, 3): what an earlier run found for the same trajectory and model. Raises StudyError for any other."""
+    document, table = read_repeats(beside(forces)), read_trajectory(forces)
+    found = {
+        "another trajectory": document.trajectory_sha256 == trajectory_sha256(wanted),
+        "another model": document.model_sha256 == model_sha256,
+        "a table of forces that was changed since": document.forces_sha256 == _text_sha256(trajectory_csv(table)),
+    }
+    if wrong := [what for what, same in found.items() if not same]:
+        raise StudyError(
+            "The earlier forces cannot be gone on from",
+            f"{beside(forces).name} belongs to {' and '.join(wrong)}.",
+            "Leave it out to begin with the model's own forces.",
+            saved="Nothing moved.",
+        )
+    return table.signal.samples
+
+
+def trajectory_sha256(wanted: Trajectory) -> str:
+    rate = np.float64(wanted.signal.sample_rate_hz).tobytes()
+    return hashlib.sha256(rate + wanted.signal.samples.astype("<f8").tobytes()).hexdigest()
+
+
+def _text_sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
