@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove-study docs clean
+.PHONY: help study test check fix bench prove-study prove-equalizer docs clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -37,7 +37,10 @@ bench: $(VENV)/.installed-test ## Time ours against the same work done plainly; 
 	@for file in tests/benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
 
 prove-study: $(VENV)/.installed-test ## The slow proof of the study: 100 sessions killed at random
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m slow tests/study tests/stories
+
+prove-equalizer: $(VENV)/.installed-test ## The slow proofs of the equalizer: many noise seeds, worst case
+	$(BIN)/python -m pytest -m slow -s tests/equalizer tests/stories/test_the_device_is_equalized.py
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
 	$(BIN)/python -m study.workflows.format_docs docs
