@@ -32,7 +32,7 @@ class IdentifiedModel:
     C: FloatArray
     """(p, n)"""
     D: FloatArray
-    """(p, m)"""
+    """(p, m); not zero in a model of a band, which uses it for what lies outside."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
     """Where the fit was made; the model says nothing outside."""

@@ -58,7 +58,8 @@ def run(band=(5, 35), order=26, sweep=(4.5, 37), parts=((5, 35),), seeds=(1, 2, 
     figures = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     assert (figures["radius"] < 1).all()
     for name, values in figures.items():
-        print(f"{name}: median {np.median(values, axis=0)}, worst {values.max(axis=0)}")
+        # Seen with `pytest -s`.
+        sys.stdout.write(f"{name}: median {np.median(values, axis=0)}, worst {values.max(axis=0)}\n")
     return figures
 
 
