@@ -19,8 +19,10 @@ from equalizer.tracking.tracking_problem import TrackingError, TrackingProblem, 
 
 EDGE_ROOM_HZ = 1.0
 """Beyond the model's band, so that all of it is played."""
-
-
+LEAKED = 3e-3
+"""Share of what is wanted that filters let through from outside the band: no more than that inside is nothing."""
+NO_CAP_N = 1e9
+"""For forces that are checked later, when all of them are together."""
 PROVED = 1e-3
 """Forces under the cap are taken whose cost is proved to be so close to the best."""
 
@@ -56,10 +58,10 @@ def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSet
     check_wanted(model, wanted)
     problem = augmented(model, TrackingWeights(settings.weight))
     inside = within_band(model, wanted.samples)
-    if not inside.any():
+    if not np.linalg.norm(inside) > LEAKED * np.linalg.norm(wanted.samples):
         low, high = model.band_hz
         raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the model's band")
-    forces, loss = _solved(problem, inside, settings)
+    forces, loss = solved_causally(problem, inside, settings)
     peaks = require_within(forces, settings.cap_n, model.sample_rate_hz)
     predicted = answer(problem, forces)
     return Feedforward(
@@ -86,13 +88,15 @@ def within_band(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
     return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
 
 
-def _solved(
-    problem: TrackingProblem, wanted: FloatArray, settings: FeedforwardSettings
+def solved_causally(
+    problem: TrackingProblem, wanted: FloatArray, settings: FeedforwardSettings, others: FloatArray | None = None
 ) -> tuple[FloatArray, TrackingLoss | None]:
+    """Forces (N, m) from the first row on, under the cap together with the others, (N, m), where it constrains."""
     free = track_padded(problem, wanted, CAUSAL).forces
-    if not settings.constrain or predicted_peaks(free, settings.cap_n).fits:
+    total = free if others is None else free + others
+    if not settings.constrain or predicted_peaks(total, settings.cap_n).fits:
         return free, None
-    after = CAUSAL.samples(problem.sample_rate_hz)[1]
-    padded = np.pad(wanted, ((0, after), (0, 0)))
-    capped = constrained_track(problem, padded, settings.cap_n, settings=CapSettings(gap=PROVED))
+    room = (0, CAUSAL.samples(problem.sample_rate_hz)[1]), (0, 0)
+    there = None if others is None else np.pad(others, room)
+    capped = constrained_track(problem, np.pad(wanted, room), settings.cap_n, there, CapSettings(gap=PROVED))
     return capped.forces[: len(wanted)], capped.loss

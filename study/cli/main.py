@@ -19,6 +19,7 @@ import typer
 from study.cli import (
     analyze,
     doctor,
+    equalize,
     identify,
     noise,
     note,
@@ -51,6 +52,7 @@ app.command("rehearse")(rehearse.rehearse)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
 app.command("identify")(identify.identify)
+app.command("equalize")(equalize.equalize)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
 app.command("watch")(watch.watch)

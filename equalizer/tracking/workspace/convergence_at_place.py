@@ -1,0 +1,37 @@
+"""Whether repeats at a place will converge, as far as the models say: their uncertainty, and how they differ."""
+
+import numpy as np
+
+from equalizer.plant.model_response import model_response
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.convergence import Convergence, convergence
+from equalizer.tracking.virtual_spring import VirtualSpring
+from equalizer.tracking.workspace.feedforward_at_place import used_models
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+
+LINES = 120
+
+
+def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta: float = 1.0) -> Convergence | None:
+    """What the device may be: every draw of every model's uncertainty and, between places, each model that is used.
+    spring: what acts on the device and is not in the models. None where nothing says what the device may be."""
+    used = [model for _, model in used_models(at)]
+    band_hz = used[0].band_hz
+    lines_hz = np.asarray(np.geomspace(*band_hz, LINES), dtype=np.float64)
+    devices = [model_response(model, lines_hz) for model in used] if len(used) > 1 else []
+    for model in used:
+        if model.samples is not None:
+            devices += [model_response(model.with_parameters(row), lines_hz) for row in model.samples]
+    if not devices:
+        return None
+    held = np.array([_under_spring(device, lines_hz, spring) for device in devices])
+    model_there = np.asarray(np.linalg.inv(at.inverse(lines_hz, weight, spring)), dtype=np.complex128)
+    return convergence(model_there, held, lines_hz, band_hz, beta)
+
+
+def _under_spring(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:
+    """From what is added to the spring's force, rather than from all that enters."""
+    share = spring.force_per_acceleration(frequency_hz)[:, None, None]
+    around = np.eye(device.shape[1]) - device * share
+    return np.asarray(np.linalg.solve(around, device), dtype=np.complex128)

@@ -1,0 +1,50 @@
+"""A wanted acceleration turned into forces at a place: by one model, or by several whose forces are added."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import Signal
+from equalizer.tracking.feedforward import NO_CAP_N, Feedforward, FeedforwardSettings, feedforward
+from equalizer.tracking.iteration import Invert
+from equalizer.tracking.limits import require_within
+from equalizer.tracking.model_inverse import InverseOfLength, inverse_of
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+
+
+def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSettings) -> Feedforward:
+    """Error and loss are those of the worst part, each by its own model. Raises what `feedforward` raises."""
+    used = used_models(at)
+    if len(used) == 1:
+        return feedforward(used[0][1], wanted, settings)
+    # A sum may fit where a part does not; parts that fit, with weights that add up to one, have a sum that fits.
+    each = settings if settings.constrain else replace(settings, cap_n=NO_CAP_N)
+    parts = [(weight, feedforward(model, wanted, each)) for weight, model in used]
+    samples = np.asarray(sum(weight * part.forces.samples for weight, part in parts), dtype=np.float64)
+    largest = max(parts, key=lambda part: part[0])[1]
+    losses = [part.loss for _, part in parts if part.loss is not None]
+    return replace(
+        largest,
+        forces=replace(largest.forces, samples=samples),
+        error=max(part.error for _, part in parts),
+        peaks=require_within(samples, settings.cap_n, wanted.sample_rate_hz),
+        loss=max(losses, key=lambda loss: loss.error_capped, default=None),
+    )
+
+
+def used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
+    """With their weights; in the band that all of them cover."""
+    used = [(weight, model) for weight, model in zip(at.weights, at.models, strict=True) if weight > 0]
+    band_hz = max(model.band_hz[0] for _, model in used), min(model.band_hz[1] for _, model in used)
+    return tuple((weight, replace(model, band_hz=band_hz)) for weight, model in used)
+
+
+def inverse_at(at: ModelsAtPlace, weight: float) -> InverseOfLength:
+    parts = [(share, inverse_of(model, weight)) for share, model in used_models(at)]
+
+    def of_length(rows: int) -> Invert:
+        inverses = [(share, inverse(rows)) for share, inverse in parts]
+        return lambda wanted: np.asarray(sum(share * invert(wanted) for share, invert in inverses), dtype=np.float64)
+
+    return of_length

@@ -1,0 +1,85 @@
+"""`hapteq equalize`: the forces that make the handle accelerate as wanted."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from study.cli.results import JsonOption
+
+if TYPE_CHECKING:
+    from study.workflows.equalize_trajectory import EqualizePlan
+
+
+def equalize(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="MODEL.h5... WANTED.csv", help="Models, then the wanted accelerations.")
+    ],
+    out: Annotated[Path, typer.Option(help="The table of forces to write, FORCES.csv.")],
+    at: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(help="Place in the workspace, x y z in metres, for models of several places."),
+    ] = None,
+    weight: Annotated[float, typer.Option(min=0.0, help="Weight of |force|² against |error|², (m/s² per N)².")] = 1e-3,
+    cap: Annotated[float, typer.Option(min=0.001, help="Highest force, in newtons.")] = 3.0,
+    constrain: Annotated[
+        bool, typer.Option("--constrain", help="Above the cap: solve under it and state the loss, instead of refusing.")
+    ] = False,
+    physics: Annotated[
+        Path | None, typer.Option(help="Mechanical model whose named effects are compensated, such as friction.")
+    ] = None,
+    repeat: Annotated[
+        int | None,
+        typer.Option(min=1, help="Play on the device, measure, correct, up to so many times. Nobody may hold it."),
+    ] = None,
+    device: Annotated[str | None, typer.Option(help="Device to repeat on: simulated.")] = None,
+    earlier: Annotated[
+        Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated device's noise.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Turn wanted accelerations (time_s,ax,ay,az) into forces (time_s,fx,fy,fz), row by row.
+
+    Models of several places are interpolated at --at; a narrow and a wide one of one place play three bands.
+    """
+    from study.errors import WrongUseError
+    from study.workflows.equalize_trajectory import EqualizePlan
+
+    if len(files) < 2:
+        raise WrongUseError(
+            "What shall be equalized?",
+            "A model and a table of wanted accelerations are needed.",
+            "Such as: hapteq equalize model.h5 wanted.csv --out forces.csv",
+        )
+    if (repeat is None) != (device is None) or (earlier is not None and repeat is None):
+        raise WrongUseError(
+            "Repeating needs to know how often, and on what",
+            "--repeat and --device go together, and --from only with them.",
+            "Such as: hapteq equalize model.h5 wanted.csv --repeat 10 --device simulated --out forces.csv",
+        )
+    *models, trajectory = files
+    plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
+    found, lines = _once(plan) if repeat is None or device is None else _repeated(plan, repeat, device, earlier, seed)
+    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
+
+
+def _once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
+    from study.workflows.equalize_trajectory import equalize_trajectory
+    from study.workflows.equalized_summary import summary, summary_lines
+
+    done = equalize_trajectory(plan)
+    return summary(done), summary_lines(done)
+
+
+def _repeated(
+    plan: "EqualizePlan", repeat: int, device: str, earlier: Path | None, seed: int
+) -> "tuple[dict[str, Any], tuple[str, ...]]":
+    from study.cli.progress import late_bar
+    from study.workflows.repeat_trajectory import RepeatOrder, repeat_trajectory, repeated_lines, repeated_summary
+
+    order = RepeatOrder(repeat, device, earlier, seed)
+    with late_bar("Plays", total=repeat + 1) as show:
+        done = repeat_trajectory(plan, order, lambda number, share: show(number + share))
+    return repeated_summary(done), repeated_lines(done)

@@ -1,0 +1,110 @@
+"""What an equalized table is worth, for a person's lines and a program's JSON alike."""
+
+from typing import Any
+
+from study.workflows.equalize_trajectory import EqualizedTrajectory
+
+WORTH_SAYING = 0.01
+"""Share of what is wanted that may be left out without a word."""
+
+
+def summary(done: EqualizedTrajectory) -> dict[str, Any]:
+    solved, bands, compensation, choice = done.solved, done.bands, done.compensation, done.models.choice
+    found: dict[str, Any] = {
+        "forces": str(done.plan.out),
+        "band_hz": list(done.models.band_hz),
+        "predicted_error": solved.error,
+        "left_out": solved.left_out,
+        "peak_n": done.peaks.peak_n,
+        "cap_n": done.peaks.cap_n,
+        "capped": None,
+        "place_m": list(done.models.at.place_m),
+        "remarks": list(done.models.remarks),
+    }
+    if solved.loss is not None:
+        found["capped"] = {
+            "error_free": solved.loss.error_free,
+            "error_capped": solved.loss.error_capped,
+            "error_clipped": solved.loss.error_clipped,
+        }
+    if choice is not None:
+        found["interpolation"] = choice.interpolation
+        found["held_out"] = [
+            {
+                "place_m": list(check.place_m),
+                "blended_worst_error": check.blended_error,
+                "modal_worst_error": check.modal_error,
+            }
+            for check in choice.checks
+        ]
+    if bands is not None:
+        found["bands"] = {
+            "edges_hz": list(bands.edges_hz),
+            "middle_error_if_only_cut": bands.cut_error,
+            "middle_error_with_run_in": bands.whole_error,
+            "high_level_error": bands.level_error,
+            "high_direction": list(bands.direction),
+            "travel_m": bands.travel_m,
+        }
+    if compensation is not None:
+        found["compensated"] = [effect.kind for effect in compensation.used]
+        found["not_compensated"] = {effect.kind: why for effect, why in compensation.not_used}
+        found["compensated_share"] = compensation.share
+    return found
+
+
+def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
+    solved = done.solved
+    low, high = done.models.band_hz
+    lines = [
+        f"Predicted error {100 * solved.error:.2f} % within {low:g} to {high:g} Hz; highest force "
+        f"{done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
+    ]
+    lines += done.models.remarks
+    lines += _band_lines(done)
+    if solved.left_out > WORTH_SAYING:
+        lines.append(
+            f"{100 * solved.left_out:.0f} % of what is wanted (rms) lies outside the "
+            f"{'bands' if done.bands else 'band'} and is not played."
+        )
+    if solved.loss is not None:
+        loss = solved.loss
+        lines.append(
+            f"The cap costs: error {100 * loss.error_capped:.1f} % instead of {100 * loss.error_free:.1f} % "
+            f"(clipping would have given {100 * loss.error_clipped:.1f} %)."
+        )
+    lines += _physics_lines(done)
+    lines.append(_spring_line(done))
+    return tuple(lines)
+
+
+def _band_lines(done: EqualizedTrajectory) -> list[str]:
+    bands, two = done.bands, done.models.two
+    if bands is None or two is None:
+        return []
+    low, high = bands.edges_hz
+    lines = [
+        f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower model "
+        f"up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz levels alone, along one direction.",
+        f"Run-in and run-out of the bands are no rows of the table. The middle band is solved for the rows alone; its "
+        f"error would be {100 * bands.whole_error:.2f} % with them, {100 * bands.cut_error:.2f} % were they only cut.",
+    ]
+    if bands.level_error is not None:
+        lines.append(f"Level error of the high band, by sixths of an octave: {100 * bands.level_error:.1f} %.")
+    return lines
+
+
+def _physics_lines(done: EqualizedTrajectory) -> list[str]:
+    compensation = done.compensation
+    if compensation is None:
+        return []
+    share = f"; {100 * compensation.share:.0f} % of it fits under the cap" if compensation.share < 1 else ""
+    used = ", ".join(effect.kind for effect in compensation.used) or "nothing"
+    lines = [f"Compensated: {used}{share}."]
+    return lines + [f"Not compensated: {effect.kind}: {why}." for effect, why in compensation.not_used]
+
+
+def _spring_line(done: EqualizedTrajectory) -> str:
+    if done.models.nearest.provenance.get("input") == "excitation":
+        return "These forces are for the device under the spring that it was recorded with."
+    return "These forces are all that enters the device: a spring that holds the handle is not counted."

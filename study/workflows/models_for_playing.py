@@ -1,0 +1,187 @@
+"""Model files sorted by what they are together: one model, several places of one device, or two bands of one place."""
+
+import hashlib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.tracking.trajectory import FORCES, TRAJECTORY
+from equalizer.tracking.two_models import TwoModels
+from equalizer.tracking.workspace.feedforward_at_place import used_models
+from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, choose_interpolation
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+from equalizer.tracking.workspace.place_weights import place_weights
+from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
+from study.errors import StudyError, WrongUseError
+from study.store.identified_model_file import read_identified_model
+from study.store.provenance import sha256_of
+
+SAME_PLACE_M = 0.001
+FAR_M = 0.005
+"""From where a single model was identified: farther, and the user is told."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelsForPlaying:
+    given: tuple[IdentifiedModel, ...]
+    at: ModelsAtPlace
+    """For two bands: the narrow model alone."""
+    two: TwoModels | None
+    choice: InterpolationChoice | None
+    """None for models of one place."""
+    remarks: tuple[str, ...]
+    """Sentences."""
+    sha256: str
+    """Of all files, and of the place where it matters which forces they give."""
+
+    @property
+    def nearest(self) -> IdentifiedModel:
+        """Of those given: what was recorded how. For two bands the narrow one."""
+        if self.two is not None:
+            return self.two.narrow
+        place_m = self.at.place_m
+        return min(self.given, key=lambda model: math.dist(model.place_m or place_m, place_m))
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """For which an error is predicted: what all models that are used cover."""
+        return used_models(self.at)[0][1].band_hz
+
+    @property
+    def largest(self) -> IdentifiedModel:
+        """The one that counts most at the place."""
+        return self.at.models[int(np.argmax(self.at.weights))]
+
+
+def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> ModelsForPlaying:
+    """Raises StudyError for files that are no models, models that cannot play a table, or do not go together."""
+    models = tuple(read_identified_model(path) for path in paths)
+    for path, model in zip(paths, models, strict=True):
+        _check(path, model)
+    if len(models) == 1:
+        return _one(paths, models[0], at_m)
+    if _of_one_place(models):
+        return _two_bands(paths, models, at_m)
+    try:
+        return _several_places(paths, WorkspaceModels(models), at_m, weight)
+    except WorkspaceError as problem:
+        numbered = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
+        raise _unfit(f"{_sentence(str(problem))} Models are {numbered}.", "Give models that go together.") from problem
+
+
+def _one(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> ModelsForPlaying:
+    at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
+    return ModelsForPlaying((model,), at, None, None, _far(paths[0], model, at_m), _sha256(paths))
+
+
+def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> ModelsForPlaying:
+    if len(models) > 2:
+        raise _unfit(
+            f"{len(models)} models are of one place.", "Give one of them, or a narrow and a wide one for bands."
+        )
+    narrow, wide = sorted(models, key=lambda model: model.band_hz[1])
+    if narrow.sample_rate_hz != wide.sample_rate_hz:
+        raise _unfit(
+            f"They run at {narrow.sample_rate_hz:g} and {wide.sample_rate_hz:g} Hz.", "Identify both at one rate."
+        )
+    try:
+        two = TwoModels(narrow, wide)
+    except ValueError as problem:
+        raise _unfit(
+            f"Both models are of one place, but {problem}.",
+            "Give one of them, or two bands such as hapteq identify --band 5 35 and --band 5 400 --order 40 make.",
+        ) from problem
+    at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
+    return ModelsForPlaying(models, at, two, None, _far(paths[0], narrow, at_m), _sha256(paths))
+
+
+def _several_places(
+    paths: tuple[Path, ...], workspace: WorkspaceModels, at_m: Vector | None, weight: float
+) -> ModelsForPlaying:
+    if at_m is None:
+        places = "; ".join(
+            f"{path.name} {_mm(model.place_m)}" for path, model in zip(paths, workspace.models, strict=True)
+        )
+        raise WrongUseError(
+            "At which place shall it be played?",
+            f"The models are of several places: {places}.",
+            "Say where with --at X Y Z, in metres.",
+            saved="Nothing was written.",
+        )
+    if len({model.provenance.get("input", "command") for model in workspace.models}) > 1:
+        raise WorkspaceError("some models hold the spring they were recorded under and some do not")
+    choice = choose_interpolation(workspace, weight=weight)
+    at = choice.at(at_m)
+    remarks = [_sentence(choice.reason)]
+    for check in choice.checks:
+        modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
+        remarks.append(
+            f"Held out {_mm(check.place_m)}: worst error {100 * check.blended_error:.1f} % with blended forces, "
+            f"{modal} with resonances interpolated."
+        )
+    outside = place_weights(workspace.places_m, at_m).remark
+    remarks += [_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
+    return ModelsForPlaying(workspace.models, at, None, choice, tuple(remarks), _sha256(paths, at_m))
+
+
+def _check(path: Path, model: IdentifiedModel) -> None:
+    found = (model.input_channels, model.output_channels, model.input_unit, model.output_unit)
+    if found != (FORCES.header[1:], TRAJECTORY.header[1:], FORCES.unit, TRAJECTORY.unit):
+        raise _unfit(
+            f"{path.name} goes from {', '.join(model.input_channels)} in {model.input_unit} to "
+            f"{', '.join(model.output_channels)} in {model.output_unit}; a table needs a model from fx, fy, fz in N to "
+            "ax, ay, az in m/s^2.",
+            "Identify one from recordings of all three axes, with these channel names.",
+        )
+    if model.spectral_radius >= 1:
+        raise _unfit(
+            f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
+            "Identify it again with hapteq identify, which makes stable ones only.",
+        )
+
+
+def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
+    places = [model.place_m for model in models]
+    if all(place is None for place in places):
+        return True
+    known = [place for place in places if place is not None]
+    return len(known) == len(places) and all(math.dist(known[0], place) <= SAME_PLACE_M for place in known)
+
+
+def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
+    if at_m is None:
+        return ()
+    if model.place_m is None:
+        return (f"{path.name} does not say where it was identified; it is used as if it were at the place.",)
+    away_m = math.dist(model.place_m, at_m)
+    if away_m <= FAR_M:
+        return ()
+    return (
+        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: coupling comes back with the distance. "
+        "Models of several places on both sides of it can be interpolated.",
+    )
+
+
+def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
+    """A single file keeps its own, so that it can be compared by hand."""
+    each = [sha256_of(path) for path in paths]
+    if len(each) == 1:
+        return each[0]
+    return hashlib.sha256(" ".join([*sorted(each), repr(at_m)]).encode()).hexdigest()
+
+
+def _mm(place_m: Vector | None) -> str:
+    return "(place not known)" if place_m is None else "({:g}, {:g}, {:g}) mm".format(*(1e3 * part for part in place_m))
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _unfit(happened: str, do_now: str) -> StudyError:
+    return StudyError("These models cannot equalize the table", happened, do_now, saved="Nothing was written.")
