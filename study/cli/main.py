@@ -6,6 +6,7 @@ imports what it needs.
 
 import contextlib
 import io
+import os
 import re
 import shutil
 import signal
@@ -93,6 +94,9 @@ def main(arguments: list[str] | None = None) -> int:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        # Our matrices are small: threads would wait for each other longer than they work. Heard before numpy loads.
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
         code = app(args=arguments, standalone_mode=False)
         return code if isinstance(code, int) else ExitCode.DONE
