@@ -88,15 +88,7 @@ def options(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns its exit code."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _leave)
-    for library in ("OPENBLAS", "OMP", "MKL"):
-        # Our matrices are small: threads would wait for each other longer than they work. Heard before numpy loads.
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    _settle_in()
     try:
         code = app(args=arguments, standalone_mode=False)
         return code if isinstance(code, int) else ExitCode.DONE
@@ -113,6 +105,19 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as problem:
         say(_refused_by_the_system(problem))
         return ExitCode.ERROR
+
+
+def _settle_in() -> None:
+    """What streams, signals and libraries do in this process."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _leave)
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        # Our matrices are small: threads would wait for each other longer than they work. Heard before numpy loads.
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
 def say(error: StudyError) -> None:
