@@ -31,6 +31,8 @@ class ProtocolLine:
     """Or path: what `--protocol` takes."""
     title: str
     locked: bool
+    equalized: bool = False
+    """Its stimuli are accelerations: it needs a model of the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,8 @@ class HomeView:
     """Latest first."""
     protocols: tuple[ProtocolLine, ...]
     devices: tuple[str, ...]
+    models: tuple[str, ...] = ()
+    """Files of identified models."""
 
 
 @dataclass(frozen=True, slots=True)

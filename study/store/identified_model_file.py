@@ -50,6 +50,12 @@ def read_identified_model(path: Path) -> IdentifiedModel:
         raise UnusableFileError(path, KIND, error.problems) from error
 
 
+def is_identified_model(path: Path) -> bool:
+    """By what the file says of itself. Raises StudyError for one that says nothing, or something else."""
+    with opened_hdf5(path, KIND, FORMAT, VERSION):
+        return True
+
+
 def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: bool = False) -> None:
     """Raises AlreadyThereError, CannotWriteError."""
 

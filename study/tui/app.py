@@ -214,7 +214,7 @@ class HapteqApp(App[None]):
         if self._sitting is not None:  # Enter twice: one sitting
             return
         start = self._start = replace(self._start, device=wanted.device)
-        order = SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed, start.model)
+        order = SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed, wanted.model)
         await self._sit(Begin(order))
 
     async def on_resume_wanted(self, wanted: home_messages.ResumeWanted) -> None:

@@ -51,7 +51,7 @@ class ArchiveScreens:
         if self._home is None:
             self._home = HomeScreen()
             await self._app.push_screen(self._home)
-        self._send(ShowHome(self._start.data, self._start.protocol, self._start.device))
+        self._send(ShowHome(self._start.data, self._start.protocol, self._start.device, self._start.model))
 
     def clear(self) -> None:
         """Take everything off but the start screen, where there is one."""

@@ -17,6 +17,8 @@ class BeginWanted(Message):
     protocol: str
     """Name or path."""
     device: str
+    model: str = ""
+    """File of the model that equalizes; empty where the protocol needs none."""
 
 
 @dataclass(eq=False)

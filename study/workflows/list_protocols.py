@@ -41,4 +41,5 @@ def protocol_line(name: str, data: Path) -> ProtocolLine | None:
         return ProtocolLine(name, f"Cannot be used. {problem.happened}", locked=False)
     if not isinstance(file.protocol, StudyProtocol):
         return None
-    return ProtocolLine(name, file.protocol.title, file.locked)
+    equalized = file.protocol.stimulus.quantity == "delivered_acceleration"
+    return ProtocolLine(name, file.protocol.title, file.locked, equalized)

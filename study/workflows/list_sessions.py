@@ -6,13 +6,16 @@ from study.devices.opening import DEVICES
 from study.session.archive_views import HomeView, SessionLine
 from study.session.printable import printable, printable_text
 from study.store.archive import session_folders
+from study.workflows.list_models import model_files
 from study.workflows.list_protocols import protocol_lines
 from study.workflows.session_line import session_line
 
 
 def home_view(data: Path) -> HomeView:
     """Everything on the start screen. A data folder that is not there is an empty one."""
-    return HomeView(printable_text(str(data)), session_lines(data), printable(protocol_lines(data)), DEVICES)
+    return HomeView(
+        printable_text(str(data)), session_lines(data), printable(protocol_lines(data)), DEVICES, model_files(data)
+    )
 
 
 def session_lines(data: Path) -> tuple[SessionLine, ...]:

@@ -143,7 +143,8 @@ def _offered(wanted: ShowHome) -> HomeView:
     line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None
     protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols
     devices = tuple(sorted(view.devices, key=lambda name: name != wanted.device))
-    return replace(view, protocols=protocols, devices=devices)
+    models = (wanted.model, *(name for name in view.models if name != wanted.model)) if wanted.model else view.models
+    return replace(view, protocols=protocols, devices=devices, models=models)
 
 
 def _results(written: WrittenAnalysis) -> Results:

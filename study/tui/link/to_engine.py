@@ -25,8 +25,9 @@ class SessionOrder:
 class ShowHome:
     data: str
     protocol: str = ""
-    """What is offered first; so is the device."""
+    """What is offered first; so are device and model."""
     device: str = ""
+    model: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,8 @@ HELP = """\
 # The start
 
 **New session** (F2). Type the participant's code, choose protocol and device, and press F5. A code has 1 to 16 letters
-and digits, with at least one digit, such as P01. Names stay off this computer.
+and digits, with at least one digit, such as P01. Names stay off this computer. A protocol whose stimuli are
+accelerations asks for a model of the device too: one that lies with the data (`hapteq identify` makes it).
 
 **Sessions** (F3), latest first. The arrow keys move, and:
 

@@ -22,6 +22,8 @@ class NewSessionForm(Vertical):
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
     NewSessionForm:focus-within { border: round $accent; }
     NewSessionForm .field { height: auto; }
+    NewSessionForm #equalizer { display: none; }
+    NewSessionForm.-equalized #equalizer { display: block; }
     NewSessionForm Label { width: 13; }
     NewSessionForm Input, NewSessionForm Select { width: 1fr; }
     NewSessionForm #about { height: 2; color: $foreground 65%; }
@@ -45,6 +47,9 @@ class NewSessionForm(Vertical):
         with Horizontal(classes="field"):
             yield Label("Device")
             yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="device", disabled=True)
+        with Horizontal(classes="field", id="equalizer"):
+            yield Label("Model")
+            yield Select[str](NOTHING_YET, allow_blank=False, compact=True, id="model", disabled=True)
         yield Static("", id="about", markup=False)
         yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
 
@@ -53,6 +58,7 @@ class NewSessionForm(Vertical):
         self._home = home
         self._offer("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
         self._offer("#device", [(_device_prompt(name), name) for name in home.devices])
+        self._offer("#model", [(_file_name(path), path) for path in home.models])
         proposed = next_code(tuple(line.subject for line in home.sessions if line.observer is None))
         self.query_one("#code", Input).placeholder = f"code, such as {proposed}"
         self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
@@ -68,11 +74,12 @@ class NewSessionForm(Vertical):
             return
         code = self._code
         problem = code_problem(code) or self._standing_problem(code)
-        if problem:
-            self._about(problem, "-problem")
-            self.query_one("#code", Input).focus()
+        if problem or self._model_problem:
+            self._about(problem or self._model_problem, "-problem")
+            self.query_one("#code" if problem else "#protocol").focus()
             return
-        self.post_message(BeginWanted(code, self._chosen("#protocol"), self._chosen("#device")))
+        model = self._chosen("#model") if self._equalized else ""
+        self.post_message(BeginWanted(code, self._chosen("#protocol"), self._chosen("#device"), model))
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
@@ -80,15 +87,29 @@ class NewSessionForm(Vertical):
         if self._home is None:
             return
         code = self._code
+        self.set_class(self._equalized, "-equalized")
         if code and not is_code(code):
             self._about(code_problem(code), "-problem")
         elif problem := self._standing_problem(code):
             self._about(problem, "-problem")
+        elif self._model_problem:
+            self._about(self._model_problem, "-problem")
         elif notice := self._notice(code):
             self._about(notice, "-notice")
         else:
             protocol = self._chosen("#protocol")
             self._about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
+
+    @property
+    def _equalized(self) -> bool:
+        chosen = self._chosen("#protocol")
+        return self._home is not None and any(p.equalized for p in self._home.protocols if p.name == chosen)
+
+    @property
+    def _model_problem(self) -> str:
+        if not self._equalized or self._chosen("#model"):
+            return ""
+        return "This protocol needs a model beside the data: hapteq record, hapteq identify."
 
     @property
     def _code(self) -> str:
@@ -139,6 +160,10 @@ def _protocol_prompt(name: str, locked: bool) -> str:
 
 def _device_prompt(name: str) -> str:
     return f"{name} (nothing moves)" if name == SIMULATED else name
+
+
+def _file_name(path: str) -> str:
+    return path.replace("\\", "/").rpartition("/")[2]
 
 
 def _name(protocol: str, home: HomeView | None) -> str:

@@ -54,7 +54,7 @@ def test_the_list_can_be_asked_for_before_it_is_there(on_screen, home):
 
 def test_only_a_protocol_and_a_device_can_be_chosen(on_screen, home):
     async def story(sight):
-        for select in sight.app.screen.query(Select):
+        for select in sight.app.screen.query("#protocol, #device").results(Select):
             assert not any(value in ("", Select.NULL) for _, value in select._options)
 
     on_screen(HomeScreen(home), story)
@@ -76,7 +76,7 @@ def test_a_code_and_a_key_begin_a_session(on_screen, home, key):
         await sight.press("P", "0", "6", key)
 
     app = on_screen(HomeScreen(home), story)
-    assert asked(app) == [("BeginWanted", "P06", "direction_threshold", "simulated")]
+    assert asked(app) == [("BeginWanted", "P06", "direction_threshold", "simulated", "")]
 
 
 def test_another_protocol_can_be_chosen_with_the_keyboard(on_screen, home):
@@ -86,7 +86,31 @@ def test_another_protocol_can_be_chosen_with_the_keyboard(on_screen, home):
         await sight.press("f5")
 
     app = on_screen(HomeScreen(home), story)
-    assert asked(app) == [("BeginWanted", "P6", "direction_training", "simulated")]
+    assert asked(app) == [("BeginWanted", "P6", "direction_training", "simulated", "")]
+
+
+def with_equalized_first(home, *models):
+    line = ProtocolLine("equalized_threshold", "Two equal accelerations", False, equalized=True)
+    return replace(home, protocols=(line, *home.protocols), models=models)
+
+
+def test_a_protocol_of_accelerations_asks_for_a_model_and_no_other_does(on_screen, home):
+    async def story(sight):
+        assert "Model" in sight.text and "centre.h5" in sight.text
+        await sight.press("P", "0", "6", "tab", "enter", "down", "enter")
+        assert "Model" not in sight.text
+        await sight.press("enter", "up", "enter", "f5")
+
+    app = on_screen(HomeScreen(with_equalized_first(home, "/lab/centre.h5", "/lab/edge.h5")), story)
+    assert asked(app) == [("BeginWanted", "P06", "equalized_threshold", "simulated", "/lab/centre.h5")]
+
+
+def test_without_a_model_it_says_where_one_comes_from_and_begins_nothing(on_screen, home):
+    async def story(sight):
+        await sight.press("P", "0", "6", "f5")
+        assert "needs a model beside the data: hapteq record, hapteq identify" in sight.words
+
+    assert on_screen(HomeScreen(with_equalized_first(home)), story).asked == []
 
 
 @pytest.mark.parametrize(
@@ -136,7 +160,7 @@ def test_a_paste_with_line_breaks_and_blanks_is_one_code(on_screen, home):
         await sight.pilot.pause()
         await sight.press("f5")
 
-    assert asked(on_screen(HomeScreen(home), story)) == [("BeginWanted", "P06", "direction_threshold", "simulated")]
+    assert asked(on_screen(HomeScreen(home), story)) == [("BeginWanted", "P06", "direction_threshold", "simulated", "")]
 
 
 @pytest.mark.parametrize(
