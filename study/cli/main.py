@@ -27,6 +27,7 @@ from study.cli import (
     protocol,
     record,
     rehearse,
+    reproduce,
     resume,
     serve,
     sessions,
@@ -50,6 +51,7 @@ app.command("study")(study.study)
 app.command("resume")(resume.resume)
 app.command("serve", context_settings=serve.PASSES_OPTIONS_ON)(serve.serve)
 app.command("rehearse")(rehearse.rehearse)
+app.command("reproduce")(reproduce.reproduce)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
 app.command("identify")(identify.identify)

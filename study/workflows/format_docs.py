@@ -13,6 +13,7 @@ from typing import Any, get_type_hints
 from pydantic import TypeAdapter
 
 from analysis.diagnosis import document
+from analysis.reproduction import document as reproduction_document
 from analysis.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from equalizer.signals.units import ALLOWED
@@ -70,6 +71,13 @@ SCHEMAS: tuple[Schema, ...] = (
         f"`*{repeats_file.SUFFIX}`, beside a table of forces that was found by repeating: errors per play, what the "
         "forces belong to",
         lambda: document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
+    ),
+    Schema(
+        "reproduction.json",
+        "`reproduction.json`, what `hapteq reproduce` found beside what the paper reports",
+        lambda: document_schema(
+            reproduction_document.reproduction_schema(), reproduction_document.FORMAT, reproduction_document.VERSION
+        ),
     ),
     Schema(
         "live.json",

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
+from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from equalizer.tracking.trajectory import TRAJECTORY
 from protocols.loading import ProtocolError, load_protocol
 from protocols.recording_protocol import RecordingProtocol
@@ -16,6 +17,7 @@ from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
 from study.store.repeats_file import FORMAT as REPEATS_FORMAT
 from study.store.repeats_file import read_repeats
+from study.store.reproduction_file import read_reproduction
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_HEADER, read_thresholds
 from study.store.trajectory_file import read_trajectory
 from study.store.trials_file import TRIALS_HEADER, read_trials
@@ -95,6 +97,13 @@ def recognise_repeats(content: FileContent) -> str | None:
     )
 
 
+def recognise_reproduction(content: FileContent) -> str | None:
+    if content.json_format != REPRODUCTION_FORMAT:
+        return None
+    found = read_reproduction(content.path)
+    return f"reproduction of {_count(len(found.figures), 'figure')} on the {found.device}, seed {found.seed}"
+
+
 def recognise_trajectory(content: FileContent) -> str | None:
     if content.header[:1] != TRAJECTORY.header[:1]:
         return None
@@ -126,6 +135,7 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_identified_model,
     recognise_mechanical_model,
     recognise_diagnosis,
+    recognise_reproduction,
     recognise_repeats,
     recognise_trajectory,
     recognise_trials,

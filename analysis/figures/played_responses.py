@@ -1,0 +1,66 @@
+"""What was played of what was wanted, without and with an equalizer, centre and edge (the published figure 5)."""
+
+from collections.abc import Sequence
+from textwrap import fill
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, new_figure, plain_axes, say_nothing_to_draw
+from analysis.reproduction.played_response import PlayedResponse
+
+_AXES = "xyz"
+_COLOURS = (BLUE, VERMILLION, GREEN)
+_LOWEST_DB, _HIGHEST_DB = -55.0, 12.0
+_TICKS_HZ = (5, 10, 20, 35)
+
+
+def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
+    return Picture(
+        name="equalized-response",
+        title="What is played, with and without the equalizer",
+        caption="Columns: the axis along which an acceleration was wanted, a swept sine. Thick: what came along it, "
+        "which should lie on 0 dB; thin: what came across. True acceleration of the simulated handle, line by line. "
+        "The first row is a force, scaled by its mean gain; the last row is ours: models of other places, their "
+        "forces blended.",
+        figure=draw_played_responses(rows),
+    )
+
+
+def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
+    """One row of panels for each, three columns."""
+    if not rows:
+        return say_nothing_to_draw(new_figure(8.6, 2.0), "Nothing was played.")
+    figure = new_figure(8.6, 0.8 + 1.75 * len(rows))
+    grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
+    for panels, row in zip(grid, rows, strict=True):
+        for wanted, axes in enumerate(panels):
+            _draw_panel(axes, row, wanted)
+        panels[0].set_ylabel(f"{fill(row.name, 18)}\n(dB)", fontsize=9)
+    for wanted, name in enumerate(_AXES):
+        grid[0][wanted].set_title(f"wanted along {name}", fontsize=10)
+        grid[-1][wanted].set_xlabel("Frequency (Hz)")
+    handles = [
+        Line2D([], [], color=colour, label=f"came along {name}") for colour, name in zip(_COLOURS, _AXES, strict=True)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    return figure
+
+
+def _draw_panel(axes: Axes, row: PlayedResponse, wanted: int) -> None:
+    plain_axes(axes)
+    axes.axhline(0, color=GREY, linewidth=0.8)
+    for came, colour in enumerate(_COLOURS):
+        level_db = 20 * np.log10(np.maximum(np.abs(row.response[:, came, wanted]), 1e-9))
+        along = came == wanted
+        axes.plot(row.frequency_hz, level_db, color=colour, linewidth=1.8 if along else 0.8, zorder=3 if along else 2)
+    axes.set_xscale("log")
+    axes.set_xlim(float(row.frequency_hz[0]), float(row.frequency_hz[-1]))
+    axes.set_ylim(_LOWEST_DB, _HIGHEST_DB)
+    axes.set_xticks(_TICKS_HZ)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,32 @@
+"""The figures of a reproduction, by the number of the published one."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.ellipsoid import EllipsoidResult
+from analysis.figures.frequency_bands import frequency_bands_picture
+from analysis.figures.picture import Picture
+from analysis.figures.played_responses import played_responses_picture
+from analysis.figures.study_pictures import ellipsoid_picture, study_pictures
+from analysis.figures.transfer_functions import transfer_functions_picture
+from analysis.reproduction.equalized_findings import EqualizedRows
+from analysis.reproduction.measured_device import MeasuredDevice
+from analysis.study_analysis import StudyAnalysis
+from equalizer.identification.frequency_bands import FrequencyBand
+
+
+def reproduction_pictures(
+    study: StudyAnalysis,
+    shapes: Sequence[EllipsoidResult],
+    device: MeasuredDevice,
+    bands: Sequence[FrequencyBand],
+    direction_limit_hz: float,
+    rows: EqualizedRows,
+) -> Mapping[int, tuple[Picture, ...]]:
+    """Only what there is data for."""
+    return {
+        1: (frequency_bands_picture(device.response, device.onset, bands, direction_limit_hz),),
+        2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),
+        3: (ellipsoid_picture(shapes),),
+        4: (transfer_functions_picture(device.response),),
+        5: (played_responses_picture(rows.drawn),),
+    }

@@ -1,0 +1,149 @@
+"""The page of a reproduction: five figures, each beside what the paper reports and what came out here."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.figures.picture import Picture
+from analysis.reports.page import Page, Section, Table, render_page
+from analysis.reproduction.document import FigureFindings, Finding, PlayedRow, Reproduction
+
+BANNER = (
+    "Everything here was simulated: the device, and those who answered. The simulation was set up to show the features "
+    "that the paper reports, so that they come out here confirms nothing about the paper or about a real omega.3. What "
+    "is shown is that the methods run from end to end, and where they lead on something of this kind."
+)
+
+_SAYS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
+
+_MEASURES = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
+
+_ROW_NOTES = (
+    "Over every line of the band, worst axis: flatness is the largest deviation from the wanted level; coupling the "
+    "largest off-axis response over that along the axis; axis error the largest angle between the wanted axis and what "
+    "is played; error the root mean square of what differs from what was wanted. Rows that are not equalized are "
+    "scaled by their mean gain first.",
+)
+_BASELINE_NOTES = (
+    "Swept sines, as in the figure. Every row but the last of 'edge' and 'in the hand' knows only what was identified "
+    "at the centre without a hand. 'Nothing' commands the wanted number of m/s² in N, so its flatness is a gain that "
+    "was never set; 'static gain' sets it. The rigid-body model is fitted to the whole band here; the raw estimate is "
+    "the measured response, inverted line by line. Cost: multiplications and additions per sample, of a form that runs "
+    "sample by sample.",
+)
+
+
+def render_reproduction_report(
+    reproduction: Reproduction,
+    pictures: Mapping[int, Sequence[Picture]],
+    provenance: Mapping[str, str],
+    generated_utc: str,
+) -> str:
+    """HTML. pictures: by the number of the published figure."""
+    sections = [_overview(reproduction)]
+    for figure in sorted(reproduction.figures, key=lambda one: one.figure):
+        played = _played_tables(reproduction) if figure.figure == 5 else ()
+        tables = (_findings_table(figure), *played)
+        sections.append(_section(figure, pictures.get(figure.figure, ()), tables))
+    low, high = reproduction.band_hz
+    return render_page(
+        Page(
+            title="The five published figures, on the simulated omega.3",
+            summary=f"{reproduction.subjects} simulated participants, {reproduction.device}, models of order "
+            f"{reproduction.order} from {low:g} to {high:g} Hz, seed {reproduction.seed}. Published: R. P. Wilson, "
+            "S. Chan, J. K. Salisbury, G. Niemeyer: Multi-DOF Equalization of Haptic Devices for Accurate Rendering at "
+            "High Frequencies.",
+            banner=BANNER,
+            sections=tuple(sections),
+            generated_utc=generated_utc,
+            provenance=provenance,
+        )
+    )
+
+
+def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
+    """One line per figure, for a terminal."""
+    return tuple(
+        f"Figure {figure.figure}: {_count(figure)}  {figure.title}"
+        for figure in sorted(reproduction.figures, key=lambda one: one.figure)
+    )
+
+
+def _overview(reproduction: Reproduction) -> Section:
+    compared = [finding for figure in reproduction.figures for finding in figure.findings if _compared(finding)]
+    agreeing = sum(finding.as_published is True for finding in compared)
+    otherwise = tuple(
+        f"Figure {figure.figure}, {finding.what}: published {finding.published}; here {finding.here}."
+        for figure in sorted(reproduction.figures, key=lambda one: one.figure)
+        for finding in figure.findings
+        if finding.as_published is False
+    )
+    sentence = (
+        f"Of {len(compared)} things that the paper says of its figures and that can be compared by a rule, {agreeing} "
+        "came out as published. The rules are ours and stand below each table."
+    )
+    named = " These did not:" if otherwise else ""
+    return Section("What came out", paragraphs=(sentence + named,), points=otherwise)
+
+
+def _section(figure: FigureFindings, pictures: Sequence[Picture], tables: tuple[Table, ...]) -> Section:
+    return Section(
+        f"Figure {figure.figure}: {figure.title}",
+        paragraphs=(
+            f"Published ({figure.source}): {figure.published}",
+            "What is different here, and why:",
+        ),
+        points=figure.differs,
+        pictures=tuple(pictures),
+        tables=(*tables, *_remarks(figure)),
+    )
+
+
+def _findings_table(figure: FigureFindings) -> Table:
+    rows = tuple(
+        (finding.what, finding.published or "–", finding.here, _SAYS[finding.as_published])
+        for finding in figure.findings
+    )
+    rules = tuple(f"{one.what}: as published means {one.rule}." for one in figure.findings if one.rule)
+    return Table(
+        f"Figure {figure.figure}: published and here", ("", "Published", "Here", "As published"), rows, notes=rules
+    )
+
+
+def _remarks(figure: FigureFindings) -> tuple[Table, ...]:
+    if not figure.remarks:
+        return ()
+    rows = tuple((str(number), remark) for number, remark in enumerate(figure.remarks, start=1))
+    return (Table(f"Remarks on figure {figure.figure}", ("", "What the analyses noted"), rows, folded=True),)
+
+
+def _played_tables(reproduction: Reproduction) -> tuple[Table, ...]:
+    header = ("", "Device", "Wanted", *_MEASURES)
+    rows = tuple((row.name, row.device, row.signal, *_numbers(row)) for row in reproduction.played)
+    tables = [Table("What was played, row by row", header, rows, notes=_ROW_NOTES)]
+    if reproduction.baselines:
+        costed = ("", *_MEASURES, "Cost")
+        others = tuple((row.name, *_numbers(row), _cost(row)) for row in reproduction.baselines)
+        tables.append(Table("Other ways of driving the device", costed, others, notes=_BASELINE_NOTES))
+    return tuple(tables)
+
+
+def _numbers(row: PlayedRow) -> tuple[str, ...]:
+    return (
+        f"{row.flatness_db:.2f} dB",
+        f"{row.coupling_db:.1f} dB",
+        f"{row.median_coupling_db:.1f} dB",
+        f"{row.axis_error_deg:.1f}°",
+        f"{100 * row.error:.1f} %",
+    )
+
+
+def _cost(row: PlayedRow) -> str:
+    return "–" if row.multiply_adds is None else f"{row.multiply_adds}"
+
+
+def _compared(finding: Finding) -> bool:
+    return finding.as_published is not None
+
+
+def _count(figure: FigureFindings) -> str:
+    compared = [finding for finding in figure.findings if _compared(finding)]
+    return f"{sum(finding.as_published is True for finding in compared)} of {len(compared)} as published."

@@ -1,0 +1,1 @@
+"""The published figures beside what came out here: findings, judged by stated rules."""

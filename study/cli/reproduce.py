@@ -1,0 +1,40 @@
+"""`hapteq reproduce`: the published figures 1 to 5 on the simulated omega.3."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Folder of the page, the figures and all that they are made from.")] = Path(
+        "reproduction"
+    ),
+    subjects: Annotated[int, typer.Option(min=2, max=1000, help="How many simulated participants.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the participants and of the sensor's noise.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw the paper's figures 1 to 5, each beside what the paper reports and what came out here.
+
+    Everything is simulated: device and participants. Interrupted, the same command goes on.
+    """
+    import json
+
+    from analysis.reproduction.document import reproduction_to_json
+    from study.cli.progress import bar
+    from study.workflows.reproduce_paper import reproduce_paper
+    from study.workflows.reproduction_plan import ReproductionPlan
+
+    plan = ReproductionPlan(out, subjects=subjects, seed=seed, workers=workers)
+    with bar("Reproduction (%)", total=100) as show:
+        written = reproduce_paper(plan, lambda share: show(round(100 * share)))
+    if as_json:
+        document = {"report": str(written.report), **reproduction_to_json(written.reproduction)}
+        typer.echo(json.dumps(document, indent=2))
+    else:
+        for line in written.lines:
+            typer.echo(line)
+    typer.echo(f"Report: {written.report}", err=True)
