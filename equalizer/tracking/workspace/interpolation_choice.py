@@ -17,7 +17,7 @@ from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation,
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.place_weights import OUTSIDE_M, place_weights
-from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
+from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError, WorkspaceModels
 
 Interpolation = Literal["blended forces", "modal"]
 LINES = 300
@@ -41,7 +41,8 @@ class PlaceCheck:
     modal: Quality | None
     """None where resonances could not be matched without this place."""
     blended_error: float
-    """Largest singular value, over all lines, of what is delivered minus what is wanted; 0.01 = 1 %."""
+    """Root mean square over the lines of the largest singular value of delivered minus wanted; 0.01 = 1 %. Not the
+    worst line: where a resonance is missed at all, that is equally bad for everything."""
     modal_error: float | None
 
 
@@ -71,7 +72,11 @@ def choose_interpolation(
     workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
 ) -> InterpolationChoice:
     """With `held_out` by those; else each model that lies between the others is held out in turn, which judges a
-    coarser grid than the one that is used. Blended forces where nothing can be checked, or modes do not match."""
+    coarser grid than the one that is used. Blended forces where nothing can be checked, or modes do not match.
+
+    Raises WorkspaceError for a held-out place where one of the models was identified: it would judge nothing.
+    """
+    _check_apart(workspace, held_out)
     try:
         modal = modal_interpolation(workspace) if len(workspace) > 1 else None
     except ModesDoNotMatchError as error:
@@ -99,10 +104,19 @@ def _chosen(
         return InterpolationChoice("blended forces", reason, checks, workspace, None)
     worst = max(modal_errors)
     places = f"{len(checks)} place{'s' * (len(checks) > 1)} held out"
-    numbers = f"worst error at {places}: {100 * worst:.1f} % modal, {100 * blended:.1f} % blended"
+    numbers = f"error at {places}: {100 * worst:.1f} % modal, {100 * blended:.1f} % blended"
     if worst < blended:
         return InterpolationChoice("modal", f"resonances are interpolated ({numbers})", checks, workspace, modal)
     return InterpolationChoice("blended forces", f"forces are blended ({numbers})", checks, workspace, None)
+
+
+def _check_apart(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -> None:
+    for place in held_out:
+        apart = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
+        if apart.min() < OUTSIDE_M:
+            raise WorkspaceError(
+                f"the place held out is that of model {int(apart.argmin()) + 1}; hold out one between the models"
+            )
 
 
 def _left_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
@@ -136,4 +150,5 @@ def _delivered(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> Complex
 
 
 def _error(delivered: ComplexArray) -> float:
-    return float(np.linalg.norm(delivered - np.eye(delivered.shape[1]), ord=2, axis=(1, 2)).max())
+    largest = np.linalg.norm(delivered - np.eye(delivered.shape[1]), ord=2, axis=(1, 2))
+    return float(np.sqrt((largest**2).mean()))

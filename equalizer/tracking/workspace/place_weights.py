@@ -18,6 +18,9 @@ OUTSIDE_M = 1e-3
 SUM_TO_ONE = 1e6
 """Weight of that condition against distances, of order 1, when the nearest point of the hull is sought."""
 
+ROUNDING = 1e-6
+"""Points that count less count nothing: each costs a computation of its forces."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaceWeights:
@@ -84,7 +87,9 @@ def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
     if dimensions == 1:
         order = np.argsort(points[:, 0])
         along = points[order, 0]
-        return np.array([np.interp(place[0], along, one) for one in np.eye(count)[:, order]])
+        shares = np.array([np.interp(place[0], along, one) for one in np.eye(count)[:, order]])
+        shares[shares < ROUNDING] = 0.0
+        return shares / shares.sum()
     mesh = Delaunay(points)
     simplex = int(mesh.find_simplex(place, tol=1e-9))
     if simplex < 0:
@@ -94,6 +99,7 @@ def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
     transform = mesh.transform[simplex]
     first = np.clip(transform[:dimensions] @ (place - transform[dimensions]), 0.0, 1.0)
     corners = np.append(first, max(0.0, 1.0 - first.sum()))
+    corners[corners < ROUNDING] = 0.0
     weights = np.zeros(count)
     weights[mesh.simplices[simplex]] = corners / corners.sum()
     return weights

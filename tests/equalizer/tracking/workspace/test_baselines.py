@@ -1,0 +1,111 @@
+"""Ways to compute forces, at the centre, the edge and in a hand of the synthetic device."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.tracking.baselines import ours, raw_estimate, rigid_body
+from equalizer.tracking.comparison import baseline_inverses, compare
+from equalizer.tracking.quality import quality
+
+LINES = np.arange(5.0, 35.001, 0.1)
+NAMES = [
+    "nothing", "static gain", "acceleration matching", "rigid-body dynamics", "raw estimate", "identified model",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def measured(workspaces, plants):
+    return workspaces.measuring.swept(plants, plants.omega_like(), 1)
+
+
+@pytest.fixture(scope="module")
+def rows(plants, three, measured, workspaces):
+    hand = plants.omega_like(hand=True)
+    held = replace(ours(workspaces.identified(hand, 9, order=26), LINES), name="in the hand")
+    responses = {
+        "centre": plants.omega_like().response(LINES),
+        "edge": workspaces.plant(1.0).response(LINES),
+        "hand": hand.response(LINES),
+    }
+    found = compare(baseline_inverses(three.models[0], measured, LINES), responses, {"hand": [held]})
+    return {(row.where, row.name): row for row in found}
+
+
+def test_every_way_is_judged_at_every_place(rows):
+    assert list(rows)[:6] == [("centre", name) for name in NAMES]
+    assert len(rows) == 19
+    assert list(rows)[-1] == ("hand", "in the hand")
+
+
+def test_at_the_centre_the_identified_model_is_best(rows):
+    best = rows["centre", "identified model"].quality
+    assert best.flatness_db <= 0.1
+    assert best.coupling_db <= -40
+    others = [rows["centre", name].quality.coupling_db for name in NAMES[:-1]]
+    assert min(others) > best.coupling_db + 10
+
+
+def test_matching_each_axis_by_itself_flattens_and_leaves_the_coupling(rows):
+    matched, static = (rows["centre", name].quality for name in ("acceleration matching", "static gain"))
+    assert matched.flatness_db < 0.1 < static.flatness_db
+    assert matched.coupling_db == pytest.approx(static.coupling_db, abs=0.5)
+
+
+def test_a_rigid_model_does_not_hold_resonances_but_is_exact_for_a_rigid_device(rows, plants, workspaces):
+    assert rows["centre", "rigid-body dynamics"].quality.coupling_db > -12
+    rate, mass = 1e5, 0.3
+    step = 1 / rate
+    A = np.array([[1.0, step], [-40 * step / mass, 1 - 3 * step / mass]])
+    model = IdentifiedModel(
+        A, np.array([[0.0], [step / mass]]), np.array([[-40 / mass, -3 / mass]]), np.array([[1 / mass]]),
+        rate, (5.0, 35.0), "N", "m/s^2", ("fx",), ("ax",),
+    )  # fmt: skip
+    delivered = model_response(model, LINES) @ rigid_body(model, LINES).response
+    assert np.abs(delivered - 1).max() < 0.01
+
+
+def test_in_a_hand_the_free_model_loses_and_one_identified_there_wins_it_back(rows):
+    free, held = rows["hand", "identified model"].quality, rows["hand", "in the hand"].quality
+    assert free.flatness_db > 2
+    assert free.coupling_db > -15
+    assert held.flatness_db <= 0.5
+    assert held.coupling_db <= -30
+    assert held.axis_error_deg <= 2
+
+
+def test_costs_are_counted(rows, measured):
+    cost = {name: rows["centre", name].multiply_adds for name in NAMES}
+    assert cost == {
+        "nothing": 0,
+        "static gain": 3,
+        "acceleration matching": 3 * 41,
+        "rigid-body dynamics": 33,
+        "raw estimate": 9 * 30_000,
+        "identified model": 20**2 + 2 * 20 * 3 + 9,
+    }
+
+
+def test_a_raw_estimate_says_nothing_beyond_its_lines(measured):
+    with pytest.raises(ValueError, match="reliable lines from 4.5 to 37 Hz, but 30 to 40 Hz is wanted"):
+        raw_estimate(measured, np.array([30.0, 40.0]))
+    nowhere = measured.of_lines(measured.frequency_hz > 100)
+    with pytest.raises(ValueError, match="reliable lines"):
+        raw_estimate(nowhere, np.array([30.0]))
+
+
+@pytest.mark.slow
+def test_centre_and_hand_over_five_seeds(workspaces, plants, record_property):
+    for name, hand, limits in (("centre", False, (0.1, -40.0, 1.0)), ("hand", True, (0.5, -30.0, 2.0))):
+        plant = plants.omega_like(hand=hand)
+        truth = plant.response(LINES)
+        found = []
+        for seed in range(1, 6):
+            model = workspaces.identified(plant, 10 * seed + hand, order=26)
+            one = quality(truth @ ours(model, LINES).response)
+            found.append((one.flatness_db, one.coupling_db, one.axis_error_deg))
+        record_property(f"{name}: median, worst", f"{np.median(found, axis=0)}, {np.max(found, axis=0)}")
+        assert (np.max(found, axis=0) <= limits).all(), (name, found)
