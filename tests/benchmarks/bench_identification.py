@@ -84,7 +84,7 @@ def peer_rows(peers: list[Peer], data: list[Path], quick: bool) -> list[Row]:
         try:
             python = python_of(peer)
         except NotInstalledError as reason:
-            report(f"{peer.name:48} not installed: {reason}")
+            report(f"{peer.name:54} not installed: {reason}")
             continue
         told: dict[str, str] = {}
         for method in peer.methods:

@@ -38,10 +38,11 @@ PEERS = (
         "BSD-3-Clause",
         (
             Method("MOESP, 250 Hz", {"factor": 4, "rows": 30, "own": True}),
+            Method("MOESP, 500 Hz, 60 rows", {"factor": 2, "rows": 60, "own": True}),
             Method("MOESP A, C + our B, D, 125 Hz", {"factor": 8, "rows": 30, "own": False}, assisted=True),
-            Method("same, 250 Hz", {"factor": 4, "rows": 30, "own": False}, assisted=True),
-            Method("same, 500 Hz, 60 rows", {"factor": 2, "rows": 60, "own": False}, assisted=True),
-            Method("same, 1 kHz, 60 rows", {"factor": 1, "rows": 60, "own": False}, assisted=True),
+            Method("MOESP A, C + our B, D, 250 Hz", {"factor": 4, "rows": 30, "own": False}, assisted=True),
+            Method("MOESP A, C + our B, D, 500 Hz, 60 rows", {"factor": 2, "rows": 60, "own": False}, assisted=True),
+            Method("MOESP A, C + our B, D, 1 kHz, 60 rows", {"factor": 1, "rows": 60, "own": False}, assisted=True),
         ),
     ),
     Peer(
@@ -55,9 +56,9 @@ PEERS = (
         ("sippy_unipi==1.0.1", "numpy==2.4.6", "scipy==1.17.1", "control==0.10.2"),
         "LGPL-3.0-or-later",
         (
-            Method("N4SID, 125 Hz", {"factor": 8, "rows": 30, "method": "N4SID", "stability": False}),
+            Method("N4SID, 125 Hz", {"factor": 8, "rows": 30, "method": "N4SID", "stability": False}, seeds=2),
             Method("N4SID, 250 Hz", {"factor": 4, "rows": 30, "method": "N4SID", "stability": False}),
-            Method("CVA, 250 Hz", {"factor": 4, "rows": 30, "method": "CVA", "stability": False}, heavy=True),
+            Method("CVA, 250 Hz", {"factor": 4, "rows": 30, "method": "CVA", "stability": False}, seeds=2, heavy=True),
             Method(
                 "N4SID, made stable, 125 Hz", {"factor": 8, "rows": 30, "method": "N4SID", "stability": True}, seeds=2
             ),

@@ -33,7 +33,7 @@ def report(line: str) -> None:
 
 
 COLUMNS = ("seeds", "states", "CPU s", "stable", "rho", "rms", "worst", "line", "held out", "worst")
-HEAD = f"{'':48}" + "".join(f"{name:>9}" for name in COLUMNS)
+HEAD = f"{'':54}" + "".join(f"{name:>9}" for name in COLUMNS)
 
 
 def shown(row: Row) -> None:
@@ -44,17 +44,17 @@ def shown(row: Row) -> None:
             str(len(row.scores)),
             str(row.scores[0].states or "-"),
             f"{row.median('cpu_s'):.2f}",
-            f"{sum(one.stable for one in row.scores)}/{len(row.scores)}",
-            f"{max(one.radius for one in row.scores):.5f}",
+            f"{sum(one.stable for one in row.scores)}/{len(row.scores)}" if row.scores[0].states else "-",
+            f"{max(one.radius for one in row.scores):.5f}" if row.scores[0].states else "-",
             percent(row.rms),
             percent(max(one.rms[0] for one in row.scores)),
             percent(max(one.worst_line for one in row.scores)),
             percent(statistics.median(held_out)),
             percent(max(held_out)),
         )
-        report(f"{row.label:48}" + "".join(f"{cell:>9}" for cell in cells))
+        report(f"{row.label:54}" + "".join(f"{cell:>9}" for cell in cells))
     for failure in sorted(set(row.failures)):
-        report(f"{row.label:48} {row.failures.count(failure)} x failed: {failure}")
+        report(f"{row.label:54} {row.failures.count(failure)} x failed: {failure}")
 
 
 def percent(share: float) -> str:
