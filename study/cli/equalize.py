@@ -44,13 +44,22 @@ def equalize(
 
     Models of several places are interpolated at --at; a narrow and a wide one of one place play three bands.
     """
-    from study.errors import WrongUseError
     from study.workflows.equalize_trajectory import EqualizePlan
 
-    if len(files) < 2:
+    _require_whole(files, repeat, device, earlier)
+    *models, trajectory = files
+    plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
+    found, lines = _once(plan) if repeat is None or device is None else _repeated(plan, repeat, device, earlier, seed)
+    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
+
+
+def _require_whole(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:
+    from study.errors import WrongUseError
+
+    if len(files) < 2 or files[-1].suffix.lower() in (".h5", ".hdf5"):
         raise WrongUseError(
             "What shall be equalized?",
-            "A model and a table of wanted accelerations are needed.",
+            "Models are needed and, behind them, a table of wanted accelerations.",
             "Such as: hapteq equalize model.h5 wanted.csv --out forces.csv",
         )
     if (repeat is None) != (device is None) or (earlier is not None and repeat is None):
@@ -59,10 +68,6 @@ def equalize(
             "--repeat and --device go together, and --from only with them.",
             "Such as: hapteq equalize model.h5 wanted.csv --repeat 10 --device simulated --out forces.csv",
         )
-    *models, trajectory = files
-    plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
-    found, lines = _once(plan) if repeat is None or device is None else _repeated(plan, repeat, device, earlier, seed)
-    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
 
 
 def _once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":

@@ -160,6 +160,6 @@ def _not_equalized(happened: str) -> StudyError:
     return StudyError(
         "The forces were not computed",
         happened,
-        "Give a table at the model's rate, with something to play in the model's band.",
+        "Correct what is named, or give a table and a model that go together.",
         saved="Nothing was written.",
     )

@@ -9,7 +9,7 @@ WORTH_SAYING = 0.01
 
 
 def summary(done: EqualizedTrajectory) -> dict[str, Any]:
-    solved, bands, compensation, choice = done.solved, done.bands, done.compensation, done.models.choice
+    solved, bands, compensation = done.solved, done.bands, done.compensation
     found: dict[str, Any] = {
         "forces": str(done.plan.out),
         "band_hz": list(done.models.band_hz),
@@ -27,16 +27,7 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
             "error_capped": solved.loss.error_capped,
             "error_clipped": solved.loss.error_clipped,
         }
-    if choice is not None:
-        found["interpolation"] = choice.interpolation
-        found["held_out"] = [
-            {
-                "place_m": list(check.place_m),
-                "blended_worst_error": check.blended_error,
-                "modal_worst_error": check.modal_error,
-            }
-            for check in choice.checks
-        ]
+    found |= _interpolated(done)
     if bands is not None:
         found["bands"] = {
             "edges_hz": list(bands.edges_hz),
@@ -51,6 +42,23 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
         found["not_compensated"] = {effect.kind: why for effect, why in compensation.not_used}
         found["compensated_share"] = compensation.share
     return found
+
+
+def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
+    choice = done.models.choice
+    if choice is None:
+        return {}
+    return {
+        "interpolation": choice.interpolation,
+        "held_out": [
+            {
+                "place_m": list(check.place_m),
+                "blended_worst_error": check.blended_error,
+                "modal_worst_error": check.modal_error,
+            }
+            for check in choice.checks
+        ],
+    }
 
 
 def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:

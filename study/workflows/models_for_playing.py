@@ -60,6 +60,13 @@ class ModelsForPlaying:
 
 def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> ModelsForPlaying:
     """Raises StudyError for files that are no models, models that cannot play a table, or do not go together."""
+    if at_m is not None and not all(map(math.isfinite, at_m)):
+        raise WrongUseError(
+            "There is no such place",
+            f"--at is {', '.join(f'{part:g}' for part in at_m)}; a place is three numbers, in metres.",
+            "Such as --at 0.02 0 0.",
+            saved="Nothing was written.",
+        )
     models = tuple(read_identified_model(path) for path in paths)
     for path, model in zip(paths, models, strict=True):
         _check(path, model)

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.band_part import band_part
 from equalizer.tracking.convergence import Convergence
-from equalizer.tracking.iteration import LOWEST_GAIN, Verdict
+from equalizer.tracking.iteration import LOWEST_GAIN, Verdict, fitting_share
 from equalizer.tracking.model_inverse import under_spring
 from equalizer.tracking.virtual_spring import VirtualSpring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
@@ -56,6 +58,11 @@ def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnPro
     check_free(plan.out, beside(plan.out))
     solved = solve_trajectory(plan)
     _require_repeatable(solved.models)
+    if solved.solved.loss is not None:
+        raise _refused(
+            "The forces are at the cap already, so that there is no room to correct them.",
+            "Scale the accelerations, or leave out --constrain or --repeat.",
+        )
     spring = _acting_spring(solved.models)
     tested = convergence_at(solved.models.at, plan.weight, spring)
     gain = _gain(tested)
@@ -80,6 +87,7 @@ def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
     found = done.repeated
     return {
         **summary(done.solved),
+        "peak_n": _peak_n(found),
         "repeats": str(beside(done.solved.plan.out)),
         "errors": list(found.errors),
         "noise_floor": found.noise_floor,
@@ -93,15 +101,20 @@ def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
 
 def repeated_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
     found = done.repeated
-    # Whose forces are no longer only the model's, and are for the device under its spring.
-    lines = [*summary_lines(done.solved)[:-1], _tested_line(done)]
+    first, *more, _ = summary_lines(done.solved)  # the last is about forces that no spring adds to
+    lines = [f"By the model alone: {first[:1].lower()}{first[1:]}", *more, _tested_line(done)]
     for number, error in enumerate(found.errors):
         kept = ", kept" if number == found.kept else ""
         lines.append(f"Play {number}: error {100 * error:.2f} % as measured{kept}.")
     lines.append(f"Noise alone: {100 * found.noise_floor:.2f} %. {_verdict(done)}")
     if found.remark:
         lines.append(f"{found.remark[:1].upper()}{found.remark[1:]}.")
-    return (*lines, "These forces are for the device under the spring that they were played under.")
+    strongest = f"The highest of the kept forces is {_peak_n(found):.3g} N"
+    return (*lines, f"{strongest}; they are for the device under the spring that they were played under.")
+
+
+def _peak_n(found: Repeated) -> float:
+    return float(np.linalg.norm(found.forces.signal.samples, axis=1).max())
 
 
 def _verdict(done: RepeatedTrajectory) -> str:
@@ -191,12 +204,14 @@ def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSprin
     """None = the model's own, which the first play computes together with what follows the last row."""
     if order.earlier is not None:
         return earlier_forces(order.earlier, solved.wanted, solved.models.sha256)
-    if solved.compensation is None and solved.solved.loss is None:
+    if solved.compensation is None:
         return None
     rate_hz, band_hz = solved.wanted.signal.sample_rate_hz, solved.models.band_hz
     forces = solved.forces.signal.samples
     wanted = band_part(solved.wanted.signal.samples, rate_hz, band_hz)
-    return under_spring(lambda _: forces, spring, rate_hz, band_hz)(wanted)
+    held = under_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(wanted)
+    # Forces at the cap leave no room to carry the spring too; what then lacks is an error like any other.
+    return forces + fitting_share(forces, held, solved.plan.cap_n) * held
 
 
 def _refused(happened: str, do_now: str) -> StudyError:
