@@ -31,6 +31,18 @@ def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
     )
 
 
+def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
+    return Picture(
+        name="equalized-friction",
+        title="What friction costs",
+        caption="The same as above. First a swept sine, then all frequencies at once with the same peak force, so that "
+        "each has less: friction, which no linear model holds, makes the lines scatter. Last the same on a twin of the "
+        "simulated device without friction, with a model identified on that; the coupling left there is the "
+        "accelerometer's mounting error.",
+        figure=draw_played_responses(rows),
+    )
+
+
 def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
     """One row of panels for each, three columns."""
     if not rows:

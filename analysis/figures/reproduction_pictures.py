@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from analysis.ellipsoid import EllipsoidResult
 from analysis.figures.frequency_bands import frequency_bands_picture
 from analysis.figures.picture import Picture
-from analysis.figures.played_responses import played_responses_picture
+from analysis.figures.played_responses import friction_picture, played_responses_picture
 from analysis.figures.study_pictures import ellipsoid_picture, study_pictures
 from analysis.figures.transfer_functions import transfer_functions_picture
 from analysis.reproduction.equalized_findings import EqualizedRows
@@ -28,5 +28,5 @@ def reproduction_pictures(
         2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),
         3: (ellipsoid_picture(shapes),),
         4: (transfer_functions_picture(device.response),),
-        5: (played_responses_picture(rows.drawn),),
+        5: (played_responses_picture(rows.drawn), friction_picture(rows.of_friction)),
     }

@@ -37,6 +37,10 @@ class EqualizedRows:
         return self.plain, self.equalized, self.edge, self.edge_blended
 
     @property
+    def of_friction(self) -> tuple[PlayedResponse, ...]:
+        return self.equalized, self.broad, self.frictionless
+
+    @property
     def all(self) -> tuple[PlayedResponse, ...]:
         return (
             self.plain, self.equalized, self.edge_plain, self.edge, self.edge_blended, self.broad, self.frictionless,

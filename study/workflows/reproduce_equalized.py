@@ -74,12 +74,16 @@ def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playing
         "edge_plain": Playing("Not equalized, edge", not_equalized, EDGE),
         "edge": Playing("Edge, model of the centre", centre, EDGE),
         "edge_blended": Playing("Edge, models blended (ours)", through(blended), EDGE),
-        "broad_plain": Playing("Not equalized, centre", not_equalized, signal="multisine"),
-        "broad": Playing("Equalized, centre", centre, signal="multisine"),
-        "edge_broad": Playing("Edge, models blended (ours)", through(blended), EDGE, signal="multisine"),
-        "slick_plain": Playing("Not equalized, centre", not_equalized, device=FRICTIONLESS),
-        "slick": Playing("Equalized, centre", slick, device=FRICTIONLESS),
-        "frictionless": Playing("Equalized, centre", slick, device=FRICTIONLESS, signal="multisine"),
+        "broad_plain": Playing("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
+        "broad": Playing("Equalized, centre, all frequencies", centre, signal="multisine"),
+        "edge_broad": Playing(
+            "Edge, models blended (ours), all frequencies", through(blended), EDGE, signal="multisine"
+        ),
+        "slick_plain": Playing("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
+        "slick": Playing("Equalized, centre, without friction", slick, device=FRICTIONLESS),
+        "frictionless": Playing(
+            "Equalized, centre, all frequencies, without friction", slick, device=FRICTIONLESS, signal="multisine"
+        ),
     }
 
 

@@ -1,14 +1,18 @@
 """The published figures from small protocols: whole, gone on with, and refused."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from analysis.reproduction.document import ReproductionError, reproduction_from_json
 from study.errors import LeftError, StudyError
 from study.store.file_errors import UnusableFileError
+from study.store.recording_file import read_recording, write_recording
 from study.store.reproduction_file import read_reproduction
+from study.workflows.reproduce_models import modelled
 from study.workflows.reproduce_paper import reproduce_paper
+from study.workflows.reproduce_recordings import Wanted, recorded
 from study.workflows.reproduction_plan import ReproducedProtocols, ReproductionPlan, Steps
 from study.workflows.validate import validate_file
 
@@ -45,7 +49,7 @@ def plan(tmp_path_factory, small_text) -> ReproductionPlan:
         (folder / f"{name}.toml").write_text(text)
     paths = {name: str(folder / f"{name}.toml") for name in texts}
     protocols = ReproducedProtocols(**paths)
-    return ReproductionPlan(folder / "out", 2, 3, 2, protocols, order=8, period_s=2.0)
+    return ReproductionPlan(folder / "out", 2, 3, 1, protocols, order=8, period_s=2.0)
 
 
 @pytest.fixture(scope="module")
@@ -100,10 +104,41 @@ def test_friction_is_named_and_its_twin_stands_beside_it(written):
 
 
 def test_the_next_run_takes_what_is_there(written, plan):
-    kept = {path: path.stat().st_mtime_ns for folder in (plan.recordings, plan.models) for path in folder.iterdir()}
-    again = reproduce_paper(plan, lambda share: None)
-    assert again.reproduction == written.reproduction
-    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    files = [folder / "centre.h5" for folder in (plan.recordings, plan.models)]
+    kept = [path.stat().st_mtime_ns for path in files]
+    found = recorded(plan, Wanted("centre", plan.protocols.band), lambda share: None)
+    assert modelled(plan, found, lambda share: None).model.order == 8
+    assert [path.stat().st_mtime_ns for path in files] == kept
+
+
+def test_a_part_of_a_recording_is_made_again(written, plan):
+    path = plan.recordings / "ellipsoid.h5"
+    whole = read_recording(path)
+    path.unlink()
+    write_recording(path, replace(whole, meta={**whole.meta, "interrupted": True}))
+    found = recorded(plan, Wanted("ellipsoid", "ellipsoid"), lambda share: None)
+    assert not found.recording.meta["interrupted"]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "why"),
+    [
+        (Wanted("ellipsoid", "sweep"), "it follows another protocol"),
+        (Wanted("ellipsoid", "ellipsoid", (0.0, 0.0, 0.01)), "it was made at another place"),
+    ],
+)
+def test_another_recording_of_that_name_is_refused(written, plan, wanted, why):
+    with pytest.raises(StudyError, match=f"holds another reproduction.*{why}"):
+        recorded(plan, wanted, lambda share: None)
+
+
+def test_a_recording_that_cannot_be_read_is_left_alone(plan, tmp_path):
+    other = replace(plan, out=tmp_path)
+    other.recordings.mkdir()
+    (other.recordings / "centre.h5").write_text("no recording")
+    with pytest.raises(StudyError, match="it cannot be read"):
+        recorded(other, Wanted("centre", plan.protocols.band), lambda share: None)
+    assert (other.recordings / "centre.h5").read_text() == "no recording"
 
 
 def test_another_seed_in_the_same_folder_is_refused(written, plan):
