@@ -2,6 +2,9 @@
 
 from typing import Any
 
+import numpy as np
+
+from equalizer.tracking.feedforward import within_band
 from study.workflows.equalize_trajectory import EqualizedTrajectory
 
 WORTH_SAYING = 0.01
@@ -81,9 +84,20 @@ def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
             f"The cap costs: error {100 * loss.error_capped:.1f} % instead of {100 * loss.error_free:.1f} % "
             f"(clipping would have given {100 * loss.error_clipped:.1f} %)."
         )
+        if (outside := _force_outside(done)) > WORTH_SAYING and done.bands is None:
+            lines.append(
+                f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
+                "band, where the model does not know what the device makes of it."
+            )
     lines += _physics_lines(done)
     lines.append(_spring_line(done))
     return tuple(lines)
+
+
+def _force_outside(done: EqualizedTrajectory) -> float:
+    forces = done.forces.signal.samples
+    outside = forces - within_band(done.models.nearest, forces)
+    return float(np.linalg.norm(outside) / np.linalg.norm(forces))
 
 
 def _band_lines(done: EqualizedTrajectory) -> list[str]:

@@ -105,6 +105,7 @@ def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(p
     assert np.linalg.norm(read_trajectory(loud.out).signal.samples, axis=1).max() <= 3.0
     assert summary(done)["capped"]["error_capped"] > summary(done)["capped"]["error_free"]
     assert any(line.startswith("The cap costs: error") for line in summary_lines(done))
+    assert any("held at the cap have corners" in line for line in summary_lines(done))
 
 
 def test_models_of_several_places_need_a_place(plan):
