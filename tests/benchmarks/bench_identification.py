@@ -26,7 +26,7 @@ from table_rows import HEAD, Row, percent, report, shown
 
 ROOT = Path(__file__).resolve().parents[2]
 RUNNERS = Path(__file__).resolve().parent / "peers"
-PATIENCE_S = 420.0
+PATIENCE_S = 240.0
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "JAX_PLATFORMS": "cpu"}
 
 OURS = "run_hapteq.py"

@@ -49,7 +49,7 @@ PEERS = (
         "nfoursid",
         ("nfoursid==1.0.2", "numpy==2.4.6", "pandas==3.1.1"),
         "MIT",
-        (Method("N4SID, 125 Hz, 120 s of 180 s", {"factor": 8, "rows": 30}, seeds=1, heavy=True),),
+        (Method("N4SID, 125 Hz, 120 of 180 s", {"factor": 8, "rows": 30}, seeds=1, heavy=True),),
     ),
     Peer(
         "sippy_unipi",
@@ -68,7 +68,7 @@ PEERS = (
         "jax-sysid",
         ("jax-sysid==1.1.0", "jax==0.4.31", "jaxlib==0.4.31", "numpy==2.2.6", "scipy==1.14.1"),
         "Apache-2.0",
-        (Method("500 Adam + 2000 L-BFGS, 125 Hz", {"factor": 8, "adam": 500, "lbfgs": 2000}, seeds=1, heavy=True),),
+        (Method("300 Adam + 300 L-BFGS, 125 Hz", {"factor": 8, "adam": 300, "lbfgs": 300}, seeds=1, heavy=True),),
     ),
     Peer(
         "scikit-rf",
