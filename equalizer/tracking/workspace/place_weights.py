@@ -89,7 +89,7 @@ def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
         along = points[order, 0]
         shares = np.array([np.interp(place[0], along, one) for one in np.eye(count)[:, order]])
         shares[shares < ROUNDING] = 0.0
-        return shares / shares.sum()
+        return np.asarray(shares / shares.sum())
     mesh = Delaunay(points)
     simplex = int(mesh.find_simplex(place, tol=1e-9))
     if simplex < 0:

@@ -98,7 +98,10 @@ def test_a_raw_estimate_says_nothing_beyond_its_lines(measured):
 
 
 @pytest.mark.slow
-def test_centre_and_hand_over_five_seeds(workspaces, plants, record_property):
+@pytest.mark.timeout(900)
+def test_centre_and_hand_over_five_seeds(workspaces, plants):
+    """Median and worst of 2026-11: centre 0.02, 0.03 dB and -51.6, -50.5 dB; hand 0.02, 0.03 dB and -46.2, -44.1 dB,
+    0.23 and 0.36 degrees."""
     for name, hand, limits in (("centre", False, (0.1, -40.0, 1.0)), ("hand", True, (0.5, -30.0, 2.0))):
         plant = plants.omega_like(hand=hand)
         truth = plant.response(LINES)
@@ -107,5 +110,4 @@ def test_centre_and_hand_over_five_seeds(workspaces, plants, record_property):
             model = workspaces.identified(plant, 10 * seed + hand, order=26)
             one = quality(truth @ ours(model, LINES).response)
             found.append((one.flatness_db, one.coupling_db, one.axis_error_deg))
-        record_property(f"{name}: median, worst", f"{np.median(found, axis=0)}, {np.max(found, axis=0)}")
         assert (np.max(found, axis=0) <= limits).all(), (name, found)

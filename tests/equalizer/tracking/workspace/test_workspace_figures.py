@@ -32,7 +32,10 @@ def test_blended_forces_are_a_safe_second_and_the_model_of_the_centre_is_bad(wor
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [20, 26])
-def test_figures_of_the_workspace_over_five_seeds(workspaces, order, record_property):
+@pytest.mark.timeout(900)
+def test_figures_of_the_workspace_over_five_seeds(workspaces, order):
+    """Median and worst of 2026-11, either order alike: three 0.05, 0.06 dB and -49, -48 dB; bent 0.35, 0.37 dB and
+    -34.7, -34.4 dB; five 0.05, 0.05 dB and -49, -48 dB."""
     found = {"three": [], "three, bent": [], "five": []}
     for seed in SEEDS:
         five = workspaces.models((0.0, 0.25, 0.5, 0.75, 1.0), seed, order=order)
@@ -44,7 +47,6 @@ def test_figures_of_the_workspace_over_five_seeds(workspaces, order, record_prop
         found["five"].append(workspaces.worst(modal_interpolation(five).at))
     for name, rows in found.items():
         numbers = np.array([(row.flatness_db, row.coupling_db) for row in rows])
-        record_property(f"{name}: median, worst", f"{np.median(numbers, axis=0)}, {numbers.max(axis=0)}")
         flat, coupled = (0.3, -35) if name == "five" else (0.5, -28)
         assert numbers[:, 0].max() <= flat, (name, numbers)
         assert numbers[:, 1].max() <= coupled, (name, numbers)
