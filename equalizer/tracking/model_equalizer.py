@@ -54,7 +54,7 @@ class ModelEqualizer:
         """What the spring does by itself: it comes in with the same envelope as the motion."""
         alone = loop.samples - self.periodic(wanted).samples
         ticks = np.arange(len(envelope)) % len(wanted)
-        spring: FloatArray = envelope[:, None] ** 2 * alone[ticks]
+        spring: FloatArray = envelope[:, None] * alone[ticks]
         return spring
 
 
