@@ -18,7 +18,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 UNEXPLAINED = 1.5
-"""Residual over noise above which a model is said to leave something."""
+"""Cost above which a model is said to leave more than noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +152,7 @@ def _model(
         provenance={
             "method": "subspace identification, refined by maximum likelihood on the lines of the response",
             "start": chosen.name,
-            "residual_over_noise": cost,
+            "residual_over_noise": float(np.sqrt(cost)),
             "longest_decay_s": settings.longest_decay_s,
         },
     )

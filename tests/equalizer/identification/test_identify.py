@@ -40,6 +40,7 @@ def test_the_device_is_found_from_noisy_sweeps_within_a_fifth_of_a_percent(plant
 
 def test_what_is_left_is_noise_and_the_model_knows_its_own_error(measuring, centre, found):
     assert found.cost == pytest.approx(1.0, abs=0.05)
+    assert found.model.provenance["residual_over_noise"] == pytest.approx(np.sqrt(found.cost))
     assert found.expected_error == pytest.approx(measuring.errors_of(found.model, centre, GRID)[0], rel=0.35)
 
 
