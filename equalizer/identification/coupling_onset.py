@@ -45,7 +45,8 @@ class CouplingOnset:
     frequency_hz: float | None
     """None: no coupling as far as the lines are reliable."""
     interval_hz: tuple[float, float] | None
-    """95 %, from resampled noise; None where the noise is not known."""
+    """95 %, from resampled noise and half a line to either side, which no noise tells; None where the noise is not
+    known."""
     from_the_start: bool
     """Coupled at the lowest reliable line already: the onset may lie below."""
     threshold: float
@@ -74,7 +75,7 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     near = lines.frequency_hz <= max(_LOOKED_BEYOND * found, lines.frequency_hz[2 * rule.neighbours])
     known = bool(np.isfinite(lines.noise_variance).all())
     drawn = _resampled(lines.of_lines(near), smooth[near], told[near], rule) if known else None
-    interval = None if drawn is None else _bias_corrected(found, drawn)
+    interval = None if drawn is None else _with_resolution(_bias_corrected(found, drawn), lines.frequency_hz, found)
     return CouplingOnset(found, interval, bool(found == lines.frequency_hz[told][0]), rule.threshold, rule.sentence)
 
 
@@ -122,6 +123,12 @@ def _resampled(lines: FrequencyResponse, smooth: ComplexArray, told: BoolArray, 
         onset = _onset(lines.frequency_hz[told], worst_coupling(drawn[told]), rule)
         onsets.append(float(lines.frequency_hz[-1]) if onset is None else onset)
     return np.array(onsets)
+
+
+def _with_resolution(interval_hz: tuple[float, float], frequency_hz: FloatArray, found: float) -> tuple[float, float]:
+    at = int(np.clip(np.searchsorted(frequency_hz, found), 1, len(frequency_hz) - 1))
+    half = float(frequency_hz[at] - frequency_hz[at - 1]) / 2
+    return interval_hz[0] - half, interval_hz[1] + half
 
 
 def _bias_corrected(found: float, onsets: FloatArray) -> tuple[float, float]:

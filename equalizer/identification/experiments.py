@@ -14,6 +14,8 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
+TRANSIENT_S = 5.0
+"""Of a first period. Ten time constants of the slowest pole that a model may have: e^-10 of the transient is left."""
 _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
 
 
@@ -27,10 +29,26 @@ class Experiment:
     """(looks, lines, outputs)"""
     instrument: ComplexArray
     """(looks, lines, inputs): the excitation, where it was recorded, else the command."""
+    borrowed: float = 0.0
+    """Share of the last look's samples that are the mean of the others."""
 
     @property
     def looks(self) -> int:
         return len(self.command)
+
+    @property
+    def independent_looks(self) -> float:
+        """So many would have a mean as good."""
+        if not self.borrowed:
+            return float(self.looks)
+        return 1 / ((1 - self.borrowed) / self.looks + self.borrowed / (self.looks - 1))
+
+    @property
+    def spread_seen(self) -> float:
+        """Share of the noise power that differs between looks."""
+        if not self.borrowed:
+            return 1.0
+        return 1 - self.borrowed / (self.looks - 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +66,8 @@ def instrument_of(recording: Recording) -> FloatArray:
 
 
 def periodic_looks(recordings: Sequence[Recording]) -> Looks:
-    """Whole periods of every periodic broadband segment that is not kept for testing. The first period holds the
-    transient and is dropped, unless it is the only one; periods with missing samples are dropped too."""
+    """Whole periods of every periodic broadband segment that is not kept for testing. Of the first, the transient is
+    left out and what comes after it is used, unless it is the only one; periods with missing samples are dropped."""
     experiments: list[Experiment] = []
     alone, gaps = 0, 0
     for recording in recordings:
@@ -62,7 +80,10 @@ def periodic_looks(recordings: Sequence[Recording]) -> Looks:
             counted = [start for start in whole if start != segment.start] or whole
             alone += counted == [segment.start]
             if counted:
-                experiments.append(_experiment(recording, counted, segment.period, np.ones(segment.period)))
+                one = _experiment(recording, counted, segment.period, np.ones(segment.period))
+                over = round(TRANSIENT_S * recording.sample_rate_hz)
+                first_too = segment.start in whole and counted != whole and segment.period >= 2 * over
+                experiments.append(_with_first(recording, one, counted, segment.start, over) if first_too else one)
     remarks = []
     if alone:
         remarks.append(f"{_segments(alone)} had one usable period only: it was kept, with its transient.")
@@ -110,6 +131,25 @@ def _experiment(recording: Recording, starts: Sequence[int], length: int, window
         spectra(recording.command.samples),
         spectra(recording.response.samples),
         spectra(instrument_of(recording)),
+    )
+
+
+def _with_first(recording: Recording, one: Experiment, counted: Sequence[int], first: int, over: int) -> Experiment:
+    """The first period as one more look. Until its transient is over it borrows the mean of the others: linear as the
+    plant is, command and response then are those of the steady state throughout."""
+
+    def spectra(samples: FloatArray) -> ComplexArray:
+        look = samples[first : first + one.length].copy()
+        look[:over] = np.mean([samples[start : start + over] for start in counted], axis=0)
+        spectrum = np.fft.rfft(look - look.mean(axis=0), axis=0)[1 : (one.length + 1) // 2] / one.length
+        return np.asarray(spectrum[None], dtype=np.complex128)
+
+    return Experiment(
+        one.length,
+        np.concatenate([one.command, spectra(recording.command.samples)]),
+        np.concatenate([one.response, spectra(recording.response.samples)]),
+        np.concatenate([one.instrument, spectra(instrument_of(recording))]),
+        borrowed=over / one.length,
     )
 
 

@@ -79,7 +79,9 @@ def solve_shared_lines(
 
 def _columns(experiments: Sequence[Experiment]) -> _Columns:
     def stacked(name: str) -> ComplexArray:
-        weighted = [getattr(one, name).mean(axis=0) * np.sqrt(one.length * one.looks) for one in experiments]
+        weighted = [
+            getattr(one, name).mean(axis=0) * np.sqrt(one.length * one.independent_looks) for one in experiments
+        ]
         return np.stack(weighted, axis=2)
 
     power = sum(one.length * np.mean(np.abs(one.response) ** 2, axis=0) for one in experiments)
@@ -103,7 +105,7 @@ def _density_of_looks(experiments: Sequence[Experiment], kept: BoolArray, respon
     found: list[FloatArray | None] = []
     for one in experiments:
         residuals = one.response[:, kept] - np.einsum("lpm,klm->klp", response, one.command[:, kept])
-        found.append(one.length * spread_over_looks(residuals) if one.looks > 1 else None)
+        found.append(one.length * spread_over_looks(residuals) / one.spread_seen if one.looks > 1 else None)
     known = [density for density in found if density is not None]
     if not known:
         return None

@@ -91,6 +91,7 @@ def _cut(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64
         experiment.command[:, lines],
         experiment.response[:, lines],
         experiment.instrument[:, lines],
+        experiment.borrowed,
     )
 
 
