@@ -7,15 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.equalizer import Equalizer, Identity
 from equalizer.tracking.model_equalizer import ModelEqualizer
+from equalizer.tracking.periodic_inverse import inverse_response
 from equalizer.tracking.virtual_spring import VirtualSpring
 from protocols.study_protocol import StudyProtocol
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
 from study.session.level_scale import EqualizedFacts, LevelScale
-from study.session.limits import limits_of_study
+from study.session.limits import SPRING_SLEW_N_PER_S, limits_of_study
 from study.session.state import SessionState
 from study.session.stimulus import direction_vector, held_stimulus
 from study.store.archive import SessionFolder
@@ -27,6 +29,11 @@ from study.workflows.spring_beside_model import spring_beside
 MODEL_NAME = "model.h5"
 NEAR_M = 0.02
 """A model from a place farther away is of another device: by then the published coupling is back."""
+
+AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
+IDENTIFY_AGAIN = "Identify it again with hapteq identify."
+LEFT_OUT = 0.1
+"""Of a wanted acceleration, by the model itself: beyond this a level would not stand for what it says."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +74,11 @@ def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceI
     if model is None:
         return NOT_EQUALIZED
     equalizer = _equalizer(read_identified_model(model), protocol, info)
-    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), level_scales(protocol, equalizer, info.sample_rate_hz))
+    try:
+        scales = level_scales(protocol, equalizer, info.sample_rate_hz)
+    except (ValueError, ArithmeticError) as error:  # what linear algebra says of a model that is none
+        raise _refused(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
+    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales)
     return Equalized(equalizer, facts, model)
 
 
@@ -107,12 +118,12 @@ def _hardest(
     protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
 ) -> float:
     """The peak force for 1 m/s² or, where it is the slew limit that comes first, the force that stands for that."""
-    limits = limits_of_study(protocol)
+    limits, cap_n = limits_of_study(protocol), protocol.staircase.cap_n
     vector = direction_vector(protocol.directions, direction)
     stimulus = held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
     forces = stimulus.played_once_then_loop
     steps = np.diff(np.concatenate([np.zeros((1, 3)), forces, stimulus.loop.samples[:1]]), axis=0)
-    slewing_n = _largest(steps) * rate_hz / limits.slew_n_per_s * limits.stimulus_cap_n
+    slewing_n = _largest(steps) * rate_hz / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S) * cap_n
     return max(_largest(forces), slewing_n)
 
 
@@ -140,7 +151,7 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
             "Identify a model from a recording of all three axes.",
         )
     if model.spectral_radius >= 1:
-        raise _refused(f"The model in {path} is not stable.", "Identify it again with hapteq identify.")
+        raise _refused(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
     low, high = model.band_hz
     outside = [f"{f:g}" for f in protocol.all_frequencies_hz if not low <= f <= high]
     if outside:
@@ -152,6 +163,32 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
         raise _refused(
             f"{path} was identified at {model.place_m} m, and the study is at the centre.",
             "Record and identify at the centre of the workspace.",
+        )
+    _check_axes(model, path)
+    _check_reach(model, protocol, path)
+
+
+def _check_axes(model: IdentifiedModel, path: Path) -> None:
+    """Other names may be anybody's; ours in another order would send forces along the wrong axes."""
+    for names, ours in zip((model.input_channels, model.output_channels), AXES, strict=True):
+        if set(names) == set(ours) and names != ours:
+            raise _refused(
+                f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order {', '.join(ours)}.",
+                "Identify a model from a recording whose channels are in that order.",
+            )
+
+
+def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    frequency_hz = np.array(protocol.all_frequencies_hz)
+    wanted = np.stack([direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
+    with np.errstate(all="ignore"):
+        reached = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ wanted
+        left_out = np.linalg.norm(reached - wanted, axis=1).max(axis=1)
+    beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LEFT_OUT]
+    if beyond:
+        raise _refused(
+            f"By {path} itself, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",
+            "Check units and axes of the recording it was made from, and identify it again.",
         )
 
 

@@ -65,6 +65,15 @@ def test_both_directions_are_wanted_equally_strong_and_the_harder_one_reaches_th
     assert at_35_hz.n_per_mps2 == pytest.approx(np.sqrt((0.4**2 + 0.5**2) / 2), rel=0.05)
 
 
+def test_a_level_is_the_highest_force_where_the_safety_cap_lies_above_that_of_the_staircase(plan):
+    staircase, demo = replace(plan.protocol.staircase, cap_n=1.0, start_n=0.5), replace(plan.protocol.demo, level_n=0.5)
+    practice = replace(plan.protocol.practice, level_n=0.5)
+    lower = replace(plan.protocol, staircase=staircase, demo=demo, practice=practice)
+    model = ModelEqualizer(rigid())
+    levels, as_before = level_scales(lower, model, 1000.0), level_scales(plan.protocol, model, 1000.0)
+    assert [s.n_per_mps2 for s in levels] == pytest.approx([s.n_per_mps2 for s in as_before])
+
+
 def test_what_is_within_reach_is_shown(conducted):
     facts = dict(session_facts(fold_session(conducted.folder)))
     reach = {scale.frequency_hz: scale.reachable_mps2 for scale in conducted.state.opened.equalized.levels}
@@ -141,6 +150,11 @@ def equalized_levels(plan, provenance) -> list[float]:
         ({"sample_rate_hz": 2000.0}, "runs at 2000 Hz, the device at 1000 Hz"),
         ({"place_m": (0.05, 0.0, 0.0)}, "and the study is at the centre"),
         ({"output_unit": "m"}, "three accelerations in m/s^2"),
+        ({"B": np.zeros((3, 3))}, "no reasonable force gives the wanted acceleration at 5, 25, 35 Hz"),
+        ({"C": 1e-7 * np.eye(3)}, "no reasonable force"),
+        ({"C": 1e200 * np.eye(3)}, "no reasonable force"),
+        ({"C": np.diag([1.0, 1.0, 0.0])}, "no reasonable force"),
+        ({"input_channels": ("fz", "fy", "fx")}, "in the order fx, fy, fz"),
     ],
 )
 def test_a_model_of_something_else_is_refused(plan, changes, said):
