@@ -18,6 +18,8 @@ OUTSIDE_M = 1e-3
 SUM_TO_ONE = 1e6
 """Weight of that condition against distances, of order 1, when the nearest point of the hull is sought."""
 
+BEND = 0.35
+"""Of the smooth functions, per distance between neighbours: smaller is closer to a parabola."""
 ROUNDING = 1e-6
 """Points that count less count nothing: each costs a computation of its forces."""
 
@@ -106,6 +108,9 @@ def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _smooth(points: FloatArray, place: FloatArray) -> FloatArray:
-    """Cubic radial functions with a linear part: along a line the natural cubic spline."""
-    cardinal = RBFInterpolator(points, np.eye(len(points)), kernel="cubic", degree=1)
+    """Multiquadric radial functions with a linear part. Their width makes them nearly parabolas between three points:
+    a cubic spline's curvature vanishes at the outer ones, where a device's need not."""
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    nearest = np.median(np.partition(apart, 1, axis=1)[:, 1])
+    cardinal = RBFInterpolator(points, np.eye(len(points)), kernel="multiquadric", epsilon=BEND / nearest, degree=1)
     return np.asarray(cardinal(place[None])[0])

@@ -79,6 +79,13 @@ def test_smooth_weights_follow_a_curve_where_linear_ones_cut_it_off():
     assert abs(place_weights(points, (0.03, 0, 0)).linear @ bent - 1) > 0.1
 
 
+def test_between_three_points_a_parabola_is_followed_better_than_a_cubic_spline_does():
+    points = np.array([[0.0, 0, 0], [0.03, 0, 0], [0.06, 0, 0]])
+    along = np.linspace(0, 0.06, 25)
+    found = np.array([place_weights(points, (x, 0, 0)).smooth @ (points[:, 0] / 0.06) ** 2 for x in along])
+    assert np.abs(found - (along / 0.06) ** 2).max() < 0.01 < 0.074 / 4
+
+
 def test_one_point_counts_everywhere():
     weights = place_weights(LINE[:1], (0.0, 0.01, 0.05))
     assert weights.linear.tolist() == [1.0]

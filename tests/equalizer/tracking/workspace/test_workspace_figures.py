@@ -18,8 +18,8 @@ def test_between_three_models_the_worst_place_is_flat_and_uncoupled(workspaces, 
 
 def test_also_where_modes_do_not_change_linearly_along_the_way(workspaces, three_bent):
     worst = workspaces.worst(modal_interpolation(three_bent).at, bend=1.0)
-    assert worst.flatness_db <= 0.5
-    assert worst.coupling_db <= -28
+    assert worst.flatness_db <= 0.3
+    assert worst.coupling_db <= -32
 
 
 def test_blended_forces_are_a_safe_second_and_the_model_of_the_centre_is_bad(workspaces, three):
@@ -34,8 +34,8 @@ def test_blended_forces_are_a_safe_second_and_the_model_of_the_centre_is_bad(wor
 @pytest.mark.parametrize("order", [20, 26])
 @pytest.mark.timeout(900)
 def test_figures_of_the_workspace_over_five_seeds(workspaces, order):
-    """Median and worst of 2026-11, either order alike: three 0.05, 0.06 dB and -49, -48 dB; bent 0.35, 0.37 dB and
-    -34.7, -34.4 dB; five 0.05, 0.05 dB and -49, -48 dB."""
+    """Median and worst of 2026-11, either order alike: three 0.04, 0.05 dB and -49, -48 dB; bent 0.16, 0.16 dB and
+    -36.4, -36.2 dB; five 0.05, 0.06 dB and -49, -48 dB."""
     found = {"three": [], "three, bent": [], "five": []}
     for seed in SEEDS:
         five = workspaces.models((0.0, 0.25, 0.5, 0.75, 1.0), seed, order=order)
