@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -67,9 +67,7 @@ def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: flo
             "Such as --at 0.02 0 0.",
             saved="Nothing was written.",
         )
-    models = tuple(read_identified_model(path) for path in paths)
-    for path, model in zip(paths, models, strict=True):
-        _check(path, model)
+    models = tuple(_readable(path) for path in paths)
     if len(models) == 1:
         return _one(paths, models[0], at_m)
     if _of_one_place(models):
@@ -136,20 +134,23 @@ def _several_places(
     return ModelsForPlaying(workspace.models, at, None, choice, tuple(remarks), _sha256(paths, at_m))
 
 
-def _check(path: Path, model: IdentifiedModel) -> None:
-    found = (model.input_channels, model.output_channels, model.input_unit, model.output_unit)
-    if found != (FORCES.header[1:], TRAJECTORY.header[1:], FORCES.unit, TRAJECTORY.unit):
+def _readable(path: Path) -> IdentifiedModel:
+    """With its channels named as a table's: others may name them otherwise, such as x, y, z."""
+    model = read_identified_model(path)
+    axes = ["".join(name[-1:] for name in names).lower() for names in (model.input_channels, model.output_channels)]
+    if (axes, model.input_unit, model.output_unit) != (["xyz", "xyz"], FORCES.unit, TRAJECTORY.unit):
         raise _unfit(
             f"{path.name} goes from {', '.join(model.input_channels)} in {model.input_unit} to "
             f"{', '.join(model.output_channels)} in {model.output_unit}; a table needs a model from fx, fy, fz in N to "
-            "ax, ay, az in m/s^2.",
-            "Identify one from recordings of all three axes, with these channel names.",
+            "ax, ay, az in m/s^2, in this order.",
+            "Identify one from recordings of all three axes, with channel names that end in x, y and z.",
         )
     if model.spectral_radius >= 1:
         raise _unfit(
             f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
             "Identify it again with hapteq identify, which makes stable ones only.",
         )
+    return replace(model, input_channels=FORCES.header[1:], output_channels=TRAJECTORY.header[1:])
 
 
 def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:

@@ -278,12 +278,23 @@ def test_unusable_tables_and_missing_files_are_named(plan, tmp_path):
 def test_models_that_cannot_play_a_table_are_refused(plants, plan, tmp_path):
     good = model_of(plants.omega_like(0.1))
     wrong = {
-        "turned.h5": (replace(good, input_channels=("tx", "ty", "tz")), "a table needs a model from fx, fy, fz in N"),
+        "turned.h5": (replace(good, input_channels=("fy", "fx", "fz")), "a table needs a model from fx, fy, fz in N"),
+        "torques.h5": (replace(good, input_unit="N m"), "goes from fx, fy, fz in N m to ax, ay, az in m/s^2"),
         "unstable.h5": (replace(good, A=good.A * 1.1 / good.spectral_radius), "is not stable (slowest pole 1.1"),
     }
     for name, (model, said) in wrong.items():
         write_identified_model(tmp_path / name, model)
         assert said in refusal(replace(plan, models=(tmp_path / name,))).happened
+
+
+def test_channels_may_be_named_otherwise(plants, plan, tmp_path):
+    named = replace(
+        model_of(plants.omega_like(0.1)), input_channels=("x", "y", "z"), output_channels=("AX", "AY", "AZ")
+    )
+    write_identified_model(tmp_path / "named.h5", named)
+    ours = equalize_trajectory(plan)
+    theirs = equalize_trajectory(replace(plan, models=(tmp_path / "named.h5",), out=tmp_path / "theirs.csv"))
+    np.testing.assert_array_equal(theirs.forces.signal.samples, ours.forces.signal.samples)
 
 
 def test_models_that_do_not_go_together_are_refused(plants, plan, tmp_path):
