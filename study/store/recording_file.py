@@ -91,6 +91,7 @@ def _rate(file: Any) -> float:
 def _signal(file: Any, name: str, rate_hz: float) -> Signal:
     samples = float_dataset(file, name, "(samples, channels)")
     quantity, unit, channels = (texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
+    channels = _one_each(channels, samples.shape[1])
     try:
         signal = Signal(samples, rate_hz, text_or_list(quantity), text_or_list(unit), channels)
     except ValueError as error:
@@ -105,6 +106,14 @@ def _signal(file: Any, name: str, rate_hz: float) -> Signal:
         scale.append(parsed.factor)
         si.append(parsed.si)
     return Signal(samples * np.array(scale), rate_hz, signal.quantity, tuple(si), channels)
+
+
+def _one_each(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
+    """One text for several columns lists their names, or is a name that all of them share and that is numbered."""
+    if len(channels) != 1 or columns < 2:
+        return channels
+    names = tuple(channels[0].replace(",", " ").split())
+    return names if len(names) == columns else tuple(f"{channels[0]} {number + 1}" for number in range(columns))
 
 
 def _time_s(file: Any) -> FloatArray | None:

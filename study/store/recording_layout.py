@@ -23,7 +23,9 @@ LAYOUT = (
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
     Entry("unit", "attribute, text or list", "likewise; converted to SI on reading"),
-    Entry("channels", "attribute, list of text", "one name per column"),
+    Entry(
+        "channels", "attribute, text or list", "one name per column; one text lists them (`fx, fy, fz`), or is numbered"
+    ),
 )
 SEGMENT_FIELDS = (
     Entry("start", "whole number", "first sample"),

@@ -216,6 +216,15 @@ def dataset(name, data):
 
 
 @pytest.mark.parametrize(
+    ("said", "read"), [("x, y", ("x", "y")), ("x y", ("x", "y")), ("handle", ("handle 1", "handle 2"))]
+)
+def test_one_text_may_name_all_channels(written, said, read):
+    with h5py.File(written, "r+") as file:
+        attribute("channels", said, "response")(file)
+    assert read_recording(written).response.channels == read
+
+
+@pytest.mark.parametrize(
     ("change", "problem"),
     [
         (lost("format"), "the attribute 'format' is missing"),
