@@ -54,14 +54,14 @@ class Candidate:
 
 
 def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
+    return tuple(subspace_start(lines, settings, longer) for longer in settings.longer_horizons)
+
+
+def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longer: int) -> Start:
     radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
-    shortest = default_horizon(settings.order, lines.response.shape[1])
-    starts = []
-    for longer in settings.longer_horizons:
-        subspace = warped_subspace(lines, shortest + longer, settings.centre_hz)
-        form = poles_and_shapes(subspace, settings.order, radius)
-        starts.append(Start(f"warped subspace, horizon {shortest + longer}", form))
-    return tuple(starts)
+    horizon = default_horizon(settings.order, lines.response.shape[1]) + longer
+    subspace = warped_subspace(lines, horizon, settings.centre_hz)
+    return Start(f"warped subspace, horizon {horizon}", poles_and_shapes(subspace, settings.order, radius))
 
 
 def record_starts(

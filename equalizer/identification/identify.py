@@ -5,7 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.candidates import Candidate, best, bins_about, candidate, record_starts, subspace_starts
+from equalizer.identification.candidates import (
+    Candidate,
+    best,
+    bins_about,
+    candidate,
+    record_starts,
+    subspace_start,
+    subspace_starts,
+)
 from equalizer.identification.frequency_response import FrequencyResponse
 from equalizer.identification.model_uncertainty import parameter_draws, response_deviation
 from equalizer.identification.refusals import IdentificationRefused, lines_or_refusal
@@ -63,10 +71,21 @@ def identify(
     for number, start in enumerate(starts):
         tell(number / (len(starts) + 1))
         found.append(candidate(start, lines, settings))
+    found += _spare_candidates(best(found), lines, settings)
     tell(len(starts) / (len(starts) + 1))
     identified = _identified(tuple(found), lines, responses[0], settings)
     tell(1.0)
     return identified
+
+
+def _spare_candidates(so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> list[Candidate]:
+    """Of a wide band, until one leaves no more than noise."""
+    found: list[Candidate] = []
+    for longer in settings.spare_horizons if settings.wide else ():
+        if best([so_far, *found]).cost <= UNEXPLAINED:
+            break
+        found.append(candidate(subspace_start(lines, settings, longer), lines, settings))
+    return found
 
 
 def _identified(

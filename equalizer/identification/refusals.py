@@ -31,6 +31,7 @@ def lines_or_refusal(responses: Sequence[FrequencyResponse], settings: Identific
             f"from {rate / 2:g} Hz on; choose a lower end or record faster"
         )
     _refuse_unexcited_inputs(responses, settings)
+    _refuse_dead_outputs(responses, settings)
     lines = weighted_lines(responses, settings.fitted_hz)
     _refuse_an_empty_band(responses, lines, settings)
     _refuse_noise(lines, settings)
@@ -59,6 +60,16 @@ def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: I
         raise IdentificationRefused(
             f"nothing tells what {names} does: as many experiments as inputs are needed, "
             f"{len(missing)} here; record one sweep per input"
+        )
+
+
+def _refuse_dead_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
+    answers = [np.nan_to_num(estimate.within(*settings.band_hz).response) for estimate in responses]
+    dead = ~np.any([(answer != 0).any(axis=(0, 2)) for answer in answers], axis=0)
+    names = ", ".join(name for name, is_dead in zip(responses[0].output_channels, dead, strict=True) if is_dead)
+    if names and any(len(answer) for answer in answers):
+        raise IdentificationRefused(
+            f"{names} answers nothing at all, not even noise: check the sensor and record again"
         )
 
 

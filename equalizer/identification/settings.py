@@ -15,6 +15,9 @@ class IdentificationSettings:
     """No pole dies out slower than this. Raise it for a device that rings longer."""
     longer_horizons: tuple[int, ...] = (0, 2)
     """Block rows beyond the shortest useful horizon; each is a start of its own."""
+    spare_horizons: tuple[int, ...] = (1, 3, 4, 6)
+    """Likewise, of a wide band: one after the other, as long as the best fit leaves more than noise. There a fit may
+    end where it gets no better though it should."""
     record_horizons: tuple[int, ...] = (16,)
     """Past and future samples of the starts from time records, where there are any."""
     margin: float = 0.1

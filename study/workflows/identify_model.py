@@ -70,6 +70,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     settings = _settings(plan)
     check_free(plan.out)
     recordings = tuple(read_recording(path) for path in plan.recordings)
+    _check_alike(recordings, plan.with_spring)
     if plan.with_spring:
         recordings = tuple(_from_excitation(recording) for recording in recordings)
     try:
@@ -79,6 +80,11 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         tested = held_out(model, recordings)
     except (TransferEstimateError, IdentificationRefused) as refusal:
         raise _no_model(str(refusal)) from refusal
+    except np.linalg.LinAlgError as problem:
+        raise _no_model(
+            f"The fit broke down ({str(problem).rstrip('.')}): an output answers nothing, or order {plan.order} is "
+            "more than these lines carry."
+        ) from problem
     except ValueError as problem:
         raise _no_model(f"{problem}.") from problem
     write_identified_model(plan.out, model)
@@ -188,6 +194,21 @@ def _amplitude_n(recordings: Sequence[Recording]) -> float:
     """The largest of the segments that were fitted: friction left its equivalent at that amplitude in the model."""
     segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
     return max((segment.amplitude for segment in segments), default=0.0)
+
+
+def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
+    """One model is of one device: with a hand or without, and under one spring where that is a part of it."""
+    found = {"the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}}
+    if with_spring:
+        feedback = [r.meta.get("feedback") for r in recordings]
+        found["the spring"] = {
+            f"{float(one.get('stiffness_n_per_m', 0.0)):.3g} N/m, {float(one.get('damping_n_s_per_m', 0.0)):.3g} N s/m"
+            for one in feedback
+            if isinstance(one, dict)
+        }
+    for name, values in found.items():
+        if len(values) > 1:
+            raise _no_model(f"The recordings differ in {name} ({'; '.join(sorted(values))}); identify each by itself.")
 
 
 def _from_excitation(recording: Recording) -> Recording:

@@ -134,3 +134,23 @@ def test_nothing_is_overwritten(folder, tmp_path):
 def test_a_model_that_cannot_be_is_wrong_use(folder, tmp_path, changes):
     with pytest.raises(WrongUseError):
         identify_model(IdentifyPlan((folder / "sweep.h5",), tmp_path / "m.h5", **changes), lambda share: None)
+
+
+def test_recordings_of_two_grips_or_under_two_springs_make_no_one_model(plants, tmp_path):
+    noise = np.random.default_rng(1).standard_normal((4000, 3))
+    springs = [{"hand": "none", "feedback": {"stiffness_n_per_m": k, "damping_n_s_per_m": 0.0}} for k in (50.0, 140.0)]
+    for number, meta in enumerate([*springs, {"hand": "held"}]):
+        write_recording(tmp_path / f"{number}.h5", recorded(plants, noise, (), **meta))
+    with pytest.raises(StudyError, match=r"differ in the hand on the handle \(held; none\)"):
+        identify_model(IdentifyPlan((tmp_path / "0.h5", tmp_path / "2.h5"), tmp_path / "m.h5"), lambda share: None)
+    plan = IdentifyPlan((tmp_path / "0.h5", tmp_path / "1.h5"), tmp_path / "m.h5", with_spring=True)
+    with pytest.raises(StudyError, match=r"differ in the spring \(140 N/m, 0 N s/m; 50 N/m"):
+        identify_model(plan, lambda share: None)
+
+
+def test_an_output_that_answers_nothing_is_named(plants, folder, tmp_path):
+    whole = swept(plants)
+    silent = replace(whole, response=replace(whole.response, samples=whole.response.samples * [1.0, 1.0, 0.0]))
+    write_recording(tmp_path / "silent.h5", silent)
+    with pytest.raises(StudyError, match="az answers nothing at all"):
+        identify_model(IdentifyPlan((tmp_path / "silent.h5",), tmp_path / "m.h5"), lambda share: None)
