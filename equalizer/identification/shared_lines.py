@@ -73,7 +73,8 @@ def solve_shared_lines(
             gain = np.sum(np.abs(solution) ** 2, axis=1)
             variance = np.fmax(variance, rest_density[kept][:, :, None] * gain[:, None, :])
         noise = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
-    coherence = np.clip(1 - noise / over_neighbours(columns.power, noise_lines), 0.0, 1.0)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of an output that is always zero nothing is known
+        coherence = np.clip(1 - noise / over_neighbours(columns.power, noise_lines), 0.0, 1.0)
     return SharedLines(frequency_hz[kept], response, variance, coherence, columns.instrument)
 
 

@@ -12,6 +12,7 @@ from study.devices.clock import VirtualClock
 from study.errors import LeftError, StudyError
 from study.participants.population import population
 from study.store.archive import SessionFolder, session_folders
+from study.store.provenance import sha256_of
 from study.workflows.conduct_session import conduct_new, conduct_resumed
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan
@@ -37,7 +38,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int, on_finished: Callable[[in
 
     After an interruption the same call goes on.
 
-    Raises StudyError where the folder holds a rehearsal of another protocol or seed.
+    Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
     """
     _check_same(rehearsal)
     # Forking a process with numba's and the device's threads in it is not safe; a spawned one starts clean.
@@ -130,11 +131,19 @@ def _check_same(rehearsal: Rehearsal) -> None:
             "Choose another folder with --out, or at least as many --subjects as were begun.",
             saved="Nothing was changed.",
         )
+    model = sha256_of(rehearsal.model) if rehearsal.model is not None and rehearsal.model.is_file() else None
     for number in range(rehearsal.subjects):
         folder = _begun(rehearsal.data, subject_code(number))
         if folder is None:
             continue
         opened = fold_session(folder).state.opened
+        if opened.equalized is not None and opened.equalized.sha256 != model:
+            raise StudyError(
+                "This folder holds another rehearsal",
+                f"{folder.name} in {rehearsal.data} was begun with another --model.",
+                "Choose another folder with --out, or the same --model to go on.",
+                saved="Nothing was changed.",
+            )
         if opened.seed != subject_seed(rehearsal.seed, number) or opened.protocol_text != rehearsal.protocol_text:
             raise StudyError(
                 "This folder holds another rehearsal",

@@ -152,5 +152,5 @@ def test_an_output_that_answers_nothing_is_named(plants, folder, tmp_path):
     whole = swept(plants)
     silent = replace(whole, response=replace(whole.response, samples=whole.response.samples * [1.0, 1.0, 0.0]))
     write_recording(tmp_path / "silent.h5", silent)
-    with pytest.raises(StudyError, match="az answers nothing at all"):
+    with pytest.raises(StudyError, match="Az answers nothing at all"):
         identify_model(IdentifyPlan((tmp_path / "silent.h5",), tmp_path / "m.h5"), lambda share: None)
