@@ -8,6 +8,7 @@ from analysis.anova import OneWayAnova, one_way
 from analysis.catch_trials import CatchTally, catch_tallies
 from analysis.comparisons import Comparisons, compare_all
 from analysis.detection import detection_thresholds
+from analysis.equalized_delivery import deliveries, delivery_warning
 from analysis.friedman import Friedman, friedman
 from analysis.population import Population, split_by_population
 from analysis.practice import PracticeRun, practice_runs
@@ -83,6 +84,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         difference=design_difference(anova, within),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
+            *filter(None, [delivery_warning(deliveries(tested))]),
             *side_warnings(catches, detection, table, detection_table),
         ),
         detection=detection,

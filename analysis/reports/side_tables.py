@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from analysis.equalized_delivery import deliveries
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
 from analysis.wording import NONE, bounded, number
@@ -43,6 +44,23 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
         notes=("d' of two intervals; a positive criterion is a liking of the second one. Chance is 50 % right.",),
         folded=True,
     )  # fmt: skip
+
+
+def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
+    """Of what was wanted, where stimuli were accelerations."""
+    rows = tuple(
+        (f"{one.frequency_hz:g} Hz", str(one.trials), *map(_percent, one.along), _percent(one.off_axis))
+        for one in deliveries(analysis.trials)
+    )
+    if not rows:
+        return ()
+    header = ("Frequency", "Trials", "Along, direction 1", "Along, direction 2", "Off the direction")
+    note = "Medians of trials. Along: delivered over wanted. Off: over what was delivered along the direction."
+    return (Table("What arrived of what was wanted", header, rows, notes=(note,)),)
+
+
+def _percent(share: float | None) -> str:
+    return NONE if share is None else f"{100 * share:.0f} %"
 
 
 def catch_table(analysis: StudyAnalysis) -> Table:

@@ -7,7 +7,13 @@ from analysis.figures.picture import Picture
 from analysis.population import Population
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
-from analysis.reports.side_tables import catch_table, detection_run_table, detection_table, practice_table
+from analysis.reports.side_tables import (
+    catch_table,
+    delivery_tables,
+    detection_run_table,
+    detection_table,
+    practice_table,
+)
 from analysis.reports.study_tables import (
     ellipsoid_table,
     group_table,
@@ -41,7 +47,7 @@ def render_study_report(
         _warnings(analysis),
         *_results(analysis, by_name),
         *_beside(analysis),
-        *_delivery(by_name),
+        *_delivery(analysis, by_name),
         *_ellipsoids(ellipsoids, by_name),
         *_runs(analysis, pictures),
         Section("Methods", paragraphs=methods_text(analysis.protocol)),
@@ -117,10 +123,11 @@ def _beside(analysis: StudyAnalysis) -> list[Section]:
     return sections
 
 
-def _delivery(by_name: Mapping[str, Picture]) -> list[Section]:
+def _delivery(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
     if "delivered" not in by_name:
         return []
-    return [Section("What the device delivered", pictures=(by_name["delivered"],))]
+    tables = delivery_tables(analysis)
+    return [Section("What the device delivered", pictures=(by_name["delivered"],), tables=tables)]
 
 
 def _ellipsoids(results: Sequence[EllipsoidResult], by_name: Mapping[str, Picture]) -> list[Section]:
