@@ -71,6 +71,14 @@ WrongCommandLine: Any = next(kind for kind in typer.BadParameter.__mro__ if kind
 """What typer raises for an unknown command or a bad option; its module differs between versions of typer."""
 
 
+INTERRUPTED = StudyError(
+    "Interrupted",
+    "The command was left before it was done.",
+    "Run it again.",
+    saved="Files that it had written are whole; none is half written.",
+)
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
@@ -101,6 +109,7 @@ def main(arguments: list[str] | None = None) -> int:
         error.show()
         return ExitCode.WRONG_USE
     except (KeyboardInterrupt, typer.Abort):
+        say(INTERRUPTED)
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
         return ExitCode.ERROR

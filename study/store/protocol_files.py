@@ -42,8 +42,8 @@ class ProtocolRefusedError(StudyError):
         super().__init__(
             title=f"{name} is not a usable protocol",
             happened=str(error),
-            do_now="Correct the file and run the command again; `hapteq protocol show direction_threshold` lists "
-            "every key with what is allowed.",
+            do_now="Correct the file and run the command again; `hapteq protocol show direction_threshold` (for "
+            "a recording: sweep_band) lists every key with what is allowed.",
         )
         self.problems: tuple[Problem, ...] = error.problems
 

@@ -101,6 +101,16 @@ def test_an_interruption_is_exit_code_130(run, small_file, tmp_path, monkeypatch
     assert run("resume", "ideal1_001", "--data", tmp_path / "d")[0] == 0
 
 
+def test_a_command_that_was_left_says_that_nothing_is_half_written(run, monkeypatch, tmp_path):
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("study.workflows.identify_model.identify_model", interrupted)
+    code, out, err = run("identify", tmp_path / "rec.h5", "--out", tmp_path / "model.h5")
+    assert (code, out) == (130, "")
+    assert "Interrupted" in err and "none is half written" in err
+
+
 def test_a_finished_session_is_said_to_be_finished(run, data):
     code, _, err = run("resume", "P01_001", "--data", data)
     assert code == 1
