@@ -101,6 +101,8 @@ def main(arguments: list[str] | None = None) -> int:
     _settle_in()
     try:
         code = app(args=arguments, standalone_mode=False)
+        if code == ExitCode.INTERRUPTED:  # some versions of typer return what others raise
+            raise KeyboardInterrupt
         return code if isinstance(code, int) else ExitCode.DONE
     except StudyError as error:
         say(error)
