@@ -142,10 +142,17 @@ class Calls(RuleBasedStateMachine):
         self.device = SafeDevice(self.rig, self.rigs.SETTINGS, self.clock)
         self.held = False
 
-    @rule(amplitude_n=st.sampled_from([0.0, 1.0, 3.0, 3.1, 1e9]), periods=st.sampled_from([5, 50, 500]))
-    def hold(self, amplitude_n, periods) -> None:
+    @rule(
+        amplitude_n=st.sampled_from([0.0, 1.0, 3.0, 3.1, 1e9]),
+        periods=st.sampled_from([5, 50, 500]),
+        onset=st.sampled_from([None, 0.5, 1.0, 2.0]),
+    )
+    def hold(self, amplitude_n, periods, onset) -> None:
+        stimulus = self.rigs.sine(amplitude_n, periods)
+        if onset is not None:
+            stimulus = replace(stimulus, onset=self.rigs.force(onset * stimulus.loop.samples))
         try:
-            self.device.hold(self.rigs.sine(amplitude_n, periods))
+            self.device.hold(stimulus)
             self.held = True
         except DeviceError:
             pass
