@@ -12,12 +12,13 @@ from protocols.recording_protocol import RecordingProtocol
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import SIMULATIONS, open_device
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, LeftError
 from study.session.handle_notice import handle_notice
 from study.session.limits import limits_of_recording
 from study.session.recording_plan import pieces
 from study.store.provenance import gather_provenance
 from study.store.recording_file import write_recording
+from study.workflows.free_name import require_free
 from study.workflows.play_pieces import Take, play_pieces
 from study.workflows.take_facts import segment_facts, spring_facts, warnings_of
 
@@ -91,20 +92,7 @@ def record_on(
 
 def check_free(out: Path) -> None:
     """Raises StudyError where the recording could not be written under this name."""
-    if out.exists():
-        raise StudyError(
-            "The recording was not started",
-            f"{out} exists already, and recordings are never overwritten.",
-            "Choose another name with --out.",
-            saved="Nothing moved.",
-        )
-    if not out.absolute().parent.is_dir():
-        raise StudyError(
-            "The recording was not started",
-            f"There is no folder {out.parent} to write {out.name} into.",
-            "Make the folder first, or choose another name with --out.",
-            saved="Nothing moved.",
-        )
+    require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
 def _left(plan: RecordingPlan, done: int) -> LeftError:

@@ -1,0 +1,21 @@
+"""Before any work: nothing has the name yet under which its result is to be written, and there is a folder for it."""
+
+from pathlib import Path
+
+from study.errors import StudyError
+
+
+def require_free(out: Path, *beside: Path, title: str, kind: str, saved: str = "Nothing was written.") -> None:
+    """`beside`: what else is written into the same folder. title: what does not happen otherwise. kind: what is never
+    overwritten, in the plural. Raises StudyError."""
+    for path in (out, *beside):
+        if path.exists():
+            happened = f"{path} exists already, and {kind} are never overwritten."
+            raise StudyError(title, happened, "Choose another name with --out.", saved=saved)
+    if not out.absolute().parent.is_dir():
+        raise StudyError(
+            title,
+            f"There is no folder {out.parent} to write {out.name} into.",
+            "Make the folder first, or choose another name with --out.",
+            saved=saved,
+        )
