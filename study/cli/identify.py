@@ -26,6 +26,10 @@ def identify(
             "--with-spring", help="Take the recording's spring as a part of the device: for a study under it."
         ),
     ] = False,
+    physics: Annotated[
+        Path | None,
+        typer.Option(help="Mechanical model whose named effects, such as friction, are taken off the recordings."),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Folder for a page with transfer functions, bands and the choice of order.")
     ] = None,
@@ -36,7 +40,7 @@ def identify(
     from study.workflows.identify_model import IdentifyPlan, check_free, identify_model, summary, summary_lines
     from study.workflows.report_identification import report_identification
 
-    plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring)
+    plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics)
     check_free(out)
     with bar("Identifying (%)", total=100) as show:
         device = identify_model(plan, lambda share: show(round(100 * share)))

@@ -15,11 +15,15 @@ from equalizer.identification.refusals import IdentificationRefused
 from equalizer.identification.settings import IdentificationSettings
 from equalizer.identification.transfer_estimate import TransferEstimateError, transfer_estimate
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.identified_model_file import write_identified_model
+from study.store.mechanical_model_file import read_mechanical_model
 from study.store.provenance import gather_provenance
 from study.store.recording_file import read_recording
+from study.workflows.free_name import require_free
+from study.workflows.freed_recordings import freed_of, freed_recordings
 
 NEAR_M = 0.001
 """Places farther apart than this are two places, and a model is of one."""
@@ -43,6 +47,8 @@ class IdentifyPlan:
     with_spring: bool = False
     """From the excitation, with the spring's force a part of the device: for playing under the same spring, without
     trusting encoders to see what the handle does."""
+    physics: Path | None = None
+    """Mechanical model whose named effects are taken off the recordings: the model is then of the linear rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +63,7 @@ class IdentifiedDevice:
     identified: Identified
     model: IdentifiedModel
     tested: HeldOut | None
+    """On recordings that are as those that were fitted: freed of known physics, where there are such."""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -73,10 +80,13 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     _check_alike(recordings, plan.with_spring)
     if plan.with_spring:
         recordings = tuple(_from_excitation(recording) for recording in recordings)
+    physics = None if plan.physics is None else read_mechanical_model(plan.physics)
+    if plan.physics is not None and physics is not None:
+        recordings = freed_recordings(recordings, physics, plan.physics)
     try:
         estimate = transfer_estimate(recordings)
         fitted, identified = _fit(plan, estimate, settings, recordings, on_progress)
-        model = _at_place(plan, recordings, identified.model)
+        model = _at_place(plan, recordings, identified.model, physics)
         tested = held_out(model, recordings)
     except (TransferEstimateError, IdentificationRefused) as refusal:
         raise _no_model(str(refusal)) from refusal
@@ -113,20 +123,7 @@ def _fit(
 
 def check_free(out: Path) -> None:
     """Before any work. Raises StudyError."""
-    if out.exists():
-        raise StudyError(
-            "The model was not made",
-            f"{out} exists already, and models are never overwritten.",
-            "Choose another name with --out.",
-            saved="Nothing was written.",
-        )
-    if not out.absolute().parent.is_dir():
-        raise StudyError(
-            "The model was not made",
-            f"There is no folder {out.parent} to write {out.name} into.",
-            "Make the folder first, or choose another name with --out.",
-            saved="Nothing was written.",
-        )
+    require_free(out, title="The model was not made", kind="models")
 
 
 def summary(device: IdentifiedDevice) -> dict[str, Any]:
@@ -144,6 +141,7 @@ def summary(device: IdentifiedDevice) -> dict[str, Any]:
         "held_out_error": tested.error if tested else None,
         "held_out_noise": tested.noise if tested else None,
         "held_out_s": tested.seconds if tested else None,
+        "freed_of": model.provenance["freed_of"],
         "remarks": list(device.remarks),
     }
 
@@ -157,6 +155,8 @@ def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
         f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
         f"{100 * found['worst_relative_error']:.2f} %; the estimate's own noise is in both.",
     ]
+    if found["freed_of"]:
+        lines.append(f"The recordings were freed of {', '.join(found['freed_of'])}; play with --physics.")
     if device.tested is None:
         lines.append("No recording was kept for a test (role 'test'): how well the model predicts is not known.")
     else:
@@ -176,16 +176,20 @@ def _settings(plan: IdentifyPlan) -> IdentificationSettings:
         ) from problem
 
 
-def _at_place(plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel) -> IdentifiedModel:
+def _at_place(
+    plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel, physics: MechanicalModel | None
+) -> IdentifiedModel:
     """With the place where all recordings were made, and where they come from."""
     provenance = {
         **model.provenance,
-        **gather_provenance(parents=plan.recordings).as_dict(),
+        **gather_provenance(parents=(*plan.recordings, *([plan.physics] if plan.physics else []))).as_dict(),
         "device": recordings[0].device,
         "hand": sorted({str(recording.meta.get("hand", "")) for recording in recordings}),
         "feedback": recordings[0].meta.get("feedback"),
         "input": "excitation" if plan.with_spring else "command",
-        "amplitude_n": _amplitude_n(recordings),
+        # None: whoever compensates these effects adds them whole, for nothing of them is in the model.
+        "amplitude_n": _amplitude_n(recordings) if physics is None else None,
+        "freed_of": [] if physics is None else freed_of(physics),
     }
     return replace(model, place_m=_place(recordings), provenance=provenance)
 
