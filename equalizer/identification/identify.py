@@ -27,6 +27,8 @@ from equalizer.signals.signal import FloatArray
 
 UNEXPLAINED = 1.5
 """Cost above which a model is said to leave more than noise."""
+SAMPLED_BEFORE_WRITTEN = 1.0
+"""A response is read just before its row's command is written, so a device answers one sample later at the earliest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,6 +169,7 @@ def _model(
         output_unit=like.output_unit,
         input_channels=like.input_channels,
         output_channels=like.output_channels,
+        delay_samples=SAMPLED_BEFORE_WRITTEN,
         samples=samples,
         provenance={
             "method": "subspace identification, refined by maximum likelihood on the lines of the response",

@@ -42,7 +42,7 @@ class IdentifiedModel:
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
     delay_samples: float = 0.0
-    """For information: A, B, C, D include the delay."""
+    """From a command's row to the first row that can answer it. For information: A, B, C, D include the delay."""
     place_m: tuple[float, float, float] | None = None
     """Where in the workspace the handle was; None = not known."""
     covariance: FloatArray | None = None

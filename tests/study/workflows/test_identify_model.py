@@ -63,6 +63,7 @@ def test_the_model_on_disk_is_the_device(device, plants):
     model = read_identified_model(device.plan.out)
     assert (model.order, model.band_hz, model.place_m) == (20, (5.0, 35.0), (0.0, 0.0, 0.0))
     assert model.spectral_radius < 1
+    assert model.delay_samples == 1.0  # read before the command of the same row is written
     f = np.linspace(5.0, 35.0, 61)
     truth = plants.omega_like().response(f)
     assert np.linalg.norm(model_response(model, f) - truth) < 0.01 * np.linalg.norm(truth)
