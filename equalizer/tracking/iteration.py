@@ -5,6 +5,9 @@
 What is taken of an error is its share that is not noise, 1 - (noise / residual)²: all of a large one, less and less
 near the noise floor, so that noise is not written into the forces (with a fixed gain it is, and a good first shot gets
 worse). The gain falls as 1, 1/2, 1/3 ... with every repeat that made things worse; the best forces are kept.
+
+At the ends of the record nothing is corrected: an inverse that cannot act before the first row answers what is missing
+there with an impulse, a handle at rest sticks and is not moved by it, and with every repeat it would grow.
 """
 
 from collections.abc import Callable
@@ -26,6 +29,8 @@ WORSE, DIVERGED = 1.1, 2.0
 second it is called diverging."""
 LOWEST_GAIN = 0.03
 """Gains below it change nothing that could be measured."""
+EDGE_S = 0.03
+"""Over which corrections are faded at either end of the record."""
 
 
 class Verdict(Enum):
@@ -50,6 +55,8 @@ class Repetition:
     """Of one play, rms in the band, in the unit of `wanted`; None = the first two plays are alike and tell it."""
     cap: float | None = None
     """Largest length of a force, N."""
+    slew: float | None = None
+    """Largest change of a force, N/s. The first forces are not held to it: it bounds what corrections add."""
     judged: tuple[int, int] | None = None
     """First row and the one behind the last that residuals are taken over; None = all. What lies outside is corrected
     too, but where a handle sticks after the motion no force within reason is the right one."""
@@ -74,6 +81,19 @@ class Repetition:
         start, stop = self.judged or (0, len(self.wanted))
         return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
 
+    def fitting(self, forces: FloatArray, correction: FloatArray) -> float:
+        """The largest share of a correction, up to 1, that cap and slew allow. Both (N, m)."""
+        share = 1.0 if self.cap is None else fitting_share(forces, correction, self.cap)
+        if self.slew is None:
+            return share
+        steps, added = (np.diff(rows, axis=0, prepend=0.0, append=0.0) for rows in (forces, correction))
+        return min(share, fitting_share(steps, added, self.slew / self.sample_rate_hz))
+
+    @property
+    def limits(self) -> str:
+        cap = [] if self.cap is None else [f"the force within {self.cap:g} N"]
+        return " and ".join([*cap, *([] if self.slew is None else [f"its change within {self.slew:.4g} N/s"])])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IterationState:
@@ -91,7 +111,7 @@ class IterationState:
     """Of each play, rms of wanted minus measured in the band, noise included. One for two plays that are averaged."""
     gains: tuple[float, ...] = ()
     fitted: tuple[float, ...] = ()
-    """Share of each correction that fitted under the cap; 1 = all."""
+    """Share of each correction that fitted under cap and slew limit; 1 = all."""
     setbacks: int = 0
     first_measured: FloatArray | None = None
     """(N, p): of the first play, until the second has told the noise."""
@@ -103,13 +123,13 @@ class IterationState:
 
     @property
     def remark(self) -> str:
-        """What the cap did, or nothing."""
+        """What cap and slew limit did, or nothing."""
         lowest = min(self.fitted, default=1.0)
         if lowest >= 1:
             return ""
         return (
             f"{sum(share < 1 for share in self.fitted)} of {len(self.fitted)} corrections were scaled down, one to "
-            f"{lowest:.0%}, to keep the force within {self.repetition.cap:g} N"
+            f"{lowest:.0%}, to keep {self.repetition.limits}"
         )
 
 
@@ -194,11 +214,18 @@ def _over(state: IterationState, verdict: Verdict) -> IterationState:
 
 def _corrected(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
     repetition = state.repetition
-    correction = gain * repetition.invert(left)
-    fitted = 1.0 if repetition.cap is None else fitting_share(base, correction, repetition.cap)
+    correction = gain * ends_faded(repetition.invert(left), repetition.sample_rate_hz)
+    fitted = repetition.fitting(base, correction)
     if fitted < LOWEST_GAIN:
         return _over(state, Verdict.BEST_KEPT)
     return replace(state, forces=base + fitted * correction, gains=(*state.gains, gain), fitted=(*state.fitted, fitted))
+
+
+def ends_faded(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
+    """(N, m), from zero at the first row to zero at the last."""
+    until_end = np.minimum(np.arange(len(rows)), np.arange(len(rows))[::-1])
+    inside = np.clip(until_end / (EDGE_S * sample_rate_hz), 0.0, 1.0)
+    return np.asarray(rows * (0.5 - 0.5 * np.cos(np.pi * inside))[:, np.newaxis])
 
 
 def fitting_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:

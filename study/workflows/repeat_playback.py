@@ -16,6 +16,7 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, Fault, Played
 from study.devices.opening import DEVICES, open_device
 from study.errors import DeviceError, LeftError, StudyError
+from study.session.limits import SPRING_SLEW_N_PER_S
 from study.store.repeats_file import beside
 from study.workflows.repeat_results import Repeated, RepeatPlan, repeated, write_repeated
 
@@ -100,9 +101,17 @@ def _begun(plan: RepeatPlan, device: Device) -> IterationState:
     after = CAUSAL.samples(rate_hz)[1]
     wanted = np.pad(signal.samples, ((0, after), (0, 0)))
     invert = under_spring(plan.inverse(len(wanted)), plan.spring, rate_hz, plan.band_hz)
-    cap_n = plan.settings.limits.stimulus_cap_n
-    inside = band_part(wanted, rate_hz, plan.band_hz)
-    repetition = Repetition(inside, invert, rate_hz, plan.band_hz, plan.first_gain, cap=cap_n, judged=(0, len(signal)))
+    inside, limits = band_part(wanted, rate_hz, plan.band_hz), plan.settings.limits
+    repetition = Repetition(
+        wanted=inside,
+        invert=invert,
+        sample_rate_hz=rate_hz,
+        band_hz=plan.band_hz,
+        first_gain=plan.first_gain,
+        cap=limits.stimulus_cap_n,
+        slew=max(0.0, limits.slew_n_per_s - SPRING_SLEW_N_PER_S),
+        judged=(0, len(signal)),
+    )
     try:
         if plan.first is None:
             return begin(repetition)

@@ -180,6 +180,45 @@ def test_corrections_stay_under_the_cap_and_say_so(rubbing, plants, repetition, 
     assert f"within {1.02 * peak:g} N" in state.remark
 
 
+def test_corrections_stay_below_the_slew_limit_and_say_so(rubbing, plants, repetition, wanted):
+    device, first = rubbing.rubbing(plants.modes_of(), 0.3), repetition.invert(wanted)
+    slew = 1.1 * steepest(first)
+    state = begin(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew=slew))
+    found = []
+    while state.verdict is Verdict.CONTINUE and len(found) < 5:
+        state = next_forces(state, device.measured(state.forces, seed=len(found)))
+        found.append(steepest(state.forces))
+    assert max(found) <= slew * (1 + 1e-9)
+    assert min(state.fitted) < 1
+    assert state.remark.endswith(f"to keep its change within {slew:.4g} N/s")
+
+
+def test_a_correction_that_no_slew_limit_leaves_room_for_ends_with_the_best_forces(plants, repetition, wanted):
+    first = repetition.invert(wanted)
+    tight = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=1e-3, slew=0.5 * steepest(first))
+    state = next_forces(begin(tight, first), 0.8 * wanted)
+    assert state.verdict is Verdict.BEST_KEPT
+    np.testing.assert_array_equal(state.forces, first)
+
+
+def test_at_the_ends_of_the_record_no_impulse_is_built_up(repetition, wanted):
+    """The device answers nothing there, as a handle that sticks."""
+    jumps = np.zeros_like(wanted)
+    jumps[:5], jumps[-5:] = 20.0, -20.0
+    known = Repetition(wanted, lambda rows: repetition.invert(rows) + jumps, RATE_HZ, BAND_HZ, noise_floor=1e-3)
+    first = repetition.invert(wanted)
+    state = begin(known, first)
+    for _ in range(4):
+        state = next_forces(state, 0.5 * wanted)
+    assert state.gains
+    np.testing.assert_array_equal(state.forces[[0, -1]], first[[0, -1]])
+    assert steepest(state.forces) < 0.5 * RATE_HZ * np.linalg.norm(jumps[0])
+
+
+def steepest(forces) -> float:
+    return float(np.linalg.norm(np.diff(forces, axis=0, prepend=0.0), axis=1).max()) * RATE_HZ
+
+
 def test_the_share_that_fits_ends_at_the_cap():
     forces, correction = np.array([[1.0, 0.0], [0.0, 0.5]]), np.array([[2.0, 1.0], [0.0, 0.1]])
     share = fitting_share(forces, correction, 2.0)

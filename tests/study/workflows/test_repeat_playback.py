@@ -20,7 +20,7 @@ from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import SweepSegment
 from study.devices.device import DeviceSettings
 from study.errors import DeviceError, LeftError, StudyError
-from study.session.limits import Limits
+from study.session.limits import SPRING_SLEW_N_PER_S, Limits
 from study.store.file_errors import UnusableFileError
 from study.store.recording_file import read_recording
 from study.store.repeats_file import beside, read_repeats
@@ -172,6 +172,16 @@ def test_a_play_that_was_limited_is_not_learnt_from(plan):
     tight = replace(SETTINGS, limits=replace(SETTINGS.limits, total_cap_n=cap_n, stimulus_cap_n=cap_n))
     with pytest.raises(DeviceError, match=r"the force was limited \(\d+ samples\)"):
         repeat_playback(replace(slow, settings=tight), unheard)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_corrections_never_reach_the_slew_limit(plan, seed):
+    first = repeat_playback(replace(plan, repeats=1), unheard).played[0].recording.excitation.samples
+    steepest = 1000 * float(np.linalg.norm(np.diff(first, axis=0), axis=1).max())
+    tight = replace(SETTINGS, limits=replace(SETTINGS.limits, slew_n_per_s=1.02 * steepest + SPRING_SLEW_N_PER_S))
+    found = repeat_playback(replace(plan, settings=tight, seed=seed), unheard)
+    assert "its change within" in found.remark
+    assert found.errors[found.kept] < 0.8 * found.errors[0]
 
 
 def test_forces_above_the_cap_are_refused_before_anything_moves(plan):
