@@ -33,6 +33,8 @@ from equalizer.tracking.tracking_problem import TrackingError, TrackingWeights, 
 RIGID_OCTAVES = 0.6
 """Above the lower end of the narrow band, where the rigid model is fitted: below the first resonance."""
 RIGID_LINES = 30
+LEAST_REACH = 2.0
+"""Of the wider band beyond the narrower: a high band of less than an octave, one direction for all of it, is none."""
 BINS_PER_OCTAVE = 6
 
 
@@ -45,10 +47,17 @@ class TwoModels:
 
     def __post_init__(self) -> None:
         (low, high), (lowest, highest) = self.narrow.band_hz, self.wide.band_hz
-        if not (lowest <= high and highest >= high + 4 * EDGE_ROOM_HZ and low > 2 * EDGE_ROOM_HZ):
+        if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * EDGE_ROOM_HZ):
             raise ValueError(
                 f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz do not add up: the wider one must "
-                f"begin at {high:g} Hz or below and reach well beyond it, the narrower one begin above 2 Hz"
+                f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
+                "above 2 Hz"
+            )
+        told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
+        if told[0] != told[1] and None not in told[0] + told[1]:
+            raise ValueError(
+                f"one model is of hand {told[0][0]} and {told[0][1]}, the other of hand {told[1][0]} and {told[1][1]}: "
+                "two bands must be of one device, held and driven alike"
             )
 
 
