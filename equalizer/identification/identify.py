@@ -7,6 +7,7 @@ import numpy as np
 
 from equalizer.identification.candidates import (
     Candidate,
+    Start,
     best,
     bins_about,
     candidate,
@@ -68,7 +69,7 @@ def identify(
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = lines_or_refusal(responses, settings)
     _refuse_foreign(records, responses[0])
-    starts = (*subspace_starts(lines, settings), *record_starts(records, lines, settings))
+    starts = _starts(lines, settings, records)
     found = []
     for number, start in enumerate(starts):
         tell(number / (len(starts) + 1))
@@ -78,6 +79,19 @@ def identify(
     identified = _identified(tuple(found), lines, responses[0], settings)
     tell(1.0)
     return identified
+
+
+def _starts(
+    lines: WeightedLines, settings: IdentificationSettings, records: tuple[Recording, ...]
+) -> tuple[Start, ...]:
+    try:
+        return (*subspace_starts(lines, settings), *record_starts(records, lines, settings))
+    except np.linalg.LinAlgError as problem:
+        order = settings.order
+        raise IdentificationRefused(
+            f"order {order} asks more of the {len(lines)} lines in the band than can be told apart; "
+            f"choose a lower order, such as {max(order // 4 * 2, 2)}"
+        ) from problem
 
 
 def _spare_candidates(so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> list[Candidate]:

@@ -69,7 +69,7 @@ def _refuse_dead_outputs(responses: Sequence[FrequencyResponse], settings: Ident
     names = ", ".join(name for name, is_dead in zip(responses[0].output_channels, dead, strict=True) if is_dead)
     if names and any(len(answer) for answer in answers):
         raise IdentificationRefused(
-            f"{names} answers nothing at all, not even noise: check the sensor and record again"
+            f"nothing at all comes from {names}, not even noise: check the sensor and record again"
         )
 
 

@@ -204,15 +204,17 @@ def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
     """One model is of one device: with a hand or without, and under one spring where that is a part of it."""
     found = {"the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}}
     if with_spring:
-        feedback = [r.meta.get("feedback") for r in recordings]
-        found["the spring"] = {
-            f"{float(one.get('stiffness_n_per_m', 0.0)):.3g} N/m, {float(one.get('damping_n_s_per_m', 0.0)):.3g} N s/m"
-            for one in feedback
-            if isinstance(one, dict)
-        }
+        found["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
     for name, values in found.items():
         if len(values) > 1:
             raise _no_model(f"The recordings differ in {name} ({'; '.join(sorted(values))}); identify each by itself.")
+
+
+def _spring_words(feedback: object) -> str:
+    if not isinstance(feedback, dict):
+        return "none"
+    stiffness, damping = (float(feedback.get(key, 0.0)) for key in ("stiffness_n_per_m", "damping_n_s_per_m"))
+    return f"{stiffness:.3g} N/m, {damping:.3g} N s/m"
 
 
 def _from_excitation(recording: Recording) -> Recording:

@@ -82,6 +82,13 @@ def test_an_order_beyond_what_the_lines_carry(plants, measuring):
     assert "choose a lower order, or record longer periods (now 1 s)" in text
 
 
+def test_an_order_whose_subspace_cannot_be_told_apart(plants, measuring):
+    many = measuring.exact(measuring.small_plant(plants), np.arange(4.6, 38, 0.2), 1e-3)
+    text = refusal(many, replace(SETTINGS, order=200))
+    assert "order 200 asks more of the 167 lines in the band than can be told apart" in text
+    assert "choose a lower order, such as 100" in text
+
+
 def test_a_band_above_half_the_rate(good):
     assert "nothing is known from 500 Hz on" in refusal(good, replace(SETTINGS, band_hz=(5.0, 600.0)))
 

@@ -147,11 +147,15 @@ def test_recordings_of_two_grips_or_under_two_springs_make_no_one_model(plants, 
     plan = IdentifyPlan((tmp_path / "0.h5", tmp_path / "1.h5"), tmp_path / "m.h5", with_spring=True)
     with pytest.raises(StudyError, match=r"differ in the spring \(140 N/m, 0 N s/m; 50 N/m"):
         identify_model(plan, lambda share: None)
+    write_recording(tmp_path / "loose.h5", recorded(plants, noise, ()))
+    plan = IdentifyPlan((tmp_path / "0.h5", tmp_path / "loose.h5"), tmp_path / "m.h5", with_spring=True)
+    with pytest.raises(StudyError, match=r"differ in the spring \(50 N/m, 0 N s/m; none\)"):
+        identify_model(plan, lambda share: None)
 
 
 def test_an_output_that_answers_nothing_is_named(plants, folder, tmp_path):
     whole = swept(plants)
     silent = replace(whole, response=replace(whole.response, samples=whole.response.samples * [1.0, 1.0, 0.0]))
     write_recording(tmp_path / "silent.h5", silent)
-    with pytest.raises(StudyError, match="Az answers nothing at all"):
+    with pytest.raises(StudyError, match="Nothing at all comes from az, not even noise"):
         identify_model(IdentifyPlan((tmp_path / "silent.h5",), tmp_path / "m.h5"), lambda share: None)
