@@ -1,7 +1,10 @@
 """From a table of wanted accelerations and models of the device to a table of forces."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -14,7 +17,14 @@ from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.trajectory_file import read_trajectory, write_trajectory
-from study.workflows.models_for_playing import ModelsForPlaying, Vector, models_for_playing
+from study.workflows.models_for_playing import ModelsForPlaying, Vector, models_for_playing, peak_gain
+
+HIGHEST_MPS2 = 1e4
+"""A thousand times gravity: what is wanted beyond it is a slip of the pen."""
+NOT_REACHED = 0.5
+"""Predicted error beyond which forces are no answer to what is wanted."""
+NO_WEIGHT = 1e-7
+"""Root of the weight over the model's gain below which it is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +80,9 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
             saved="Nothing was written.",
         ) from limit
     except ValueError as problem:
+        _require_weight(plan, models)
         raise _not_equalized(f"{plan.trajectory.name}: {problem}.") from problem
+    _require_reached(plan, solved)
     compensation = None
     if physics is not None:
         compensation = _compensated(plan, solved, models.largest, physics, amplitude_n)
@@ -110,7 +122,38 @@ def _wanted(path: Path) -> Trajectory:
             "Give the wanted accelerations in m/s^2, as the last file.",
             saved="Nothing was written.",
         )
+    sizes = np.abs(trajectory.signal.samples)
+    if not sizes.max() <= HIGHEST_MPS2:
+        row, axis = np.unravel_index(int(sizes.argmax()), sizes.shape)
+        found = trajectory.signal.samples[row, axis]
+        raise _not_equalized(
+            f"{path.name} wants {found:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; no more than "
+            f"{HIGHEST_MPS2:g} m/s^2 is taken for an acceleration."
+        )
     return trajectory
+
+
+def _require_weight(plan: EqualizePlan, models: ModelsForPlaying) -> None:
+    if math.sqrt(plan.weight) < NO_WEIGHT * max(peak_gain(model) for model in models.given):
+        raise StudyError(
+            "The forces were not computed",
+            f"With --weight {plan.weight:g} nothing keeps forces finite that the model hardly answers.",
+            "Give a weight above zero, such as --weight 0.001.",
+            saved="Nothing was written.",
+        )
+
+
+def _require_reached(plan: EqualizePlan, solved: Feedforward) -> None:
+    """Where the cap costs something the loss is stated: without the cap what is wanted must be in reach."""
+    missed = solved.error if solved.loss is None else solved.loss.error_free
+    if not missed <= NOT_REACHED:
+        raise StudyError(
+            "The forces were not computed",
+            f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: along some "
+            f"direction it answers hardly anything, for --weight {plan.weight:g}.",
+            "Check units and axes of the recording that it was made from and identify it again, or lower --weight.",
+            saved="Nothing was written.",
+        )
 
 
 def _solved(plan: EqualizePlan, wanted: Trajectory, models: ModelsForPlaying) -> tuple[Feedforward, BandFacts | None]:

@@ -16,13 +16,13 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
     found: dict[str, Any] = {
         "forces": str(done.plan.out),
         "band_hz": list(done.models.band_hz),
-        "predicted_error": solved.error,
+        "predicted_error": predicted_error(done),
         "left_out": solved.left_out,
         "peak_n": done.peaks.peak_n,
         "cap_n": done.peaks.cap_n,
         "capped": None,
         "place_m": list(done.models.at.place_m),
-        "remarks": list(done.models.remarks),
+        "remarks": [*done.models.held_out, *done.models.remarks],
     }
     if solved.loss is not None:
         found["capped"] = {
@@ -56,8 +56,8 @@ def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
         "held_out": [
             {
                 "place_m": list(check.place_m),
-                "blended_worst_error": check.blended_error,
-                "modal_worst_error": check.modal_error,
+                "blended_held_out_error": check.blended_error,
+                "modal_held_out_error": check.modal_error,
             }
             for check in choice.checks
         ],
@@ -66,32 +66,42 @@ def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
 
 def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
     solved = done.solved
-    low, high = done.models.band_hz
-    lines = [
-        f"Predicted error {100 * solved.error:.2f} % within {low:g} to {high:g} Hz; highest force "
-        f"{done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
-    ]
-    lines += done.models.remarks
+    lines = [*done.models.held_out, _predicted_line(done), *done.models.remarks]
     lines += _band_lines(done)
     if solved.left_out > WORTH_SAYING:
         lines.append(
             f"{100 * solved.left_out:.0f} % of what is wanted (rms) lies outside the "
             f"{'bands' if done.bands else 'band'} and is not played."
         )
-    if solved.loss is not None:
-        loss = solved.loss
+    if solved.loss is not None and done.bands is None and (outside := _force_outside(done)) > WORTH_SAYING:
         lines.append(
-            f"The cap costs: error {100 * loss.error_capped:.1f} % instead of {100 * loss.error_free:.1f} % "
-            f"(clipping would have given {100 * loss.error_clipped:.1f} %)."
+            f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
+            "band, where the model does not know what the device makes of it."
         )
-        if (outside := _force_outside(done)) > WORTH_SAYING and done.bands is None:
-            lines.append(
-                f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
-                "band, where the model does not know what the device makes of it."
-            )
     lines += _physics_lines(done)
     lines.append(_spring_line(done))
     return tuple(lines)
+
+
+def predicted_error(done: EqualizedTrajectory) -> float:
+    """Under a cap that costs something, the figure that can be compared with those without it: corners count too."""
+    loss = done.solved.loss
+    return done.solved.error if loss is None else loss.error_capped
+
+
+def _predicted_line(done: EqualizedTrajectory) -> str:
+    loss, (low, high) = done.solved.loss, done.models.band_hz
+    who = "the model itself predicts" if len(done.models.given) == 1 else "the models themselves predict"
+    cost = ""
+    if loss is not None:
+        cost = (
+            f" under the cap, {100 * loss.error_free:.2f} % without it (clipping would have given "
+            f"{100 * loss.error_clipped:.2f} %)"
+        )
+    return (
+        f"As {who}: error {100 * predicted_error(done):.2f} % of what is wanted within {low:g} to {high:g} Hz{cost}; "
+        f"highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
+    )
 
 
 def _force_outside(done: EqualizedTrajectory) -> float:

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
 from equalizer.tracking.trajectory import FORCES, TRAJECTORY
 from equalizer.tracking.two_models import TwoModels
 from equalizer.tracking.workspace.feedforward_at_place import used_models
-from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, choose_interpolation
+from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, PlaceCheck, choose_interpolation
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.place_weights import place_weights
 from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
@@ -20,6 +21,9 @@ from study.store.identified_model_file import read_identified_model
 from study.store.provenance import sha256_of
 
 SAME_PLACE_M = 0.001
+GAIN_LINES = 100
+HIGHEST_GAIN = 1e6
+"""m/s² per N: no handle weighs a milligram."""
 FAR_M = 0.005
 """From where a single model was identified: farther, and the user is told."""
 
@@ -36,6 +40,8 @@ class ModelsForPlaying:
     """None for models of one place."""
     remarks: tuple[str, ...]
     """Sentences."""
+    held_out: tuple[str, ...]
+    """Sentences: the error at places that were left out and predicted from the others."""
     sha256: str
     """Of all files, and of the place where it matters which forces they give."""
 
@@ -81,7 +87,7 @@ def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: flo
 
 def _one(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> ModelsForPlaying:
     at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
-    return ModelsForPlaying((model,), at, None, None, _far(paths[0], model, at_m), _sha256(paths))
+    return ModelsForPlaying((model,), at, None, None, _far(paths[0], model, at_m), (), _sha256(paths))
 
 
 def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> ModelsForPlaying:
@@ -102,7 +108,7 @@ def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_
             "Give one of them, or two bands such as hapteq identify --band 5 35 and --band 5 400 --order 40 make.",
         ) from problem
     at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
-    return ModelsForPlaying(models, at, two, None, _far(paths[0], narrow, at_m), _sha256(paths))
+    return ModelsForPlaying(models, at, two, None, _far(paths[0], narrow, at_m), (), _sha256(paths))
 
 
 def _several_places(
@@ -123,15 +129,20 @@ def _several_places(
     choice = choose_interpolation(workspace, weight=weight)
     at = choice.at(at_m)
     remarks = [_sentence(choice.reason)]
-    for check in choice.checks:
-        modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
-        remarks.append(
-            f"Held out {_mm(check.place_m)}: worst error {100 * check.blended_error:.1f} % with blended forces, "
-            f"{modal} with resonances interpolated."
-        )
     outside = place_weights(workspace.places_m, at_m).remark
     remarks += [_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
-    return ModelsForPlaying(workspace.models, at, None, choice, tuple(remarks), _sha256(paths, at_m))
+    if not choice.checks:
+        remarks.append("No place could be held out: what the error is between the models' places is not known.")
+    held_out = tuple(_held_out(check) for check in choice.checks)
+    return ModelsForPlaying(workspace.models, at, None, choice, tuple(remarks), held_out, _sha256(paths, at_m))
+
+
+def _held_out(check: PlaceCheck) -> str:
+    modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
+    return (
+        f"Held out {_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with blended forces, "
+        f"{modal} with resonances interpolated."
+    )
 
 
 def _readable(path: Path) -> IdentifiedModel:
@@ -150,7 +161,19 @@ def _readable(path: Path) -> IdentifiedModel:
             f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
             "Identify it again with hapteq identify, which makes stable ones only.",
         )
+    if not (gain := peak_gain(model)) <= HIGHEST_GAIN:
+        raise _unfit(
+            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; a model is taken up to "
+            f"{HIGHEST_GAIN:g} m/s^2.",
+            "Check the units of the recording that it was made from, and identify it again.",
+        )
     return replace(model, input_channels=FORCES.header[1:], output_channels=TRAJECTORY.header[1:])
+
+
+def peak_gain(model: IdentifiedModel) -> float:
+    """Largest answer of one output to one input in the band."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_LINES))).max())
 
 
 def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:

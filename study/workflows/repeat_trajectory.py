@@ -101,8 +101,8 @@ def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
 
 def repeated_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
     found = done.repeated
-    first, *more, _ = summary_lines(done.solved)  # the last is about forces that no spring adds to
-    lines = [f"By the model alone: {first[:1].lower()}{first[1:]}", *more, _tested_line(done)]
+    *alone, _ = summary_lines(done.solved)  # the last is about forces that no spring adds to
+    lines = [*alone, _tested_line(done)]
     for number, error in enumerate(found.errors):
         kept = ", kept" if number == found.kept else ""
         lines.append(f"Play {number}: error {100 * error:.2f} % as measured{kept}.")

@@ -104,8 +104,51 @@ def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(p
     done = equalize_trajectory(replace(loud, constrain=True))
     assert np.linalg.norm(read_trajectory(loud.out).signal.samples, axis=1).max() <= 3.0
     assert summary(done)["capped"]["error_capped"] > summary(done)["capped"]["error_free"]
-    assert any(line.startswith("The cap costs: error") for line in summary_lines(done))
     assert any("held at the cap have corners" in line for line in summary_lines(done))
+
+
+def test_what_the_cap_costs_is_said_in_one_figure(plan):
+    done = equalize_trajectory(replace(plan, trajectory=plan.trajectory.with_name("loud.csv"), constrain=True))
+    capped, lines = summary(done)["capped"], summary_lines(done)
+    assert summary(done)["predicted_error"] == capped["error_capped"]
+    assert sum(" error " in line for line in lines) == 1
+    figures = [100 * capped[f"error_{kind}"] for kind in ("capped", "free", "clipped")]
+    assert "error {:.2f} % of what is wanted".format(*figures) in lines[0]
+    assert "under the cap, {1:.2f} % without it (clipping would have given {2:.2f} %)".format(*figures) in lines[0]
+
+
+@pytest.mark.parametrize("rows", [[0.0, 0.0, 0.0], [1e-7, 1e-7, 1e-7], [1.0, 0.0, 0.0]])
+@pytest.mark.parametrize("constrain", [False, True])
+def test_a_model_that_does_not_answer_is_refused(plants, plan, tmp_path, rows, constrain):
+    good = model_of(plants.omega_like(0.1))
+    write_identified_model(tmp_path / "deaf.h5", replace(good, C=np.array(rows)[:, None] * good.C))
+    refused = refusal(replace(plan, models=(tmp_path / "deaf.h5",), constrain=constrain))
+    assert "By the model itself the best forces would miss" in refused.happened
+    assert "identify it again" in refused.do_now
+
+
+@pytest.mark.parametrize("gain", [1e7, 1e200])
+def test_a_model_of_a_handle_without_mass_is_refused(plants, plan, tmp_path, gain):
+    good = model_of(plants.omega_like(0.1))
+    write_identified_model(tmp_path / "huge.h5", replace(good, C=gain * good.C))
+    refused = refusal(replace(plan, models=(tmp_path / "huge.h5",)))
+    assert "By huge.h5 1 N accelerates the handle with up to" in refused.happened
+    assert "Check the units" in refused.do_now
+
+
+def test_without_a_weight_the_weight_is_named(plan):
+    refused = refusal(replace(plan, weight=0.0))
+    assert refused.happened == "With --weight 0 nothing keeps forces finite that the model hardly answers."
+    assert refused.do_now == "Give a weight above zero, such as --weight 0.001."
+
+
+@pytest.mark.parametrize("size", [1e5, -1e300])
+def test_an_acceleration_that_cannot_be_meant_is_named_with_its_line(plants, plan, tmp_path, size):
+    samples = noise(plants)
+    samples[500, 1] = size
+    write_trajectory(tmp_path / "slip.csv", table(samples))
+    refused = refusal(replace(plan, trajectory=tmp_path / "slip.csv"))
+    assert refused.happened.startswith(f"slip.csv wants {size:g} m/s^2 of ay in line 502; no more than 10000 m/s^2")
 
 
 def test_models_of_several_places_need_a_place(plan):
@@ -119,6 +162,7 @@ def test_two_places_are_blended(plants, plan):
     done = equalize_trajectory(blended)
     assert summary(done)["interpolation"] == "blended forces"
     assert summary(done)["held_out"] == []
+    assert any(line.startswith("No place could be held out") for line in summary_lines(done))
     error = played_error(plants, blended, 0.1)
     blended.out.unlink()
     equalize_trajectory(with_models(plan, "left"))
@@ -130,9 +174,12 @@ def test_three_places_are_checked_with_the_middle_one_held_out(plants, plan):
     done = equalize_trajectory(between)
     (check,) = summary(done)["held_out"]
     assert check["place_m"] == [0.0, 0.0, 0.0]
-    better = check["modal_worst_error"] is not None and check["modal_worst_error"] < check["blended_worst_error"]
+    blended, modal = check["blended_held_out_error"], check["modal_held_out_error"]
+    better = modal is not None and modal < blended
     assert summary(done)["interpolation"] == ("modal" if better else "blended forces")
-    assert any(line.startswith("Held out (0, 0, 0) mm: worst error") for line in summary_lines(done))
+    first, second, *_ = summary_lines(done)
+    assert first.startswith(f"Held out (0, 0, 0) mm: error {100 * blended:.1f} % (rms over lines) with blended forces")
+    assert second.startswith("As the models themselves predict: error")
     assert played_error(plants, between, 0.15) < 0.2
 
 

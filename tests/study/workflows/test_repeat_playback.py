@@ -122,7 +122,8 @@ def test_forces_of_something_else_are_not_gone_on_from(plan, tmp_path, other):
     out = tmp_path / "forces.csv"
     repeat_playback(replace(plan, repeats=1, out=out), unheard)
     if other.startswith("a table"):
-        out.write_text(out.read_text().replace("0.001,", "0.001,1", 1))
+        header, first, _, *rest = out.read_text().splitlines()
+        out.write_text("\n".join([header, first, "0.001,0.5,0.0,0.0", *rest]))
     wanted = trajectory(1.7) if other == "another trajectory" else plan.wanted
     model = "1" * 64 if other == "another model" else plan.model_sha256
     with pytest.raises(StudyError, match="cannot be gone on from") as refused:

@@ -90,7 +90,7 @@ def test_repeats_make_it_better_and_say_so_play_by_play(done):
     assert found["noise_floor"] < min(found["errors"])
     assert found["peak_n"] <= 3.0
     lines = repeated_lines(done)
-    assert lines[0].startswith("By the model alone: predicted error")
+    assert lines[0].startswith("As the model itself predicts: error 0.")
     assert f"Play 0: error {100 * found['errors'][0]:.2f} % as measured." in lines
     assert any(line.startswith("Noise alone: ") and line.endswith("the best forces are kept.") for line in lines)
     assert lines[-1].endswith("they are for the device under the spring that they were played under.")
@@ -116,7 +116,7 @@ def test_a_later_run_goes_on_from_them(done, plan):
 
 def test_but_not_for_another_model_or_table(done, plan, tmp_path):
     order = replace(ORDER, earlier=done.solved.plan.out)
-    assert "belongs to another model" in refusal(changed(plan, tmp_path, delay_samples=1.0), order).happened
+    assert "belongs to another model" in refusal(changed(plan, tmp_path, delay_samples=7.0), order).happened
     write_trajectory(tmp_path / "other.csv", table(level=1.0))
     other = replace(plan, trajectory=tmp_path / "other.csv")
     assert "belongs to another trajectory" in refusal(other, order).happened
