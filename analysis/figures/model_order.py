@@ -3,10 +3,11 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
-from equalizer.identification.order_report import OrderReport
+from equalizer.identification.order_report import VISIBLE, OrderReport
 
 
 def model_order_picture(report: OrderReport, chosen: int) -> Picture:
@@ -14,7 +15,8 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
     return Picture(
         name="model-order",
         title="What the order of the model buys and costs",
-        caption="Left: singular values of the data, in units of the noise; states above the dashed line are seen. "
+        caption=f"Left: singular values of the data, in units of the noise; states above {VISIBLE:g} times the noise "
+        "(dashed) are seen. "
         "Right: error on lines that the fit did not see, with its floor, the noise (dashed), and the multiplications "
         f"that a tick costs. This model has order {chosen}; the lowest that is as good as the best is "
         f"{report.suggested_order}.",
@@ -37,9 +39,10 @@ def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
     seen = number <= report.visible_order
     axes.semilogy(number[seen], values[seen], "o", color=BLUE, markersize=4, label="seen")
     axes.semilogy(number[~seen], values[~seen], "o", color=GREY, markersize=4, markerfacecolor="none", label="noise")
-    axes.axhline(1.0, color=GREY, linestyle="--", linewidth=1)
-    axes.set_xlabel("Number")
-    axes.set_ylabel("Singular value")
+    axes.axhline(VISIBLE, color=GREY, linestyle="--", linewidth=1)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_xlabel("State")
+    axes.set_ylabel("Singular value (noise = 1)")
     axes.legend(frameon=False, fontsize=9)
 
 
@@ -49,6 +52,10 @@ def _draw_errors(axes: Axes, report: OrderReport, chosen: int) -> None:
     axes.semilogy(orders, [100 * row.held_out_error for row in report.rows], "o-", color=VERMILLION, markersize=5)
     axes.axhline(100 * report.held_out_noise, color=GREY, linestyle="--", linewidth=1)
     axes.axvline(chosen, color=GREY, linewidth=1)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(LogLocator(subs=(2, 3, 5)))
+    axes.yaxis.set_minor_formatter("{x:g}")
+    axes.set_xticks(orders)
     axes.set_xlabel("Order")
     axes.set_ylabel("Error, held-out lines (%)", color=VERMILLION)
     cost = axes.twinx()
