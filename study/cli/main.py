@@ -4,7 +4,6 @@ Results go to stdout, talk and progress to stderr. Imports are light, so that `-
 imports what it needs.
 """
 
-import contextlib
 import io
 import os
 import re
@@ -136,8 +135,11 @@ def _settle_in() -> None:
 def say(error: StudyError) -> None:
     """Title on a line, then what happened, what is safe, what to do."""
     parts = [as_typed(part) for part in (error.happened, error.saved, error.do_now)]
-    with contextlib.suppress(OSError):  # a closed terminal hears nothing
+    try:
         sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
+        sys.stderr.flush()
+    except OSError:  # a terminal that is gone hears nothing, and must not be told once more when Python ends
+        sys.stderr = io.StringIO()
 
 
 def as_typed(sentence: str) -> str:
