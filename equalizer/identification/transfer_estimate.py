@@ -42,6 +42,7 @@ def transfer_estimate(recordings: Sequence[Recording], settings: EstimateSetting
             "no segment drives the device with more than single sinusoids for a whole period or window; "
             "record a sweep or a multisine along every axis"
         )
+    _refuse_still_outputs(recordings)
     rate_hz = recordings[0].sample_rate_hz
     parts = []
     for frequency_hz, experiments in _by_shared_lines(looks.experiments, rate_hz):
@@ -138,6 +139,17 @@ def _check_alike(recordings: Sequence[Recording]) -> None:
                 raise TransferEstimateError(
                     f"recording {number} has the {what} {two}, but the first has {one}; estimate them apart"
                 )
+
+
+def _refuse_still_outputs(recordings: Sequence[Recording]) -> None:
+    """Rounding would make a response of a sensor that hangs at a value."""
+    rows = [recording.response.samples for recording in recordings]
+    still = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
+    names = ", ".join(name for name, is_still in zip(recordings[0].response.channels, still, strict=True) if is_still)
+    if names:
+        raise TransferEstimateError(
+            f"nothing at all comes from {names}, not even noise: check the sensor and record again"
+        )
 
 
 def _channels(signal: Signal) -> str:

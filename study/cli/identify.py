@@ -21,14 +21,10 @@ def identify(
         ),
     ] = None,
     with_spring: Annotated[
-        bool,
-        typer.Option(
-            "--with-spring", help="Take the recording's spring as a part of the device: for a study under it."
-        ),
+        bool, typer.Option("--with-spring", help="Take the spring as a part of the device: for a study under it.")
     ] = False,
     physics: Annotated[
-        Path | None,
-        typer.Option(help="Mechanical model whose named effects, such as friction, are taken off the recordings."),
+        Path | None, typer.Option(help="Mechanical model whose named effects (friction) are taken off the recordings.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Folder for a page with transfer functions, bands and the choice of order.")

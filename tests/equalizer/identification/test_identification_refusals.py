@@ -75,6 +75,11 @@ def test_an_input_that_no_experiment_drove(good):
     assert "record one sweep per input" in text
 
 
+def test_an_output_that_no_line_has(good):
+    silent = replace(good, response=good.response * np.array([1.0, 0.0, 1.0])[:, None])
+    assert f"nothing at all comes from {good.output_channels[1]}, not even noise" in refusal(silent)
+
+
 def test_an_order_beyond_what_the_lines_carry(plants, measuring):
     few = measuring.exact(measuring.small_plant(plants), np.arange(4.6, 38, 1.0), 1e-3)
     text = refusal(few, replace(SETTINGS, order=60))

@@ -153,9 +153,11 @@ def test_recordings_of_two_grips_or_under_two_springs_make_no_one_model(plants, 
         identify_model(plan, lambda share: None)
 
 
-def test_an_output_that_answers_nothing_is_named(plants, folder, tmp_path):
+@pytest.mark.parametrize("hangs_at", [0.0, 9.81])
+def test_an_output_that_answers_nothing_is_named(plants, tmp_path, hangs_at):
     whole = swept(plants)
-    silent = replace(whole, response=replace(whole.response, samples=whole.response.samples * [1.0, 1.0, 0.0]))
-    write_recording(tmp_path / "silent.h5", silent)
+    samples = np.array(whole.response.samples)
+    samples[:, 2] = hangs_at
+    write_recording(tmp_path / "silent.h5", replace(whole, response=replace(whole.response, samples=samples)))
     with pytest.raises(StudyError, match="Nothing at all comes from az, not even noise"):
         identify_model(IdentifyPlan((tmp_path / "silent.h5",), tmp_path / "m.h5"), lambda share: None)
