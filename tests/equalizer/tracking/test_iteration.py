@@ -219,6 +219,14 @@ def steepest(forces) -> float:
     return float(np.linalg.norm(np.diff(forces, axis=0, prepend=0.0), axis=1).max()) * RATE_HZ
 
 
+def test_what_fits_under_a_cap_is_not_above_it_by_rounding():
+    for seed in range(200):
+        forces, correction = np.random.default_rng(seed).standard_normal((2, 20, 3))
+        cap = 1.01 * float(np.linalg.norm(forces, axis=1).max())
+        fitted = forces + fitting_share(forces, 10 * correction, cap) * 10 * correction
+        assert np.linalg.norm(fitted, axis=1).max() <= cap
+
+
 def test_the_share_that_fits_ends_at_the_cap():
     forces, correction = np.array([[1.0, 0.0], [0.0, 0.5]]), np.array([[2.0, 1.0], [0.0, 0.1]])
     share = fitting_share(forces, correction, 2.0)

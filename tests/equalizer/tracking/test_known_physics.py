@@ -179,7 +179,7 @@ def test_the_forces_stay_within_the_cap(frictionless, wanted):
     cap_n = 1.01 * float(np.linalg.norm(forces, axis=1).max())
     done = compensate(forces, wanted, frictionless, physics(friction(0.3)), None, cap_n)
     assert 0 < done.share < 1
-    assert np.linalg.norm(done.forces, axis=1).max() <= cap_n * (1 + 1e-9)
+    assert np.linalg.norm(done.forces, axis=1).max() <= cap_n
 
 
 def test_a_dead_band_is_crossed(plants, frictionless, wanted):
