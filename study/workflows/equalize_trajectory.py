@@ -17,6 +17,7 @@ from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.workflows.free_name import require_free
 from study.workflows.models_for_playing import ModelsForPlaying, Vector, models_for_playing, peak_gain
 
 HIGHEST_MPS2 = 1e4
@@ -96,21 +97,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 def check_free(out: Path, *more: Path) -> None:
     """Before any work. Raises StudyError."""
-    for path in (out, *more):
-        if path.exists():
-            raise StudyError(
-                "The forces were not computed",
-                f"{path} exists already, and tables are never overwritten.",
-                "Choose another name with --out.",
-                saved="Nothing was written.",
-            )
-    if not out.absolute().parent.is_dir():
-        raise StudyError(
-            "The forces were not computed",
-            f"There is no folder {out.parent} to write {out.name} into.",
-            "Make the folder first, or choose another name with --out.",
-            saved="Nothing was written.",
-        )
+    require_free(out, *more, title="The forces were not computed", kind="tables")
 
 
 def _wanted(path: Path) -> Trajectory:
