@@ -81,15 +81,18 @@ def test_an_unknown_peer_is_refused_with_those_that_are_known(bench, capsys):
     assert "unknown peers: matlab; known are ctrlsys, nfoursid" in capsys.readouterr().err
 
 
-def test_an_unstable_model_is_no_peer_that_could_be_used(bench):
+def test_an_unstable_model_is_no_peer_that_could_be_used(bench, capsys):
     wild = bench.Score(1.0, 26, 1.2, (1e-4,), 1e-4, float("nan"))
     calm = bench.Score(1.0, 26, 0.9, (1e-3,), 1e-3, 1e-3)
     ours = bench.Row("hapteq", [calm])
     assert bench.Row("peer", [wild]).usable is False
-    assert bench.compared(ours, [bench.Row("peer", [calm])]) is False
+    bench.compared(ours, [bench.Row("peer", [calm])])
+    assert "1.00 (aim 0.4: not reached)" in capsys.readouterr().out
     better = bench.Score(1.0, 26, 0.9, (3e-4,), 1e-3, 3e-4)
-    assert bench.compared(bench.Row("hapteq", [better]), [bench.Row("peer", [calm])]) is True
+    bench.compared(bench.Row("hapteq", [better]), [bench.Row("peer", [calm])])
+    assert "0.30 (aim 0.4: reached)" in capsys.readouterr().out
 
 
-def test_peers_that_did_not_run_are_no_failure_of_ours(bench):
-    assert bench.compared(bench.Row("hapteq"), [bench.Row("peer")]) is True
+def test_where_no_peer_ran_there_is_nothing_to_divide_by(bench, capsys):
+    bench.compared(bench.Row("hapteq"), [bench.Row("peer")])
+    assert "no peer gave a model: nothing to divide by" in capsys.readouterr().out
