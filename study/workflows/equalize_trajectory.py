@@ -83,7 +83,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     except ValueError as problem:
         _require_weight(plan, models)
         raise _not_equalized(f"{plan.trajectory.name}: {problem}.") from problem
-    _require_reached(plan, solved)
+    _require_reached(plan, solved, in_bands=bands is not None)
     compensation = None
     if physics is not None:
         compensation = _compensated(plan, solved, models.largest, physics, amplitude_n)
@@ -130,9 +130,17 @@ def _require_weight(plan: EqualizePlan, models: ModelsForPlaying) -> None:
         )
 
 
-def _require_reached(plan: EqualizePlan, solved: Feedforward) -> None:
+def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) -> None:
     """Where the cap costs something the loss is stated: without the cap what is wanted must be in reach."""
     missed = solved.error if solved.loss is None else solved.loss.error_free
+    if not missed <= NOT_REACHED and in_bands:
+        raise StudyError(
+            "The forces were not computed",
+            f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: three bands have "
+            "to run in and out, and the table begins or ends too close to it.",
+            "Put 3 s of zeros before and after what is wanted, or give one model.",
+            saved="Nothing was written.",
+        )
     if not missed <= NOT_REACHED:
         raise StudyError(
             "The forces were not computed",
