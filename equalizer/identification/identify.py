@@ -156,7 +156,7 @@ def _remarks(chosen: Candidate, cost: float, settings: IdentificationSettings) -
         )
     if not chosen.sane:
         remarks.append(
-            f"outside the band the model's gain is {chosen.outside_gain:.3g} times that inside: "
+            f"outside the band the model's gain is {chosen.outside_gain:.0f} times that inside: "
             f"keep what is played within the band, or lower the order"
         )
     return remarks
