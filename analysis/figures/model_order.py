@@ -18,7 +18,7 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
         caption=f"Left: singular values of the data, in units of the noise; states above {VISIBLE:g} times the noise "
         "(dashed) are seen. "
         "Right: error on lines that the fit did not see, with its floor, the noise (dashed), and the multiplications "
-        f"that a tick costs. This model has order {chosen}; the lowest that is as good as the best is "
+        f"that a tick costs. This model has order {chosen}; of those tried, the lowest that is as good as the best is "
         f"{report.suggested_order}.",
         figure=draw_model_order(report, chosen),
     )

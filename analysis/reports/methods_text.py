@@ -19,6 +19,7 @@ _LEVELS = {
     "an identified model of the device. The level of a trial is the highest force that either direction needs for that "
     "acceleration; the table of trials has the acceleration that was wanted and the one that was measured.",
 }
+_PLAYED = {"commanded_force": "sinusoidal force", "delivered_acceleration": "sinusoidal vibration"}
 _STEP_CHANGES = {
     StepChange.AFTER_REVERSAL: "the reversal that completed a phase still moved by that phase's step",
     StepChange.AT_REVERSAL: "the reversal that completed a phase already moved by the next step",
@@ -52,7 +53,8 @@ def _task(protocol: StudyProtocol) -> str:
     limit = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
     told = "was told" if trial.feedback == "after_answer" else "was not told"
     return (
-        f"Every trial played one sinusoidal force along one of two orthogonal directions, at {first:g}° (1) and "
+        f"Every trial played one {_PLAYED[protocol.stimulus.quantity]} along one of two orthogonal directions, at "
+        f"{first:g}° (1) and "
         f"{second:g}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
         f"{directions.symmetry_deg:g}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
         f"which of the two it was, {limit}, and {told} whether that was right."

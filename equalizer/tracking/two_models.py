@@ -56,8 +56,8 @@ class TwoModels:
         told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
         if told[0] != told[1] and None not in told[0] + told[1]:
             raise ValueError(
-                f"one model is of hand {told[0][0]} and {told[0][1]}, the other of hand {told[1][0]} and {told[1][1]}: "
-                "two bands must be of one device, held and driven alike"
+                f"the narrower one was made {_made(self.narrow)}, the wider one {_made(self.wide)}: two bands must be "
+                "of one device, held and driven alike"
             )
 
 
@@ -175,3 +175,10 @@ def _facts(
         direction=() if played.high is None else tuple(float(part) for part in played.high.direction),
         travel_m=0.0 if played.motion is None else played.motion.travel_m,
     )
+
+
+def _made(model: IdentifiedModel) -> str:
+    """In words, of what the provenance says."""
+    held = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
+    spring = "with" if model.provenance.get("input") == "excitation" else "without"
+    return f"{held} and {spring} the spring in it"

@@ -33,7 +33,8 @@ def identify(
 ) -> None:
     """Fit a stable model to the band, test it on what was kept for a test, and write it."""
     from study.cli.progress import bar
-    from study.workflows.identify_model import IdentifyPlan, check_free, identify_model, summary, summary_lines
+    from study.workflows.identified_summary import summary, summary_lines
+    from study.workflows.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.report_identification import report_identification
 
     plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics)

@@ -117,12 +117,15 @@ def _band_lines(done: EqualizedTrajectory) -> list[str]:
     low, high = bands.edges_hz
     lines = [
         f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower model "
-        f"up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz levels alone, along one direction.",
-        f"Run-in and run-out of the bands are no rows of the table. The middle band is solved for the rows alone; its "
-        f"error would be {100 * bands.whole_error:.2f} % with them, {100 * bands.cut_error:.2f} % were they only cut.",
+        f"up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz of the loudness alone, all along one direction.",
+        f"The bands begin before the table's first row and end after its last; only its rows are written, and the "
+        f"middle band is solved for them. Its error with all of it played would be {100 * bands.whole_error:.2f} %, "
+        f"were the rest only cut off {100 * bands.cut_error:.2f} %.",
     ]
     if bands.level_error is not None:
-        lines.append(f"Level error of the high band, by sixths of an octave: {100 * bands.level_error:.1f} %.")
+        lines.append(
+            f"Loudness of the high band, compared sixth by sixth of an octave: {100 * bands.level_error:.1f} % off."
+        )
     return lines
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -124,47 +123,6 @@ def _fit(
 def check_free(out: Path) -> None:
     """Before any work. Raises StudyError."""
     require_free(out, title="The model was not made", kind="models")
-
-
-def summary(device: IdentifiedDevice) -> dict[str, Any]:
-    """The figures, for a person's lines and a program's JSON alike."""
-    model, tested = device.model, device.tested
-    low, high = model.band_hz
-    return {
-        "model": str(device.plan.out),
-        "order": model.order,
-        "band_hz": [low, high],
-        "spectral_radius": model.spectral_radius,
-        "lines": device.identified.lines,
-        "rms_relative_error": device.identified.rms_relative_error,
-        "worst_relative_error": device.identified.worst_relative_error,
-        "held_out_error": tested.error if tested else None,
-        "held_out_noise": tested.noise if tested else None,
-        "held_out_s": tested.seconds if tested else None,
-        "freed_of": model.provenance["freed_of"],
-        "remarks": list(device.remarks),
-    }
-
-
-def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
-    found = summary(device)
-    low, high = found["band_hz"]
-    lines = [
-        f"Order {found['order']}, {low:g} to {high:g} Hz, stable (slowest pole {found['spectral_radius']:.5f}), "
-        f"from {found['lines']} lines.",
-        f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
-        f"{100 * found['worst_relative_error']:.2f} %; the estimate's own noise is in both.",
-    ]
-    if found["freed_of"]:
-        lines.append(f"The recordings were freed of {', '.join(found['freed_of'])}; play with --physics.")
-    if device.tested is None:
-        lines.append("No recording was kept for a test (role 'test'): how well the model predicts is not known.")
-    else:
-        noise = f", of which noise {100 * device.tested.noise:.2f} %" if device.tested.noise is not None else ""
-        lines.append(
-            f"Held-out {device.tested.seconds:g} s: error {100 * device.tested.error:.2f} % in the band{noise}."
-        )
-    return tuple(lines)
 
 
 def _settings(plan: IdentifyPlan) -> IdentificationSettings:

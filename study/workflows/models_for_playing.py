@@ -105,7 +105,8 @@ def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_
     except ValueError as problem:
         raise _unfit(
             f"Both models are of one place, but {problem}.",
-            "Give one of them, or two bands such as hapteq identify --band 5 35 and --band 5 400 --order 40 make.",
+            "Give one of them, or identify both alike (with or without --with-spring), such as --band 5 35 and "
+            "--band 5 400 --order 40.",
         ) from problem
     at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
     return ModelsForPlaying(models, at, two, None, _far(paths[0], narrow, at_m), (), _sha256(paths))

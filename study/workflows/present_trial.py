@@ -22,7 +22,7 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
     hindrance = await_handle(state, sitting)
     if hindrance is not None:
         return cut_short(state, hindrance)
-    question = question_of(state, present, sitting.clock.utc())
+    question = question_of(state, present)
     state = record(state, presented(present, sitting), sitting)
     asked = ask_participant(state, present, question, sitting)
     if isinstance(asked.reply, Unanswered):

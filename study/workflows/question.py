@@ -7,7 +7,7 @@ from study.session.state import SessionState
 from study.session.views import Question, Task, picture_of
 
 
-def question_of(state: SessionState, present: Present, utc: str) -> Question:
+def question_of(state: SessionState, present: Present) -> Question:
     run = state.runs[present.run]
     alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
     return Question(
@@ -20,5 +20,5 @@ def question_of(state: SessionState, present: Present, utc: str) -> Question:
         picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
         task=Task.INTERVAL if run.phase is Phase.DETECTION else Task.DIRECTION,
         practice=run.practice,
-        progress=progress(state, utc),
+        progress=progress(state),
     )

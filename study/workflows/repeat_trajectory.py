@@ -128,8 +128,8 @@ def _tested_line(done: RepeatedTrajectory) -> str:
     if done.tested is None:
         return "Convergence was not tested before playing: the model does not hold how well it is known."
     return (
-        f"Of an error at most {100 * done.tested.surviving.max():.1f} % should survive a repeat "
-        f"({done.tested.worst_hz:.1f} Hz), by what the device may be within the models; gain {done.gain:.2f}."
+        f"If the device is linear and within the models, at most {100 * done.tested.surviving.max():.1f} % of an error "
+        f"survives a repeat ({done.tested.worst_hz:.1f} Hz); friction lets more survive. Gain {done.gain:.2f}."
     )
 
 

@@ -16,7 +16,8 @@ from equalizer.identification.resonances import find_resonances
 from equalizer.identification.settings import IdentificationSettings
 from study.devices.clock import RealClock
 from study.store.text_file import write_text
-from study.workflows.identify_model import IdentifiedDevice, summary_lines
+from study.workflows.identified_summary import summary_lines
+from study.workflows.identify_model import IdentifiedDevice
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME = "report.html"

@@ -15,7 +15,7 @@ def report():
 
 def test_the_caption_names_the_order_and_the_one_that_would_do(report):
     assert (
-        "This model has order 20; the lowest that is as good as the best is 14."
+        "This model has order 20; of those tried, the lowest that is as good as the best is 14."
         in model_order_picture(report, 20).caption
     )
 

@@ -25,7 +25,10 @@ def test_a_little_wider_is_no_second_band():
 
 @pytest.mark.parametrize("other", [{"hand": ["held"], "input": "command"}, {"hand": ["none"], "input": "excitation"}])
 def test_models_held_or_driven_otherwise_are_of_two_devices(other):
-    with pytest.raises(ValueError, match="held and driven alike"):
+    with pytest.raises(
+        ValueError,
+        match="the narrower one was made without a hand and without the spring in it, .* held and driven alike",
+    ):
         TwoModels(NARROW, replace(NARROW, band_hz=(5.0, 400.0), provenance=other))
 
 

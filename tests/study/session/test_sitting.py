@@ -311,13 +311,15 @@ def test_a_protocol_that_asks_nothing_has_no_forms(small_protocol):
 
 def test_progress_grows_with_trials_and_says_nothing_of_levels(begun, small_protocol, facts):
     right, wrong = begun(small_protocol), begun(small_protocol)
-    shares = [progress(right, UTC).share_done]
+    shares = [progress(right).share_done]
     for _ in range(4):
         right, wrong = facts.one_trial(right, correct=True), facts.one_trial(wrong, correct=False)
-        assert progress(right, UTC) == progress(wrong, UTC)
-        shares.append(progress(right, UTC).share_done)
+        assert progress(right) == progress(wrong)
+        shares.append(progress(right).share_done)
     assert shares[0] == 0.0
     assert shares == sorted(shares)
-    assert progress(right, UTC).minutes_left is None
-    right = facts.one_trial(apply(right, RestTaken(UTC, 1, 0, 2.0)), correct=True)
-    assert progress(right, LATER).minutes_left > 0
+    assert progress(right).minutes_left is None
+    right = apply(right, RestTaken(UTC, 1, 0, 2.0))
+    for _ in range(4):
+        right = facts.one_trial(right, correct=True)
+    assert 0 < progress(right).minutes_left < 30

@@ -11,7 +11,8 @@ from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
 from study.store.identified_model_file import read_identified_model
 from study.store.recording_file import write_recording
-from study.workflows.identify_model import IdentifyPlan, identify_model, summary, summary_lines
+from study.workflows.identified_summary import summary, summary_lines
+from study.workflows.identify_model import IdentifyPlan, identify_model
 from study.workflows.report_identification import report_identification
 
 RATE_HZ = 1000.0
@@ -79,7 +80,10 @@ def test_what_is_said_is_what_was_measured(device):
     found = summary(device)
     assert found["held_out_error"] == pytest.approx(found["held_out_noise"], rel=0.2)
     said = " ".join(summary_lines(device))
-    assert f"error {100 * found['held_out_error']:.2f} % in the band, of which noise" in said
+    assert f"an error of {100 * found['held_out_error']:.2f} % in the band, of which noise" in said
+    assert "mostly friction" not in said
+    poor = replace(device, tested=replace(device.tested, error=0.2))
+    assert "mostly friction, where there is some" in " ".join(summary_lines(poor))
     assert "Order 20, 5 to 35 Hz, stable" in said
 
 

@@ -99,7 +99,7 @@ def test_repeats_make_it_better_and_say_so_play_by_play(done):
 def test_convergence_is_tested_before_anything_is_played(done):
     assert 0 < repeated_summary(done)["surviving_error"] < 0.2
     assert done.gain == 1.0
-    assert any(line.startswith("Of an error at most") for line in repeated_lines(done))
+    assert any(line.startswith("If the device is linear") for line in repeated_lines(done))
 
 
 def test_forces_and_how_they_were_found_are_written(done):
