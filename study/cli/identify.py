@@ -41,10 +41,8 @@ def identify(
     check_free(out)
     with bar("Identifying (%)", total=100) as show:
         device = identify_model(plan, lambda share: show(round(100 * share)))
-    if as_json:
-        typer.echo(json.dumps(summary(device), indent=2))
-    else:
-        typer.echo("\n".join((str(out), *summary_lines(device))))
+    said = json.dumps(summary(device), indent=2) if as_json else "\n".join((str(out), *summary_lines(device)))
+    typer.echo(said)
     for remark in device.remarks:
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:
