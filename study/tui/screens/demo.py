@@ -64,7 +64,7 @@ class DemoScreen(Screen[DemoChoice]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show(f"Press {self._keys.choice} to feel it, Enter when you have felt enough.")
+        self._show(f"Press {self._keys.choice} to feel it, → for the next vibration, Enter when you have felt enough.")
 
     def on_key(self, event: Key) -> None:
         answer = self._keys.answer(event.character or event.key)
@@ -93,7 +93,8 @@ class DemoScreen(Screen[DemoChoice]):
         unfelt = 2 * self._menu.vibrations - len(set(self._menu.felt))
         if unfelt and not self._asked:
             self._asked = True
-            self._show(f"{unfelt} of {2 * self._menu.vibrations} were not felt yet. Enter again goes on without them.")
+            count = f"{unfelt} of {2 * self._menu.vibrations}"
+            self._show(f"{count} were not felt yet: ← and → lead there. Enter again goes on.")
             return
         take_off(self, DemoDone())
 

@@ -139,7 +139,7 @@ def test_the_demonstration_plays_turns_and_ends(read, keys, choice):
 def test_enter_by_habit_does_not_skip_the_demonstration(on_stage):
     async def story(stage):
         await stage.press("enter")
-        assert "5 of 6 were not felt yet. Enter again goes on without them." in stage.text
+        assert "5 of 6 were not felt yet: ← and → lead there. Enter again goes on." in stage.text
 
     assert on_stage(DemoScreen(MENU), story) == []
 
