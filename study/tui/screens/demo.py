@@ -64,7 +64,7 @@ class DemoScreen(Screen[DemoChoice]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show(f"Press {self._keys.choice} to feel it, → for the next vibration, Enter when you have felt enough.")
+        self._show(f"Press {self._keys.choice} to feel it, → for the next one, Enter when you felt enough.")
 
     def on_key(self, event: Key) -> None:
         answer = self._keys.answer(event.character or event.key)
