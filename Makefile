@@ -21,10 +21,10 @@ test: $(VENV)/.installed-test ## Set up, then run all checks and tests
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	@# Screens mostly wait: their tests run beside all the others.
-	@$(BIN)/python -m pytest -m "not slow" -p no:cacheprovider tests/study/tui & screens=$$!; \
-		$(BIN)/python -m pytest -m "not slow" --ignore=tests/study/tui; others=$$?; \
-		wait $$screens && exit $$others
+	@# Two halves side by side: screens, which mostly wait, with the equalizer's numbers, and all the others.
+	@$(BIN)/python -m pytest -m "not slow" -p no:cacheprovider tests/study/tui tests/equalizer & first=$$!; \
+		$(BIN)/python -m pytest -m "not slow" --ignore=tests/study/tui --ignore=tests/equalizer; others=$$?; \
+		wait $$first && exit $$others
 
 check: $(VENV)/.installed-test ## Format, lint, types and import contracts: the fast half of `make test`
 	$(BIN)/ruff format --check .
