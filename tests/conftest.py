@@ -74,11 +74,7 @@ def shared() -> Path:
 @pytest.fixture(scope="session")
 def rigs() -> ModuleType:
     """`tests/rigs.py`, bare rigs that write down every force. Imported late: it compiles."""
-    spec = importlib.util.spec_from_file_location("rigs", Path(__file__).parent / "rigs.py")
-    assert spec is not None and spec.loader is not None
-    module = sys.modules["rigs"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return _beside("rigs")
 
 
 @pytest.fixture
@@ -91,18 +87,19 @@ def small_file(tmp_path, small_text) -> Path:
 @pytest.fixture(scope="session")
 def plants() -> ModuleType:
     """`tests/plants.py`, synthetic devices with a known truth."""
-    spec = importlib.util.spec_from_file_location("plants", Path(__file__).parent / "plants.py")
-    assert spec is not None and spec.loader is not None
-    module = sys.modules["plants"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return _beside("plants")
 
 
 @pytest.fixture(scope="session")
 def rubbing() -> ModuleType:
     """`tests/rubbing.py`, the synthetic device with dry friction. Imported late: it compiles."""
-    spec = importlib.util.spec_from_file_location("rubbing", Path(__file__).parent / "rubbing.py")
+    return _beside("rubbing")
+
+
+def _beside(name: str) -> ModuleType:
+    """A module of this folder, which is no package."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / f"{name}.py")
     assert spec is not None and spec.loader is not None
-    module = sys.modules["rubbing"] = importlib.util.module_from_spec(spec)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
