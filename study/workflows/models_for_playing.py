@@ -147,10 +147,10 @@ def _held_out(check: PlaceCheck) -> str:
 
 
 def _readable(path: Path) -> IdentifiedModel:
-    """With its channels named as a table's: others may name them otherwise, such as x, y, z."""
+    """With its channels named as a table's: others may name them otherwise, such as x, y, z, or by numbers."""
     model = read_identified_model(path)
-    axes = ["".join(name[-1:] for name in names).lower() for names in (model.input_channels, model.output_channels)]
-    if (axes, model.input_unit, model.output_unit) != (["xyz", "xyz"], FORCES.unit, TRAJECTORY.unit):
+    in_order = all(_in_order(names) for names in (model.input_channels, model.output_channels))
+    if not in_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
         raise _unfit(
             f"{path.name} goes from {', '.join(model.input_channels)} in {model.input_unit} to "
             f"{', '.join(model.output_channels)} in {model.output_unit}; a table needs a model from fx, fy, fz in N to "
@@ -169,6 +169,12 @@ def _readable(path: Path) -> IdentifiedModel:
             "Check the units of the recording that it was made from, and identify it again.",
         )
     return replace(model, input_channels=FORCES.header[1:], output_channels=TRAJECTORY.header[1:])
+
+
+def _in_order(names: tuple[str, ...]) -> bool:
+    """Three, and none says that it is another axis than its place says."""
+    letters = [name[-1:].lower() for name in names]
+    return len(names) == 3 and (letters == ["x", "y", "z"] or not set(letters) & set("xyz"))
 
 
 def peak_gain(model: IdentifiedModel) -> float:

@@ -334,10 +334,9 @@ def test_models_that_cannot_play_a_table_are_refused(plants, plan, tmp_path):
         assert said in refusal(replace(plan, models=(tmp_path / name,))).happened
 
 
-def test_channels_may_be_named_otherwise(plants, plan, tmp_path):
-    named = replace(
-        model_of(plants.omega_like(0.1)), input_channels=("x", "y", "z"), output_channels=("AX", "AY", "AZ")
-    )
+@pytest.mark.parametrize("names", [(("x", "y", "z"), ("AX", "AY", "AZ")), (("u1", "u2", "u3"), ("0", "1", "2"))])
+def test_channels_may_be_named_otherwise(plants, plan, tmp_path, names):
+    named = replace(model_of(plants.omega_like(0.1)), input_channels=names[0], output_channels=names[1])
     write_identified_model(tmp_path / "named.h5", named)
     ours = equalize_trajectory(plan)
     theirs = equalize_trajectory(replace(plan, models=(tmp_path / "named.h5",), out=tmp_path / "theirs.csv"))
