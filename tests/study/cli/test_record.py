@@ -3,6 +3,7 @@
 import io
 import os
 import pty
+import select
 
 import pytest
 
@@ -48,7 +49,10 @@ def test_a_late_bar_draws_nothing_before_there_is_progress(monkeypatch):
                 os.read(reader, 1)
             show(2.0)
             show(4.0)
-        assert b"Sweeps (s)" in os.read(reader, 4096)
+        drawn = b""
+        while b"Sweeps (s)" not in drawn:  # a terminal hands over what has arrived so far
+            assert select.select([reader], [], [], 5.0)[0], drawn
+            drawn += os.read(reader, 4096)
     os.close(reader)
 
 
