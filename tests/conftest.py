@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -74,7 +75,7 @@ def shared() -> Path:
 @pytest.fixture(scope="session")
 def rigs() -> ModuleType:
     """`tests/rigs.py`, bare rigs that write down every force. Imported late: it compiles."""
-    return _beside("rigs")
+    return _module_at(Path(__file__).parent / "rigs.py")
 
 
 @pytest.fixture
@@ -87,19 +88,24 @@ def small_file(tmp_path, small_text) -> Path:
 @pytest.fixture(scope="session")
 def plants() -> ModuleType:
     """`tests/plants.py`, synthetic devices with a known truth."""
-    return _beside("plants")
+    return _module_at(Path(__file__).parent / "plants.py")
 
 
 @pytest.fixture(scope="session")
 def rubbing() -> ModuleType:
     """`tests/rubbing.py`, the synthetic device with dry friction. Imported late: it compiles."""
-    return _beside("rubbing")
+    return _module_at(Path(__file__).parent / "rubbing.py")
 
 
-def _beside(name: str) -> ModuleType:
-    """A module of this folder, which is no package."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / f"{name}.py")
+@pytest.fixture(scope="session")
+def module_at() -> Callable[[Path], ModuleType]:
+    """Loads a module of a test folder, which is no package."""
+    return _module_at
+
+
+def _module_at(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
-    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    module = sys.modules[path.stem] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.lqr import StoredGains, periodic_state, stored_gains, track
+from equalizer.tracking.lqr import StoredGains, periodic_state, ringing_weight, stored_gains, track
 from equalizer.tracking.periodic_inverse import WEIGHT, periodic_command
 from equalizer.tracking.tracking_problem import TrackingWeights, augmented
 from equalizer.tracking.virtual_spring import NO_SPRING, VirtualSpring
@@ -65,5 +64,4 @@ def _force_of(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[s
 @lru_cache(maxsize=8)
 def _onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
     problem = augmented(model, TrackingWeights(weight))
-    played_on = solve_discrete_lyapunov(problem.A.T, problem.C.T @ problem.Q @ problem.C)
-    return stored_gains(problem, samples, (played_on + played_on.T) / 2)
+    return stored_gains(problem, samples, ringing_weight(problem))

@@ -1,7 +1,6 @@
 """Recordings of the synthetic device: axes or multisines one after the other, a second of rest before and after."""
 
-import importlib.util
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -9,20 +8,12 @@ import pytest
 
 
 @pytest.fixture(scope="session")
-def synthetic() -> ModuleType:
+def synthetic(module_at: Callable[[Path], ModuleType]) -> ModuleType:
     """`synthetic_recordings.py` of this folder."""
-    return _beside("synthetic_recordings")
+    return module_at(Path(__file__).parent / "synthetic_recordings.py")
 
 
 @pytest.fixture(scope="session")
-def measuring() -> ModuleType:
+def measuring(module_at: Callable[[Path], ModuleType]) -> ModuleType:
     """`measured_lines.py` of this folder."""
-    return _beside("measured_lines")
-
-
-def _beside(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = sys.modules[name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_at(Path(__file__).parent / "measured_lines.py")
