@@ -1,0 +1,91 @@
+"""The whole periods of a recording's periodic segments that are settled, and their spectra.
+
+Spectra are rfft / length without the mean and without half the rate, so that white noise of variance s² has s² / length
+per line.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+_TRANSIENT_RATIO = 2.0
+"""Of the energy that a period differs by from the last one, first third to last third: above, it still settles."""
+_SHORTEST = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Periods:
+    """Looks at one periodic segment."""
+
+    index: int
+    """Of the segment in the recording."""
+    segment: Segment
+    starts: tuple[int, ...]
+    """First samples of the periods that are whole and settled; one at least."""
+    settled: bool
+    """False: only the first period is there, with its transient."""
+
+    @property
+    def length(self) -> int:
+        return self.segment.period
+
+    @property
+    def looks(self) -> int:
+        return len(self.starts)
+
+    def frequency_hz(self, sample_rate_hz: float) -> FloatArray:
+        """(lines,)"""
+        lines: FloatArray = np.arange(1.0, (self.length + 1) // 2) * (sample_rate_hz / self.length)
+        return lines
+
+
+def settled_periods(recording: Recording) -> tuple[Periods, ...]:
+    """Of every periodic segment. The first period is left out, and further ones while they still settle; periods with
+    missing samples are left out, too. Segments without a usable period are not among them."""
+    found = []
+    for index, segment in enumerate(recording.segments):
+        if segment.period < _SHORTEST:
+            continue
+        starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
+        whole = [start for start in starts if _is_whole(recording, start, segment.period)]
+        later = _after_transients(recording, [start for start in whole if start != segment.start], segment.period)
+        if later or whole:
+            found.append(Periods(index, segment, tuple(later or whole), bool(later)))
+    return tuple(found)
+
+
+def look_samples(samples: FloatArray, periods: Periods) -> FloatArray:
+    """(looks, length, channels)"""
+    return np.stack([samples[start : start + periods.length] for start in periods.starts])
+
+
+def look_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
+    """(looks, lines, channels); lines as in `Periods.frequency_hz`."""
+    return spectra(look_samples(samples, periods))
+
+
+def spectra(looks: FloatArray) -> ComplexArray:
+    """(looks, length, channels) to (looks, lines, channels)."""
+    length = looks.shape[1]
+    return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+
+
+def _is_whole(recording: Recording, start: int, length: int) -> bool:
+    signals = [recording.command.samples, recording.response.samples]
+    signals += [] if recording.position is None else [recording.position.samples]
+    return all(bool(np.isfinite(samples[start : start + length]).all()) for samples in signals)
+
+
+def _after_transients(recording: Recording, starts: list[int], length: int) -> list[int]:
+    samples, third = recording.response.samples, length // 3
+    while len(starts) > 2:
+        apart = samples[starts[0] : starts[0] + length] - samples[starts[-1] : starts[-1] + length]
+        energy = np.sum((apart - apart.mean(axis=0)) ** 2, axis=1)
+        if energy[:third].sum() <= _TRANSIENT_RATIO * energy[-third:].sum():
+            break
+        starts = starts[1:]
+    return starts

@@ -1,0 +1,103 @@
+"""Noise where nothing is driven: at rest, or on the lines above the driven band."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.experiments import instrument_of
+from equalizer.identification.noise_floor import SETTLING_S, over_neighbours
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+_WINDOW_S = 0.25
+_SILENT = 1e-4
+"""Share of the strongest smoothed power of the command that counts as none."""
+_CLEAR = 1.3
+"""Times the highest driven line: where the flanks of windows have died away."""
+_LEAST_LINES = 16
+_DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
+"""Of a third difference of white noise: gain of variance, and loss of degrees of freedom by correlation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hiss:
+    """Variance of the fast part of what is heard at rest, scaled as if it were white."""
+
+    variance: FloatArray
+    """(windows, channels)"""
+    freedom: FloatArray
+    """(windows, channels)"""
+
+
+def hiss_at_rest(recording: Recording, samples: FloatArray) -> Hiss | None:
+    """From windows of a quarter of a second, a quarter of a second after the excitation: slow ringing is no hindrance,
+    for only third differences count. None where there is no such window."""
+    length = round(_WINDOW_S * recording.sample_rate_hz)
+    variances = []
+    for start, stop in _rests(recording, _WINDOW_S):
+        for at in range(start, stop - length + 1, length):
+            look = samples[at : at + length]
+            if np.isfinite(look).all():
+                variances.append(np.mean(np.diff(look, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
+    if not variances:
+        return None
+    variance: FloatArray = np.array(variances)
+    return Hiss(variance, np.full(variance.shape, (length - 3) / _DIFFERENCE_LOSS))
+
+
+def resting_noise(
+    recording: Recording, samples: FloatArray, frequency_hz: FloatArray
+) -> tuple[FloatArray, float] | None:
+    """(lines, channels) density and its degrees of freedom; None where nothing rests for a quarter of a second."""
+    length = round(_WINDOW_S * recording.sample_rate_hz)
+    hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
+    powers = []
+    for start, stop in _rests(recording, SETTLING_S):
+        for at in range(start, stop - length + 1, length // 2):
+            look = samples[at : at + length]
+            if np.isfinite(look).all():
+                spectrum = np.fft.rfft((look - look.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
+                powers.append(np.abs(spectrum) ** 2 / length)
+    if not powers:
+        return None
+    lines_hz: FloatArray = np.arange(1.0, length // 2) * (recording.sample_rate_hz / length)
+    mean = np.mean(powers, axis=0)
+    mean[:2] = mean[2:3]
+    smooth = over_neighbours(mean, 9)
+    density = np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
+    # Windows overlap by half and a Hann window spreads each line over its neighbours: about half of all count.
+    return density, float(len(powers) * length / 2)
+
+
+def quiet_band_noise(
+    recording: Recording, samples: FloatArray, frequency_hz: FloatArray
+) -> tuple[FloatArray, float] | None:
+    """White density (lines, channels) as strong as the median line above all that is driven, and its degrees of
+    freedom; None where no band is left above. The median, so that the lines of harmonics do not count."""
+    whole = np.isfinite(samples).all(axis=1) & np.isfinite(instrument_of(recording)).all(axis=1)
+    if not whole.all():
+        samples = np.where(whole[:, None], samples, np.nanmean(samples, axis=0))
+    n = len(samples)
+    window = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n))
+    lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
+    command = np.where(whole[:, None], instrument_of(recording), 0.0)
+    driven = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
+    smooth = over_neighbours(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
+    if smooth.max() == 0:
+        return None
+    highest_hz = float(lines_hz[np.flatnonzero(smooth > _SILENT * smooth.max())[-1]])
+    quiet = np.asarray(lines_hz > _CLEAR * highest_hz)
+    if quiet.sum() < _LEAST_LINES:
+        return None
+    power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
+    level = np.median(power[quiet], axis=0) / np.log(2)
+    return np.tile(level, (len(frequency_hz), 1)), float(quiet.sum())
+
+
+def _rests(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
+    """Stretches without excitation, settled. Recordings begin at rest."""
+    driven = ~(instrument_of(recording) == 0).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
+    settling = round(settling_s * recording.sample_rate_hz)
+    rests = zip(edges[::2], edges[1::2], strict=True)
+    return [(int(start) + (settling if start else 0), int(stop)) for start, stop in rests]
