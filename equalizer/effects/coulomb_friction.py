@@ -1,0 +1,39 @@
+"""Dry friction: a constant force against the motion that holds still what is pushed less than that."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import V_FREE, V_PER_N
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import moving_force
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The force that stops the axis by the end of the step, if friction is strong enough for it."""
+    stopping = -at[V_FREE] / at[V_PER_N]
+    return min(max(stopping, -of[0]), of[0])
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["level"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    level = moving_force(evidence, axis, np.sign)
+    return ({"level": level},) if level > 0 else ()
+
+
+EFFECT = Effect(
+    name="coulomb_friction",
+    equation="F = -level sgn(v)",
+    source="Coulomb; held still as in Karnopp 1985, J. Dyn. Syst. Meas. Control 107:100",
+    signature="the missing force flips its sign with the velocity and does not grow with it; its odd harmonics fall "
+    "as the level rises",
+    parameters=(Parameter("level", 1e-5, 1e4, none=0.0),),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

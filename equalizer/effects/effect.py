@@ -1,0 +1,103 @@
+"""What an effect is to the simulator and to a diagnosis: its equation, its numbers, where it acts and how.
+
+An effect acts in one of four ways: it changes the linear structure, adds a force that depends on the motion at a
+driven axis, changes the command before it becomes a force, or changes the response after it was sensed.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from equalizer.effects.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+Values = Mapping[str, float]
+"""By parameter name, SI."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number that a fit may move between `lower` and `upper`."""
+
+    name: str
+    lower: float
+    upper: float
+    none: float | None
+    """The value at which the effect is not there; None where this number alone cannot switch it off."""
+    scale: Literal["log", "linear"] = "log"
+    step: float = 0.01
+    """How far a fit moves it to see what it does: relative on a log scale, else in its own unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """Another linear model: masses, dampers, springs, couplings."""
+
+    change: Callable[[MechanicalModel, int, Values], MechanicalModel]
+    """Model, driven axis, values."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisForce:
+    """A force along a driven axis, from its motion."""
+
+    law: Any
+    """Compiled: law(of, memory, at) gives newtons; see `equalizer.effects.instant` for what `at` holds."""
+    pack: Callable[[MechanicalModel, int, Values], FloatArray]
+    """What the law finds in `of`."""
+    memory: int = 0
+    """How many numbers the law keeps between instants; they start at zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class OnCommand:
+    """What becomes of one channel of the command."""
+
+    change: Callable[[FloatArray, float, Values], FloatArray]
+    """Samples (n,), the seconds between them, values. A sample is the mean over its time."""
+    fine: bool = False
+    """It moves between samples, so that it must be followed more finely than they come."""
+
+
+@dataclass(frozen=True, slots=True)
+class OnResponse:
+    """What becomes of the response."""
+
+    change: Callable[[FloatArray, float, tuple[int, ...], Values], FloatArray]
+    """Samples (n, p), sample rate, the channels that it befalls, values."""
+    after_filter: bool = True
+    """Comes after the sensor's own low pass."""
+    shared: bool = False
+    """It cannot befall one channel alone."""
+
+
+Acts = Structure | AxisForce | OnCommand | OnResponse
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A catalogue entry. Its name, place, units and reported parameters stand in the vocabulary."""
+
+    name: str
+    equation: str
+    source: str
+    signature: str
+    """What a reader sees in the data where it is the cause; ends the sentence that names it."""
+    parameters: tuple[Parameter, ...]
+    acts: Acts
+    starts: Callable[[Evidence, int], tuple[Values, ...]]
+    """Values worth trying at an axis or channel, the likeliest first; none where the data speak against it."""
+    sites: tuple[Literal["one", "all", "each"], ...] = ("one",)
+    """One axis or channel; all with the same numbers; all, each with its own."""
+    simpler: tuple[str, ...] = ()
+    """Effects that it contains as a special case."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedEffect:
+    """An effect with its numbers, at the axes or channels that it befalls, all with the same numbers."""
+
+    effect: Effect
+    sites: tuple[int, ...]
+    values: Values

@@ -1,0 +1,31 @@
+"""What the starting values of an effect are drawn from: the motion, the commands and what the model failed to explain."""
+
+from dataclasses import dataclass
+
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Time first; all of one length (n), whole record. Axes are the command's."""
+
+    model: MechanicalModel
+    """Re-tuned; what the residuals are of."""
+    sample_rate_hz: float
+    command: FloatArray
+    """(n, m)"""
+    axis_position: FloatArray
+    """(n, m): as measured, smoothed by the model."""
+    axis_velocity: FloatArray
+    """(n, m)"""
+    axis_force: FloatArray
+    """(n, m): the additional force at each driven axis that would explain the residual, N."""
+    response: FloatArray
+    """(n, p): as measured."""
+    predicted: FloatArray
+    """(n, p)"""
+    noise: FloatArray
+    """(p,): rms of what does not repeat."""
+    used: FloatArray
+    """(n,): 1 where samples count, else 0."""

@@ -1,0 +1,16 @@
+"""Where a compiled law of force finds what it needs of the instant. "Free" is what would come to be without its force.
+
+A force is held over one step; laws that are steep (friction, stops) therefore ask what it would do by the step's end
+and solve for it, which stays stable at any step (the impulse view of dry friction; Moreau 1988, Stewart 2000).
+"""
+
+X, V = 0, 1
+"""Position and velocity of the axis at the start of the step."""
+X_FREE, V_FREE = 2, 3
+"""At its end without this force."""
+X_PER_N, V_PER_N = 4, 5
+"""What 1 N over the step adds to them."""
+A_FREE, A_PER_N = 6, 7
+"""Acceleration at the start without this force, and what 1 N adds to it."""
+STEP_S, TIME_S = 8, 9
+LENGTH = 10

@@ -1,0 +1,18 @@
+"""What a sensor makes of a true response, by the limits that a model states."""
+
+import numpy as np
+from scipy.signal import lfilter
+
+from equalizer.signals.signal import FloatArray
+
+
+def low_passed(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
+    """One pole, discrete: y += (1 - exp(-2 pi f / rate)) (x - y). response: (n, …)"""
+    if bandwidth_hz <= 0:
+        return response
+    decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
+    return np.asarray(lfilter([1 - decay], [1.0, -decay], response, axis=0))
+
+
+def within_range(response: FloatArray, limit: float) -> FloatArray:
+    return np.clip(response, -limit, limit) if limit > 0 else response

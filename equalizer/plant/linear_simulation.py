@@ -1,0 +1,82 @@
+"""A mechanical model's linear part, exactly discretised for forces that are held over each step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearSteps:
+    """State (q, v), 2n numbers; inputs are the m commands and the m driven axes' own forces."""
+
+    step_s: float
+    advance: FloatArray
+    """(2n, 2n)"""
+    by_command: FloatArray
+    """(2n, m)"""
+    by_axis_force: FloatArray
+    """(2n, m): of 1 N along each driven axis."""
+    motion: FloatArray
+    """(3 m, 2n): the driven axes' positions, velocities and accelerations."""
+    motion_by_command: FloatArray
+    """(3 m, m)"""
+    motion_by_axis_force: FloatArray
+    """(3 m, m)"""
+    response: FloatArray
+    """(p, 2n), of the quantity that the model answers with."""
+    response_by_command: FloatArray
+    """(p, m)"""
+    response_by_axis_force: FloatArray
+    """(p, m)"""
+    position: FloatArray
+    """(p, 2n)"""
+
+
+def driven_axes(model: MechanicalModel) -> FloatArray:
+    """(n, m): the direction in the coordinates along which each command drives; length 1."""
+    length = np.linalg.norm(model.input, axis=0)
+    return np.asarray(model.input / np.where(length > 0, length, 1.0))
+
+
+def linear_steps(model: MechanicalModel, step_s: float) -> LinearSteps:
+    """Actuator, sensor and effects apart."""
+    n, axes = model.coordinates, driven_axes(model)
+    m = axes.shape[1]
+    inputs = np.linalg.solve(model.mass, np.hstack([model.input, axes]))
+    from_state = -np.linalg.solve(model.mass, np.hstack([model.stiffness, model.damping]))
+    size = 2 * n
+    continuous = np.zeros((size + 2 * m, size + 2 * m))
+    continuous[:n, n:size] = np.eye(n)
+    continuous[n:size, :size] = from_state
+    continuous[n:size, size:] = inputs
+    exact = expm(continuous * step_s)
+    rate = DERIVATIVE_OF_QUANTITY[model.quantity]
+    looked, directly = _rows(model.output, rate, from_state, inputs)
+    motion = [_rows(axes.T, order, from_state, inputs) for order in range(3)]
+    return LinearSteps(
+        step_s=step_s,
+        advance=exact[:size, :size],
+        by_command=exact[:size, size : size + m],
+        by_axis_force=exact[:size, size + m :],
+        motion=np.vstack([rows for rows, _ in motion]),
+        motion_by_command=np.vstack([direct[:, :m] for _, direct in motion]),
+        motion_by_axis_force=np.vstack([direct[:, m:] for _, direct in motion]),
+        response=looked,
+        response_by_command=directly[:, :m],
+        response_by_axis_force=directly[:, m:],
+        position=_rows(model.output, 0, from_state, inputs)[0],
+    )
+
+
+def _rows(output: FloatArray, order: int, from_state: FloatArray, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """An output's `order`-th derivative: its rows for the state, (p, 2n), and for the inputs, (p, 2m)."""
+    nothing, directly = np.zeros_like(output), np.zeros((len(output), inputs.shape[1]))
+    if order == 0:
+        return np.hstack([output, nothing]), directly
+    if order == 1:
+        return np.hstack([nothing, output]), directly
+    return output @ from_state, output @ inputs
