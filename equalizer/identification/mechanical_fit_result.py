@@ -1,6 +1,6 @@
 """What a fit of a mechanical model found, how well it predicts, and why it stopped where it did."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 
@@ -15,9 +15,9 @@ class MechanicalFitSettings:
     """None: what the commands drive, from the lowest line on."""
     most_modes: int = 8
     """Beside the driven axes."""
-    sensor: SensorLimits = SensorLimits()
+    sensor: SensorLimits = field(default_factory=SensorLimits)
     """As its data sheet has it: it is taken as known, not fitted."""
-    actuator: ActuatorLimits = ActuatorLimits()
+    actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
     """Known beforehand; the delay is where its fit starts, if it is fitted."""
     fit_delay: bool = True
     """Whether a delay may be added where the left-out lines ask for it."""

@@ -1,0 +1,155 @@
+"""A linear mechanical model for whoever has none: masses, dampers and springs at the driven axes, and as many
+oscillators on them as the recordings ask for."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.identification.mechanical_fit_result import (
+    ChannelError,
+    MechanicalFit,
+    MechanicalFitRefused,
+    MechanicalFitSettings,
+)
+from equalizer.identification.mechanical_free_simulation import simulation_errors
+from equalizer.identification.mechanical_lines import SegmentLines, of_band, roles, segment_lines
+from equalizer.identification.mechanical_misfit import LineGroup, line_groups
+from equalizer.identification.mechanical_model_of import readable_model
+from equalizer.identification.mechanical_order import choose
+from equalizer.identification.mechanical_refinement import Refined, refined
+from equalizer.identification.mechanical_refusals import refuse_noise, refuse_unfit, refuse_unstable
+from equalizer.identification.mechanical_start import rigid_start
+from equalizer.identification.mechanical_structure import Structure
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+
+_LOW_PARTS = (1.0, 0.5, 0.25)
+"""Of the band in octaves, from its beginning: modes above would draw the start away from the rigid body."""
+
+
+def fit_mechanical_model(
+    recordings: Sequence[Recording],
+    settings: MechanicalFitSettings | None = None,
+    on_progress: Callable[[float], None] = lambda share: None,
+    name: str = "fitted to recordings",
+) -> MechanicalFit:
+    """From the total command to the response. Response i must be the motion where and along which command i acts; what
+    more there are may lie anywhere. Raises MechanicalFitRefused.
+
+    `on_progress(share)`.
+    """
+    settings = settings or MechanicalFitSettings()
+    refuse_unfit(recordings)
+    fit, test = roles(recordings)
+    lines = [one for each in fit if (one := segment_lines(*each)) is not None]
+    segments = of_band(lines, settings.band_hz)
+    if sum(len(one.frequency_hz) for one in segments) < 8:
+        raise MechanicalFitRefused(
+            "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
+            "record a sweep, noise or a multisine along every axis"
+        )
+    band = _band(segments)
+    groups = line_groups(segments, settings.floor)
+    structure = _structure(recordings[0], settings, band)
+    starts = _rigid_fits(segments, groups, structure, band, settings)
+    chosen = choose(groups, starts, band, settings, on_progress)
+    every = [group.of(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
+    final = refined(_nothing_left_out(every), chosen.best.structure, chosen.best.unknowns, band)
+    refuse_unstable(final)
+    tested = [one for each in test if (one := segment_lines(*each)) is not None]
+    on_progress(1.0)
+    model = readable_model(final, name)
+    errors = _channel_errors(model, lines, tested, band, recordings[0].response.channels)
+    return MechanicalFit(
+        model=model,
+        errors=errors[:-1],
+        error=errors[-1].fit,
+        held_out=errors[-1].held_out,
+        noise=errors[-1].noise,
+        band_hz=band,
+        tried=chosen.tried,
+        reason=chosen.reason,
+        remarks=_remarks(final, recordings[0].response.channels, bool(tested)),
+    )
+
+
+def _channel_errors(
+    model: MechanicalModel,
+    fitted: Sequence[SegmentLines],
+    tested: Sequence[SegmentLines],
+    band: tuple[float, float],
+    channels: tuple[str, ...],
+) -> tuple[ChannelError, ...]:
+    """The last one is over all channels. Raises MechanicalFitRefused where nothing is explained."""
+    error, noise = simulation_errors(model, fitted, band)
+    refuse_noise(error, channels)
+    held = simulation_errors(model, tested, band)[0] if tested else None
+    return tuple(
+        ChannelError(
+            channel,
+            float(error[i]),
+            None if held is None else float(held[i]),
+            float(noise[i]) if np.isfinite(noise[i]) else None,
+        )
+        for i, channel in enumerate((*channels, "all"))
+    )
+
+
+def _rigid_fits(
+    segments: Sequence[SegmentLines],
+    groups: Sequence[LineGroup],
+    structure: Structure,
+    band: tuple[float, float],
+    settings: MechanicalFitSettings,
+) -> list[Refined]:
+    found = []
+    for part in _LOW_PARTS:
+        end = band[0] * (band[1] / band[0]) ** part
+        lower = of_band(segments, (band[0], end))
+        if sum(len(one.frequency_hz) for one in lower) < 8 * structure.inputs:
+            continue
+        begun, unknowns = rigid_start(lower, structure, settings.floor)
+        found.append(refined(groups, begun, unknowns, band))
+    return found
+
+
+def _structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
+    inputs, outputs = len(recording.command.channels), len(recording.response.channels)
+    quantity, units = recording.response.quantities[0], (*recording.response.units, *recording.command.units)
+    return Structure(
+        inputs=inputs,
+        outputs=outputs,
+        quantity=quantity,
+        mass_scale=1.0,
+        speed_scale=2 * np.pi * float(np.sqrt(band[0] * band[1])),
+        signs=(1.0,) * inputs,
+        step_s=1 / recording.sample_rate_hz,
+        sensor=settings.sensor,
+        actuator=settings.actuator,
+        rotational=any(unit.startswith(("rad", "N m")) for unit in units),
+    )
+
+
+def _band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
+    return (
+        float(min(one.frequency_hz[0] for one in segments)),
+        float(max(one.frequency_hz[-1] for one in segments)),
+    )
+
+
+def _nothing_left_out(groups: Sequence[LineGroup]) -> list[LineGroup]:
+    return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
+
+
+def _remarks(final: Refined, channels: tuple[str, ...], tested: bool) -> tuple[str, ...]:
+    structure = final.structure
+    own = ", ".join(channels[: structure.inputs])
+    found = [f"The model is linear and was fitted, as none was given; {own} taken to move as the commands act."]
+    if -1.0 in structure.signs:
+        found.append("The response counts the other way than the command acts.")
+    if not structure.grounded:
+        found.append("No spring to the ground is seen: the device drifts freely under a constant command.")
+    if not tested:
+        found.append("Nothing was kept for a test: the error is that of the fitted segments.")
+    return tuple(found)

@@ -1,0 +1,126 @@
+"""What a mechanical model answers at given frequencies, sampled exactly as recordings are.
+
+Through the poles of M a + D v + K q = B u: each answers a held command in closed form, so that a line costs a product
+of small matrices. `response[k]` is taken just before `command[k]` is written; see `equalizer.signals.recording`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Hold
+from equalizer.signals.signal import FloatArray
+
+_SMALL = 1e-9
+"""Of a pole times the step: below it the pole integrates."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoleForm:
+    """Of the plant in continuous time, without delay and sensor."""
+
+    poles: ComplexArray
+    """(states,), 1/s"""
+    outputs: ComplexArray
+    """(p, states)"""
+    inputs: ComplexArray
+    """(states, m)"""
+    direct: FloatArray
+    """(p, m)"""
+    states: ComplexArray
+    """(states, states): each pole's share of each state's initial value."""
+
+
+def pole_form(model: MechanicalModel) -> PoleForm:
+    """Raises numpy.linalg.LinAlgError where the poles cannot be told apart at all."""
+    n, m = model.coordinates, model.inputs
+    weights = np.linalg.solve(model.mass, np.concatenate([model.stiffness, model.damping, model.input], axis=1))
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:] = np.eye(n)
+    A[n:, :n], A[n:, n:] = -weights[:, :n], -weights[:, n : 2 * n]
+    B = np.concatenate([np.zeros((n, m)), weights[:, 2 * n :]])
+    order = DERIVATIVE_OF_QUANTITY[model.quantity]
+    C = model.output @ (A[n:] if order == 2 else np.eye(2 * n)[order * n : (order + 1) * n])
+    direct = model.output @ B[n:] if order == 2 else np.zeros((model.outputs, m))
+    if model.actuator.bandwidth_hz:
+        A, B, C, direct = _behind_a_pole(A, B, C, direct, 2 * np.pi * model.actuator.bandwidth_hz)
+    poles, vectors = np.linalg.eig(A)
+    inverse = np.linalg.inv(vectors)
+    return PoleForm(poles.astype(complex), C @ vectors, inverse @ B, direct, inverse.astype(complex))
+
+
+def sampled_response(model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold) -> ComplexArray:
+    """(lines, p, m), sensor and delay included; frequencies above zero."""
+    form = pole_form(model)
+    z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
+    answers, direct = _answers(form.poles, z, rate_hz, hold, model.actuator.delay_s)
+    through = np.einsum("lk,pk,km->lpm", answers, form.outputs, form.inputs, optimize=True)
+    response = through + direct[:, None, None] * form.direct
+    return np.asarray(response * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
+
+
+def free_response(model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float) -> ComplexArray:
+    """(lines, p, 2n): spectra of what each initial state alone would give, per state's wrap from end to beginning.
+
+    A segment's spectrum is the response to its commands plus a real combination of these.
+    """
+    form = pole_form(model)
+    z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
+    decays = z[:, None] / (z[:, None] - np.exp(form.poles / rate_hz))
+    spectra = np.einsum("lk,pk,kn->lpn", decays, form.outputs, form.states, optimize=True)
+    return np.asarray(spectra * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
+
+
+def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
+    """(lines,): y += (1 - exp(-2 pi f / rate)) (x - y)."""
+    if not bandwidth_hz:
+        return np.ones(len(z), dtype=np.complex128)
+    left = np.exp(-2 * np.pi * bandwidth_hz / rate_hz)
+    return np.asarray((1 - left) / (1 - left / z))
+
+
+def _behind_a_pole(
+    A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, rate: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    n, m = B.shape
+    lagged = np.block([[A, B], [np.zeros((m, n)), -rate * np.eye(m)]])
+    driven = np.concatenate([np.zeros((n, m)), rate * np.eye(m)])
+    return lagged, driven, np.concatenate([C, direct], axis=1), np.zeros_like(direct)
+
+
+def _answers(
+    poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """(lines, poles), (lines,): what a pole, and what goes straight through, makes of a command."""
+    step, column = 1 / rate_hz, z[:, None]
+    if hold is Hold.ZERO_ORDER:
+        whole = np.floor(delay_s * rate_hz + 1e-9)
+        late = max(delay_s - whole * step, 0.0)
+        early = step - late
+        first = _integral(poles, early)
+        second = np.exp(poles * early) * _integral(poles, late)
+        away = column ** (-whole)
+        return away * (first + second / column) / (column - np.exp(poles * step)), z ** (-whole - 1)
+    delayed = np.exp(-np.log(z) * delay_s * rate_hz)
+    if hold is Hold.LINEAR:
+        ramp = _ramp(poles, step)
+        away = column - np.exp(poles * step)
+        return delayed[:, None] * (_integral(poles, step) + ramp * (column - 1)) / away, delayed
+    return delayed[:, None] / (np.log(column) * rate_hz - poles), delayed
+
+
+def _integral(poles: ComplexArray, seconds: float) -> ComplexArray:
+    """Of e^(p t) from 0 on; (poles,)."""
+    small = np.abs(poles) * seconds < _SMALL
+    safe = np.where(small, 1.0, poles)
+    return np.asarray(np.where(small, seconds, np.expm1(safe * seconds) / safe))
+
+
+def _ramp(poles: ComplexArray, step: float) -> ComplexArray:
+    """What a command that rises by one over the step adds by its end; (poles,)."""
+    small = np.abs(poles) * step < 1e-4
+    safe = np.where(small, 1.0, poles)
+    exact = (np.expm1(safe * step) - safe * step) / (safe**2 * step)
+    return np.asarray(np.where(small, step / 2 + poles * step**2 / 6, exact))

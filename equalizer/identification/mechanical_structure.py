@@ -1,0 +1,174 @@
+"""The unknowns of a mechanical model: masses, dampers and springs at the driven axes, and oscillators on them.
+
+M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
+(root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses see the
+driven axes through `output` rows, the oscillators through rows of their own.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What is unknown; its numbers are a vector, in units that make them about one."""
+
+    inputs: int
+    outputs: int
+    """The first `inputs` of them are the driven axes' own motions."""
+    quantity: str
+    mass_scale: float
+    speed_scale: float
+    """rad/s"""
+    signs: tuple[float, ...]
+    """Of the driven axes' own responses: -1 for a sensor that counts the other way."""
+    modes: int = 0
+    grounded: bool = True
+    """Whether springs to the ground may be there."""
+    turned: bool = False
+    """Whether the sensor's axes may be turned against the commands' by a small angle."""
+    shared: bool = False
+    """Whether the driven axes' own sensors see a part of the oscillators' motion beside them."""
+    delayed: bool = False
+    step_s: float = 1e-3
+    sensor: SensorLimits = field(default_factory=SensorLimits)
+    actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
+    rotational: bool = False
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        m, p = self.inputs, self.outputs
+        pairs = m * (m + 1) // 2
+        seen = p if self.shared else p - m
+        sizes = {
+            "mass": pairs, "damping": pairs, "stiffness": pairs if self.grounded else 0,
+            "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.turned else 0,
+            "delay": 1 if self.delayed else 0, "modes": self.modes * (2 + m + seen),
+        }  # fmt: skip
+        ends = np.cumsum(list(sizes.values()))
+        return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+
+    @property
+    def parameters(self) -> int:
+        return int(self.slices["modes"].stop)
+
+    @property
+    def coordinates(self) -> int:
+        return self.inputs + self.modes
+
+    @property
+    def units(self) -> tuple[float, float, float]:
+        """Of mass, damping and stiffness."""
+        return (
+            self.mass_scale,
+            self.mass_scale * self.speed_scale,
+            self.mass_scale * self.speed_scale**2,
+        )
+
+    def larger(self, unknowns: FloatArray, **changes: bool | int) -> tuple["Structure", FloatArray]:
+        """With more unknowns, which begin at zero; those of added oscillators too."""
+        other = replace(self, **changes)  # type: ignore[arg-type]
+        grown = np.zeros(other.parameters)
+        for name, part in self.slices.items():
+            there = other.slices[name]
+            if name == "modes" and self.modes:
+                old = unknowns[part].reshape(self.modes, -1)
+                new = np.zeros((other.modes, (there.stop - there.start) // other.modes))
+                head = 2 + self.inputs
+                new[: self.modes, :head] = old[:, :head]
+                if old.shape[1] > head:
+                    new[: self.modes, new.shape[1] - (old.shape[1] - head) :] = old[:, head:]
+                grown[there] = new.ravel()
+            elif name != "modes" and part.stop - part.start == there.stop - there.start:
+                grown[there] = unknowns[part]
+        return other, grown
+
+    def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
+        """In relative coordinates. Raises MechanicalModelError for what is no mass."""
+        m, part = self.inputs, self.slices
+        units = self.units
+        lower = _lower(unknowns[part["mass"]], m)
+        mass = units[0] * lower @ lower.T
+        damping = units[1] * _symmetric(unknowns[part["damping"]], m)
+        stiffness = units[2] * _symmetric(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        frequency, ratio, participation, seen = self.oscillators(unknowns)
+        one = np.eye(self.modes)
+        own = np.diag(self.signs) @ _turn(unknowns[part["turn"]], m)
+        rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
+        return MechanicalModel(
+            name=name,
+            quantity=self.quantity,
+            mass=np.block([[mass + participation.T @ participation, participation.T], [participation, one]]),
+            damping=_apart(damping, np.diag(2 * ratio * frequency)),
+            stiffness=_apart(stiffness, np.diag(frequency**2)),
+            input=np.concatenate([np.eye(m), np.zeros((self.modes, m))]),
+            output=np.concatenate([rows, seen.T], axis=1),
+            sensor=self.sensor,
+            actuator=replace(self.actuator, delay_s=self.delay_s(unknowns)),
+            rotational=self.rotational,
+        )
+
+    def delay_s(self, unknowns: FloatArray) -> float:
+        if not self.delayed:
+            return self.actuator.delay_s
+        return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)
+
+    def oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """rad/s (modes,), damping ratios (modes,), participations (modes, m), what each response sees (modes, p)."""
+        m, p = self.inputs, self.outputs
+        each = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
+        root = np.sqrt(self.mass_scale)
+        seen = np.zeros((self.modes, p))
+        if self.modes and each.shape[1] > 2 + m:
+            seen[:, p - (each.shape[1] - 2 - m) :] = each[:, 2 + m :] / root
+        return self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1]), root * each[:, 2 : 2 + m], seen
+
+
+def packed_mass(mass: FloatArray) -> FloatArray:
+    """Unknowns of a mass in the structure's unit. mass: (m, m), positive definite."""
+    lower = np.linalg.cholesky(mass)
+    np.fill_diagonal(lower, np.log(np.diag(lower)))
+    return np.asarray(lower[np.tril_indices(len(mass))])
+
+
+def packed_symmetric(matrix: FloatArray) -> FloatArray:
+    return np.asarray(matrix[np.tril_indices(len(matrix))])
+
+
+def diagonal_places(m: int) -> npt.NDArray[np.intp]:
+    """Which of the unknowns of a symmetric matrix stand on its diagonal."""
+    rows, columns = np.tril_indices(m)
+    return np.flatnonzero(rows == columns)
+
+
+def _lower(unknowns: FloatArray, m: int) -> FloatArray:
+    lower = np.zeros((m, m))
+    lower[np.tril_indices(m)] = unknowns
+    np.fill_diagonal(lower, np.exp(np.diag(lower)))
+    return lower
+
+
+def _symmetric(unknowns: FloatArray, m: int) -> FloatArray:
+    lower = np.zeros((m, m))
+    lower[np.tril_indices(m)] = unknowns
+    return np.asarray(lower + np.tril(lower, -1).T)
+
+
+def _turn(angles: FloatArray, m: int) -> FloatArray:
+    """Rows that see the axes turned: the rotation that the skew matrix's Cayley transform gives."""
+    if not len(angles):
+        return np.eye(m)
+    skew = np.zeros((m, m))
+    skew[np.tril_indices(m, -1)] = angles / 2
+    skew = skew - skew.T
+    return np.asarray(np.linalg.solve(np.eye(m) - skew, np.eye(m) + skew))
+
+
+def _apart(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.block([[one, np.zeros((len(one), len(other)))], [np.zeros((len(other), len(one))), other]])
