@@ -16,7 +16,9 @@ class SegmentNoise:
     freedom: FloatArray
     """(channels,): degrees of freedom of the variance."""
     counted: tuple[bool, ...]
-    """Per channel. False: larger than in the quietest segments, so there is more than noise in it."""
+    """Per channel: whether it is part of the noise floor."""
+    varies: tuple[bool, ...]
+    """Per channel: larger than in the quietest segments, so there is more than noise in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -96,7 +96,7 @@ def _from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloo
 def _what_varies(signal: Signal, noise: ChannelNoise) -> list[str]:
     remarks = []
     for number, name in enumerate(signal.channels):
-        left = sum(not segment.counted[number] for segment in noise.segments)
+        left = sum(segment.varies[number] for segment in noise.segments)
         if left:
             instead = "what is heard at rest" if noise.more_than_rest[number] else "that of the others"
             remarks.append(

@@ -74,7 +74,7 @@ def quiet_band_noise(
 ) -> tuple[FloatArray, float] | None:
     """White density (lines, channels) as strong as the median line above all that is driven, and its degrees of
     freedom; None where no band is left above. The median, so that the lines of harmonics do not count."""
-    whole = np.isfinite(samples).all(axis=1) & np.isfinite(instrument_of(recording)).all(axis=1)
+    whole = np.asarray(np.isfinite(np.hstack([samples, instrument_of(recording)])).all(axis=1))
     if not whole.all():
         samples = np.where(whole[:, None], samples, np.nanmean(samples, axis=0))
     n = len(samples)
@@ -86,12 +86,12 @@ def quiet_band_noise(
     if smooth.max() == 0:
         return None
     highest_hz = float(lines_hz[np.flatnonzero(smooth > _SILENT * smooth.max())[-1]])
-    quiet = np.asarray(lines_hz > _CLEAR * highest_hz)
-    if quiet.sum() < _LEAST_LINES:
+    quiet = np.flatnonzero(lines_hz > _CLEAR * highest_hz)
+    if len(quiet) < _LEAST_LINES:
         return None
     power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
     level = np.median(power[quiet], axis=0) / np.log(2)
-    return np.tile(level, (len(frequency_hz), 1)), float(quiet.sum())
+    return np.tile(level, (len(frequency_hz), 1)), float(len(quiet))
 
 
 def _rests(recording: Recording, settling_s: float) -> list[tuple[int, int]]:

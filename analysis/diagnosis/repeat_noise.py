@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
 from analysis.diagnosis.channel_noise import ChannelNoise, SegmentNoise
-from analysis.diagnosis.periods import Periods, look_spectra
+from analysis.diagnosis.periods import Periods, look_samples, look_spectra
 from analysis.diagnosis.quiet_noise import hiss_at_rest
 from analysis.diagnosis.rounding import rounded_noise, rounding_step
 from equalizer.identification.noise_floor import over_neighbours, spread_over_looks
@@ -22,6 +22,8 @@ BoolArray = npt.NDArray[np.bool_]
 _SMOOTHED_LINES = 9
 _ALIKE = 1e-4
 """Chance that equal noise is taken for unequal."""
+_STEPS_MOVED = 1.2
+"""Rms of a movement in steps of rounding: with less, rounding may hide noise or add to it by chance."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -32,16 +34,25 @@ def repeat_noise(
     spreads = [_spread(recording, samples, one, lines_hz) for one in periods]
     density, freedom = np.stack([spread for spread, _ in spreads]), np.stack([free for _, free in spreads])
     variance = density.mean(axis=1)
-    counted = quietest(variance, freedom)
+    moved = _moved(samples, periods)
+    counted = moved & quietest(np.where(moved, variance, np.inf), freedom)
     weights = np.where(counted, freedom, 0.0)
     pooled = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
     freedom_pooled = weights.sum(axis=0)
-    floor, loud = _no_more_than_rest(recording, samples, pooled, freedom_pooled, ~counted.all(axis=0))
+    varies = np.asarray(moved & ~counted)
+    floor, loud = _no_more_than_rest(recording, samples, pooled, freedom_pooled, np.asarray(varies.any(axis=0)))
     smooth = over_neighbours(floor, _SMOOTHED_LINES)
     smooth *= floor.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
     whole, rounding = with_rounding(smooth, samples)
     segments = tuple(
-        SegmentNoise(one.index, one.segment.amplitude, variance[k], freedom[k], tuple(counted[k].tolist()))
+        SegmentNoise(
+            one.index,
+            one.segment.amplitude,
+            variance[k],
+            freedom[k],
+            tuple(counted[k].tolist()),
+            tuple(varies[k].tolist()),
+        )
         for k, one in enumerate(periods)
     )
     return ChannelNoise(np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(loud.tolist()))
@@ -80,6 +91,13 @@ def _spread(
     if len(own_hz) != len(lines_hz):
         density = np.stack([np.interp(lines_hz, own_hz, channel) for channel in density.T], axis=1)
     return density, freedom
+
+
+def _moved(samples: FloatArray, periods: Sequence[Periods]) -> BoolArray:
+    """(segments, channels): where a channel moves over its steps of rounding; all where it never does."""
+    steps = np.array([rounding_step(channel) for channel in samples.T])
+    moved = np.array([look_samples(samples, one).std(axis=(0, 1)) >= _STEPS_MOVED * steps for one in periods])
+    return np.asarray(moved | ~moved.any(axis=0), dtype=np.bool_)
 
 
 def _no_more_than_rest(

@@ -1,0 +1,76 @@
+"""Which lines of a period were driven, and what the silent ones detect.
+
+A device that is linear answers on driven lines only. Where all driven lines are odd multiples of one, odd distortion
+falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon 2016). Measured from the excitation as
+it was, so that any multisine with silent lines will do.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.lockin import ComplexArray
+
+BoolArray = npt.NDArray[np.bool_]
+_SILENT = 3e-3
+"""Amplitude of a line, of the strongest of its input, below which it counts as silent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DetectionLines:
+    """Each (lines,), within the driven band."""
+
+    driven: BoolArray
+    odd: BoolArray
+    """Silent lines that only odd distortion reaches."""
+    even: BoolArray
+    """Silent lines that only even distortion reaches."""
+    either: BoolArray
+    """Silent lines that both reach, because even lines were driven, too."""
+    step: int
+    """Greatest common divisor of the driven lines' numbers: lines between its multiples detect noise only."""
+
+    @property
+    def any_silent(self) -> bool:
+        return bool((self.odd | self.even | self.either).any())
+
+
+def detection_lines(excitation: ComplexArray) -> DetectionLines | None:
+    """excitation: (lines, inputs), line k in row k - 1. None where nothing is driven."""
+    size = np.abs(excitation)
+    strongest = size.max()
+    if strongest == 0:
+        return None
+    driven = np.asarray((size > _SILENT * np.maximum(size.max(axis=0), 0.1 * strongest)).any(axis=1))
+    numbers = np.arange(1, len(driven) + 1)
+    step = int(np.gcd.reduce(numbers[driven]))
+    lowest, highest = numbers[driven][[0, -1]]
+    silent = ~driven & (numbers >= lowest) & (numbers <= highest) & (numbers % step == 0)
+    multiple = numbers // step
+    odd_only = bool((multiple[driven] % 2 == 1).all()) and highest > lowest
+    none = np.zeros(len(driven), dtype=np.bool_)
+    if not odd_only:
+        return DetectionLines(driven, none, none, np.asarray(silent), step)
+    return DetectionLines(
+        driven, np.asarray(silent & (multiple % 2 == 1)), np.asarray(silent & (multiple % 2 == 0)), none, step
+    )
+
+
+def image_lines(driven: BoolArray, repeats: int) -> BoolArray:
+    """(lines,): where a command that is held over `repeats` samples leaves images of its driven lines."""
+    lines = len(driven)
+    length = 2 * (lines + 1)
+    found = np.zeros(lines, dtype=np.bool_)
+    numbers = np.flatnonzero(driven) + 1
+    for multiple in range(1, repeats // 2 + 1):
+        centre = multiple * length // repeats
+        for image in (centre - numbers, centre + numbers):
+            found[image[(image >= 1) & (image <= lines)] - 1] = True
+    return np.asarray(found & ~driven)
+
+
+def held_samples(command: npt.NDArray[np.float64]) -> int:
+    """Over how many samples each value of the command is held. command: (n, inputs)"""
+    moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
+    return int(np.gcd.reduce(np.diff(moves))) if len(moves) > 16 else 1

@@ -1,0 +1,32 @@
+"""The frequency bands of a diagnosis: octaves that begin at powers of two, alike for all recordings, so that what was
+learned of a band on one is known on another."""
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.signal import FloatArray
+
+Band = tuple[float, float]
+
+
+def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
+    """Every octave that holds a part of it; a last line on an edge opens its own octave. Both must be positive."""
+    first = int(np.floor(np.log2(from_hz) + 1e-9))
+    last = int(np.floor(np.log2(to_hz) + 1e-9))
+    return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
+
+
+def within(frequency_hz: FloatArray, band_hz: Band) -> npt.NDArray[np.bool_]:
+    """(lines,): lower edge included, upper edge excluded."""
+    return np.asarray((frequency_hz >= band_hz[0] * (1 - 1e-9)) & (frequency_hz < band_hz[1] * (1 - 1e-9)))
+
+
+def driving_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Which inputs were driven in a segment. power: (inputs,). An input that only reacts, by a feedback, stays below a
+    hundredth of the strongest where the excitation was recorded."""
+    if power.max(initial=0.0) == 0:
+        return ()
+    return tuple(name for name, one in zip(channels, power, strict=True) if one > _DRIVEN * power.max())
+
+
+_DRIVEN = 0.01
