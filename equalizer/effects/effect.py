@@ -1,7 +1,8 @@
 """What an effect is to the simulator and to a diagnosis: its equation, its numbers, where it acts and how.
 
-An effect acts in one of four ways: it changes the linear structure, adds a force that depends on the motion at a
-driven axis, changes the command before it becomes a force, or changes the response after it was sensed.
+An effect acts in one of five ways: it changes the linear structure, adds a force that depends on the motion at a
+driven axis or within a joint, changes the command before it becomes a force, or changes the response after it was
+sensed.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,6 +16,12 @@ from equalizer.signals.signal import FloatArray
 Values = Mapping[str, float]
 """By parameter name, SI."""
 
+STEPS = 4
+"""Per sample, where a force depends on the motion or a command moves between samples."""
+
+ALL_SITES = -1
+"""Stands for the site where starting values are asked for all axes or channels together."""
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -24,10 +31,13 @@ class Parameter:
     lower: float
     upper: float
     none: float | None
-    """The value at which the effect is not there; None where this number alone cannot switch it off."""
-    scale: Literal["log", "linear"] = "log"
+    """Where all numbers that have such a value are at it, the effect is not there; None: it does not matter."""
+    scale: Literal["log", "linear", "signed"] = "log"
+    """signed: either sign, and nobody knows the size beforehand; a fit moves it by a share of its start."""
     step: float = 0.01
-    """How far a fit moves it to see what it does: relative on a log scale, else in its own unit."""
+    """How far a fit moves it to see what it does: relative, but in its own unit on a linear scale."""
+    fixed: bool = False
+    """Read off the recording by its starting value; a fit does not move it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +58,22 @@ class AxisForce:
     """What the law finds in `of`."""
     memory: int = 0
     """How many numbers the law keeps between instants; they start at zero."""
+    steps: int = STEPS
+    """At least so many per sample."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointForce:
+    """A force between two bodies, or within one that the model takes for stiff, from how they move to each other."""
+
+    change: Callable[[MechanicalModel, int, Values], tuple[MechanicalModel, FloatArray]]
+    """The structure with the joint in it, whose further coordinates come last; and the direction (n,) in its
+    coordinates along which the joint moves and its force acts."""
+    law: Any
+    pack: Callable[[MechanicalModel, int, Values], FloatArray]
+    """Of the model before the change."""
+    memory: int = 0
+    steps: int = STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +94,18 @@ class OnResponse:
     """Samples (n, p), sample rate, the channels that it befalls, values."""
     after_filter: bool = True
     """Comes after the sensor's own low pass."""
+    stage: int = 0
+    """Orders those on the same side of the low pass: alignment, range, what is added, numbers, clock."""
     shared: bool = False
     """It cannot befall one channel alone."""
+    position_too: bool = False
+    """The position is read by the same clock or logger and undergoes the same."""
+    given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
+    """Where chance decides, what was read given what was measured: samples (n, p), measured (n, p), its noise (p,),
+    channels, values. Without a measurement `change` plays some chance."""
 
 
-Acts = Structure | AxisForce | OnCommand | OnResponse
+Acts = Structure | AxisForce | JointForce | OnCommand | OnResponse
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +125,8 @@ class Effect:
     """One axis or channel; all with the same numbers; all, each with its own."""
     simpler: tuple[str, ...] = ()
     """Effects that it contains as a special case."""
+    report: Callable[[Values], Values] = dict
+    """The vocabulary's numbers from the fitted ones, where these say more than a reader wants."""
 
 
 @dataclass(frozen=True, slots=True)

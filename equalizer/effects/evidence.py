@@ -1,4 +1,4 @@
-"""What the starting values of an effect are drawn from: the motion, the commands and what the model failed to explain."""
+"""What an effect's starting values are drawn from: motion, commands, and what the model failed to explain."""
 
 from dataclasses import dataclass
 
@@ -29,3 +29,9 @@ class Evidence:
     """(p,): rms of what does not repeat."""
     used: FloatArray
     """(n,): 1 where samples count, else 0."""
+    position: FloatArray | None = None
+    """(n, d): as measured; None where no position was recorded."""
+    predicted_position: FloatArray | None = None
+    """(n, p): of the response's rows; compared where d = p."""
+    position_noise: FloatArray | None = None
+    """(d,): rms"""

@@ -3,7 +3,7 @@
 What an effect does is written elsewhere, one physics per file; here is only what it is called, where it sits and
 which numbers it has. Meanings: `gap` is the total play, `width` half the dead band, `gain` a factor (1 = none),
 `degrees` the total rotation angle, `ppm` > 0 takes the response at t (1 + ppm 1e-6), `per_m` is M (1 + per_m x);
-`total` and the hum's `amplitude` are those of the largest channel.
+`total` and the hum's `amplitude` are those of the largest channel, where all share the effect.
 """
 
 from dataclasses import dataclass
@@ -22,6 +22,8 @@ class EffectParameter:
     unit: str
     """SI, of a translational model; with RESPONSE for the response's own."""
     rotational_unit: str
+    optional: bool = False
+    """A file may leave it out; needed to play an effect again just as it was fitted."""
 
     def unit_in(self, rotational: bool, response_unit: str) -> str:
         """The unit in a model whose response is in `response_unit`."""
@@ -45,6 +47,10 @@ class EffectName:
 
 def _number(name: str, unit: str, rotational: str = "") -> EffectParameter:
     return EffectParameter(name, unit, rotational or unit)
+
+
+def _optional(name: str, unit: str, rotational: str = "") -> EffectParameter:
+    return EffectParameter(name, unit, rotational or unit, optional=True)
 
 
 def _level(name: str) -> EffectParameter:
@@ -91,13 +97,22 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("force_gain", "actuator", (_number("gain", "1"),)),
     EffectName("sensor_lag", "sensor", (_number("bandwidth", "Hz"),)),
     EffectName("sensor_clipping", "sensor", (_number("limit", RESPONSE),)),
-    EffectName("sensor_misalignment", "sensor", (_number("degrees", "deg"),)),
+    EffectName(
+        "sensor_misalignment",
+        "sensor",
+        (_number("degrees", "deg"), *(_optional(f"about_{axis}", "deg") for axis in "xyz")),
+    ),
+    EffectName("cross_axis_sensitivity", "sensor", (_number("from_next", "1"), _number("from_after_next", "1"))),
     EffectName("sensor_gain", "sensor", (_number("gain", "1"),)),
     EffectName("sensor_nonlinearity", "sensor", (_number("cubic", f"1/{RESPONSE}^2"),)),
-    EffectName("sensor_drift", "sensor", (_number("total", RESPONSE),)),
+    EffectName("sensor_offset", "sensor", (_number("offset", RESPONSE),)),
+    EffectName("sensor_drift", "sensor", (_number("total", RESPONSE), _optional("bend", "1"))),
     EffectName("quantization", "sensor", (_number("step", RESPONSE),)),
-    EffectName("mains_hum", "sensor", (_number("amplitude", RESPONSE), _number("frequency", "Hz"))),
-    EffectName("clock_drift", "sensor", (_number("ppm", "ppm"),)),
+    EffectName(
+        "mains_hum", "sensor", (_number("amplitude", RESPONSE), _number("frequency", "Hz"), _optional("phase", "rad"))
+    ),
+    EffectName("clock_drift", "sensor", (_number("ppm", "ppm"), _optional("interpolated", "1"))),
+    EffectName("logger_offset", "sensor", (_number("offset", "s"),)),
     EffectName("lost_samples", "sensor", (_number("fraction", "1"),)),
 )
 

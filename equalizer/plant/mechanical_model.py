@@ -177,6 +177,10 @@ def effect_problems(effect: ModelEffect) -> Iterator[str]:
             yield f"{effect.kind} has no parameter '{name}'{nearest(name, names)}; allowed are {', '.join(names)}"
         elif not np.isfinite(value):
             yield f"{effect.kind}.{name} is {value}; it must be a finite number"
-    missing = [f"{part.name} ({part.unit})" for part in known.parameters if part.name not in effect.parameters]
+    missing = [
+        f"{part.name} ({part.unit})"
+        for part in known.parameters
+        if not (part.optional or part.name in effect.parameters)
+    ]
     if missing:
         yield f"{effect.kind} lacks {', '.join(missing)}"

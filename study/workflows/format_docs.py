@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from analysis.diagnosis import document
 from analysis.reproduction import document as reproduction_document
 from analysis.thresholds import Threshold
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
 from equalizer.signals.units import ALLOWED
 from equalizer.tracking.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.schema import protocol_schema
@@ -152,10 +152,15 @@ def _mechanical_models() -> Iterable[str]:
 _RESPONSE = "the response's unit"
 
 
+def _parameter(part: EffectParameter) -> str:
+    unit = part.unit_in(False, _RESPONSE)
+    return f"`{part.name}` ({unit}, optional)" if part.optional else f"`{part.name}` ({unit})"
+
+
 def _effects() -> str:
     rows = []
     for effect in EFFECT_NAMES:
-        numbers = ", ".join(f"`{part.name}` ({part.unit_in(False, _RESPONSE)})" for part in effect.parameters)
+        numbers = ", ".join(_parameter(part) for part in effect.parameters)
         turned = ", ".join(part.unit_in(True, _RESPONSE) for part in effect.parameters)
         rows.append((f"`{effect.name}`", effect.place, numbers, turned))
     return _rows(("effect", "place", "parameters", "rotational units"), rows)
