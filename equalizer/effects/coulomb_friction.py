@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The force that stops the axis by the end of the step, if friction is strong enough for it."""
     stopping = -at[V_FREE] / at[V_PER_N]
-    return min(max(stopping, -of[0]), of[0])
+    return float(min(max(stopping, -of[0]), of[0]))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

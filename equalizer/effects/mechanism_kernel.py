@@ -4,6 +4,8 @@ Between steps everything linear is exact; a motion-dependent force is found once
 """
 
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +17,8 @@ from equalizer.signals.signal import FloatArray
 
 LAWS = 6
 """How many different laws can act at once."""
+SWEEPS = 3
+"""Over all forces per step, where there are several: each is found again with the others as they have become."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _PLACES = types.int64[:, ::1]
@@ -22,9 +26,17 @@ LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
 """What every law of force is compiled as."""
 
 Integers = npt.NDArray[np.int64]
+Three = tuple[FloatArray, FloatArray, FloatArray]
+
+_THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
+_TWO = types.UniTuple(_MATRIX, 2)  # type: ignore[no-untyped-call]
+_LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
+_PLAY = types.void(
+    _LAWS, _PLACES, _VECTOR, _VECTOR, _THREE, _THREE, _THREE, _MATRIX, _VECTOR, _TWO, types.int64, types.float64
+)
 
 
-def compiled_law(law: object) -> object:
+def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
     """The law, ready to be called from the kernel. Its machine code is kept on disk with its own file."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
@@ -47,32 +59,63 @@ with warnings.catch_warnings():
             for i in range(out.shape[0]):
                 out[i] += matrix[j, i] * b
 
+    @njit(types.float64(_MATRIX, types.int64, _VECTOR), cache=True, fastmath={"reassoc", "contract"})
+    def _row(matrix: FloatArray, row: int, by: FloatArray) -> float:
+        total = 0.0
+        for j in range(by.shape[0]):
+            total += matrix[row, j] * by[j]
+        return total
+
     @njit(
-        types.void(
-            types.UniTuple(types.FunctionType(LAW), LAWS), _PLACES, _VECTOR, _VECTOR,
-            types.UniTuple(_MATRIX, 3), types.UniTuple(_MATRIX, 3), _MATRIX, _MATRIX, _VECTOR,
-            types.UniTuple(_MATRIX, 2), types.int64, types.float64,
-        ),
+        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _THREE, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _VECTOR, _VECTOR),
         cache=True, nogil=True, error_model="numpy",
     )  # fmt: skip
-    def play(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: object, places: Integers, of: FloatArray, memory: FloatArray,
-        advance: tuple[FloatArray, FloatArray, FloatArray], look: tuple[FloatArray, FloatArray, FloatArray],
-        per_newton: FloatArray, command: FloatArray, state: FloatArray,
-        out: tuple[FloatArray, FloatArray], steps: int, step_s: float,
+    def _push(  # noqa: PLR0913 - a kernel takes flat arrays
+        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, motion: Three, state: FloatArray,
+        u: FloatArray, free: FloatArray, by_force: FloatArray, force: FloatArray, at: FloatArray,
     ) -> None:  # fmt: skip
-        """Fills out = (what is looked at (n, rows), forces (n, ports)), as they are just before each command is written.
+        """Finds the forces (ports,) of one step and lets them act on `free`, the state at its end without them."""
+        ports = force.shape[0]
+        before, items = memory.copy(), places.shape[0]
+        own = np.zeros(items)
+        force[:] = 0.0
+        for sweep in range(SWEEPS if items > 1 else 1):
+            for item in range(items):
+                port, kept, end = places[item, 1], places[item, 4], places[item, 5]
+                if sweep > 0:
+                    force[port] -= own[item]
+                    for i in range(free.shape[0]):
+                        free[i] -= by_force[port, i] * own[item]
+                    memory[kept:end] = before[kept:end]
+                at[X], at[V] = _row(motion[0], port, state), _row(motion[0], ports + port, state)
+                at[X_FREE], at[V_FREE] = _row(motion[0], port, free), _row(motion[0], ports + port, free)
+                at[X_PER_N] = _row(motion[0], port, by_force[port])
+                at[V_PER_N] = _row(motion[0], ports + port, by_force[port])
+                row = 2 * ports + port
+                at[A_FREE] = _row(motion[0], row, state) + _row(motion[1], row, u) + _row(motion[2], row, force)
+                at[A_PER_N] = motion[2][row, port]
+                added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], memory[kept:end], at)
+                own[item] = added
+                force[port] += added
+                for i in range(free.shape[0]):
+                    free[i] += by_force[port, i] * added
+
+    @njit(_PLAY, cache=True, nogil=True, error_model="numpy")
+    def play(  # noqa: PLR0913 - a kernel takes flat arrays
+        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, advance: Three, look: Three, motion: Three,
+        command: FloatArray, state: FloatArray, out: tuple[FloatArray, FloatArray], steps: int, step_s: float,
+    ) -> None:  # fmt: skip
+        """Fills out = (what is looked at (n, rows), forces (n, ports)), as they are just before a command is written.
 
         places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. advance: transposed, (s, s),
-        (m, s) and (ports, s). look: transposed, (s, rows), (m, rows), (ports, rows); rows begin with the ports'
-        positions, velocities and accelerations. per_newton: (ports, 3), what 1 N adds to those by a step's end (and
-        to the acceleration at once). command: (n, m), or (n steps, m).
+        (m, s) and (ports, s). look: transposed, (s, rows), (m, rows), (ports, rows). motion: (3 ports, s), (3 ports, m)
+        and (3 ports, ports), the ports' positions, velocities and accelerations. command: (n, m), or (n steps, m).
         """
         looked, forces = out
-        n, ports, rows, size = looked.shape[0], per_newton.shape[0], looked.shape[1], state.shape[0]
+        n, ports, size = looked.shape[0], forces.shape[1], state.shape[0]
         fine = command.shape[0] == n * steps and steps > 1
         free, before, force = np.empty(size), np.zeros(command.shape[1]), np.zeros(ports)
-        at, seen, seen_free = np.zeros(LENGTH), np.empty(rows), np.empty(rows)
+        at, seen = np.zeros(LENGTH), np.empty(looked.shape[1])
         at[STEP_S] = step_s
         for k in range(n):
             seen[:] = 0.0
@@ -87,27 +130,7 @@ with warnings.catch_warnings():
                 _add(free, advance[0], state)
                 _add(free, advance[1], u)
                 if len(places):
-                    seen[:] = 0.0
-                    _add(seen, look[0], state)
-                    _add(seen, look[1], u)
-                    force[:] = 0.0
                     at[TIME_S] = (k * steps + step) * step_s
-                    for item in range(places.shape[0]):
-                        port = places[item, 1]
-                        seen_free[:] = 0.0
-                        _add(seen_free, look[0], free)
-                        at[X], at[V] = seen[port], seen[ports + port]
-                        at[X_FREE], at[V_FREE] = seen_free[port], seen_free[ports + port]
-                        at[X_PER_N], at[V_PER_N] = per_newton[port, 0], per_newton[port, 1]
-                        at[A_FREE] = seen[2 * ports + port]
-                        at[A_PER_N] = per_newton[port, 2]
-                        added = laws[places[item, 0]](
-                            of[places[item, 2] : places[item, 3]], memory[places[item, 4] : places[item, 5]], at
-                        )
-                        force[port] += added
-                        for i in range(size):
-                            free[i] += advance[2][port, i] * added
-                        for i in range(rows):
-                            seen[i] += look[2][port, i] * added
+                    _push(laws, places, of, memory, motion, state, u, free, advance[2], force, at)
                 state[:] = free
                 before[:] = u

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.bodies import STEPS, Bodies, bodies_of, moved
+from equalizer.effects.bodies import Bodies, bodies_of, moved
 from equalizer.effects.command_path import delayed, finer, lagged
-from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect
+from equalizer.effects.effect import STEPS, OnCommand, OnResponse, PlacedEffect
 from equalizer.effects.sensor_path import low_passed, within_range
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold

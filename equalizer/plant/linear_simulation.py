@@ -11,7 +11,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearSteps:
-    """State (q, v), 2n numbers; inputs are the m commands and the m driven axes' own forces."""
+    """State (q, v), 2n numbers; inputs are the m commands and forces at r ports, the driven axes first."""
 
     step_s: float
     advance: FloatArray
@@ -19,19 +19,19 @@ class LinearSteps:
     by_command: FloatArray
     """(2n, m)"""
     by_axis_force: FloatArray
-    """(2n, m): of 1 N along each driven axis."""
+    """(2n, r): of 1 N at each port."""
     motion: FloatArray
-    """(3 m, 2n): the driven axes' positions, velocities and accelerations."""
+    """(3 r, 2n): the ports' positions, velocities and accelerations."""
     motion_by_command: FloatArray
-    """(3 m, m)"""
+    """(3 r, m)"""
     motion_by_axis_force: FloatArray
-    """(3 m, m)"""
+    """(3 r, r)"""
     response: FloatArray
     """(p, 2n), of the quantity that the model answers with."""
     response_by_command: FloatArray
     """(p, m)"""
     response_by_axis_force: FloatArray
-    """(p, m)"""
+    """(p, r)"""
     position: FloatArray
     """(p, 2n)"""
 
@@ -42,14 +42,15 @@ def driven_axes(model: MechanicalModel) -> FloatArray:
     return np.asarray(model.input / np.where(length > 0, length, 1.0))
 
 
-def linear_steps(model: MechanicalModel, step_s: float) -> LinearSteps:
-    """Actuator, sensor and effects apart."""
-    n, axes = model.coordinates, driven_axes(model)
-    m = axes.shape[1]
+def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> LinearSteps:
+    """Actuator, sensor and effects apart. ports: (n, r), the directions in the coordinates along which forces act and
+    motion is looked at; the driven axes where none are given."""
+    n, m = model.coordinates, model.inputs
+    axes = driven_axes(model) if ports is None else ports
     inputs = np.linalg.solve(model.mass, np.hstack([model.input, axes]))
     from_state = -np.linalg.solve(model.mass, np.hstack([model.stiffness, model.damping]))
-    size = 2 * n
-    continuous = np.zeros((size + 2 * m, size + 2 * m))
+    size, inward = 2 * n, m + axes.shape[1]
+    continuous = np.zeros((size + inward, size + inward))
     continuous[:n, n:size] = np.eye(n)
     continuous[n:size, :size] = from_state
     continuous[n:size, size:] = inputs
