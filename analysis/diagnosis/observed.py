@@ -1,0 +1,90 @@
+"""What was observed, ready to be compared with a prediction: signals in units of their noise, and which samples count
+for what."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+Mask = npt.NDArray[np.bool_]
+
+FLOOR = 0.002
+"""No model is trusted better than this share of a channel's rms; added to the noise as if it were some."""
+LEVELS_TO_HOLD_ONE_BACK = 3
+KEPT_BACK = 0.25
+"""Of the fitting time, from its end, where no level can be kept back for the choice between explanations."""
+TESTED = 0.25
+"""Of the whole time, from its end, where no segment has a role."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observed:
+    """One recording. Channels are the response's, then the position's."""
+
+    recording: Recording
+    command: FloatArray
+    """(n, m)"""
+    measured: FloatArray
+    """(n, c)"""
+    fit: Mask
+    """(n,): samples that parameters are fitted to,"""
+    choose: Mask
+    """that explanations are chosen by,"""
+    test: Mask
+    """and that are only looked at in the end."""
+
+
+def observed(recording: Recording, responses: int) -> Observed:
+    """responses: how many position channels belong to the model's outputs; a position of another width is left out."""
+    signals = [recording.response.samples]
+    if recording.position is not None and recording.position.samples.shape[1] == responses:
+        signals.append(recording.position.samples)
+    measured = np.hstack(signals)
+    known = np.isfinite(measured).all(axis=1)
+    fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
+    return Observed(recording, recording.command.samples, measured, fit, choose, test)
+
+
+def roles(segments: tuple[Segment, ...], length: int) -> tuple[Mask, Mask, Mask]:
+    """Samples to fit, to choose and to test by: (length,) each.
+
+    What is marked as test stays sealed. Of the rest, the middle level of three or more is kept back to choose by, else
+    the last quarter of the time.
+    """
+    inside = [s for s in segments if s.kind != "rest"]
+    test = _covered([s for s in inside if s.role == "test"], length)
+    fitted = [s for s in inside if s.role == "fit"] or [s for s in inside if s.role != "test"]
+    fit = _covered(fitted, length) if fitted else ~test
+    if not test.any():
+        places = np.flatnonzero(fit)
+        test[places[int((1 - TESTED) * len(places)) :]] = True
+        fit &= ~test
+    choose = _middle_level(fitted, length) & fit
+    if not choose.any():
+        places = np.flatnonzero(fit)
+        choose[places[int((1 - KEPT_BACK) * len(places)) :]] = True
+    return fit & ~choose, choose, test
+
+
+def noise_in_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
+    """(c,): what a channel's errors are counted in: its noise, and a share of its signal below which no model goes."""
+    rms = np.sqrt(np.nanmean(measured**2, axis=0))
+    return np.asarray(np.sqrt(noise**2 + (FLOOR * rms) ** 2))
+
+
+def _covered(segments: list[Segment], length: int) -> Mask:
+    mask = np.zeros(length, dtype=np.bool_)
+    for segment in segments:
+        mask[segment.start : segment.stop] = True
+    return mask
+
+
+def _middle_level(segments: list[Segment], length: int) -> Mask:
+    levels = sorted({segment.amplitude for segment in segments if segment.amplitude > 0})
+    if len(levels) < LEVELS_TO_HOLD_ONE_BACK:
+        return np.zeros(length, dtype=np.bool_)
+    middle = levels[len(levels) // 2]
+    return _covered([segment for segment in segments if segment.amplitude == middle], length)

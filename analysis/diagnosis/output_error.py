@@ -1,0 +1,152 @@
+"""Least squares on the error measure: a model's open numbers, held by their calibration, and a hypothesis's numbers.
+
+Gauss and Newton's steps inside bounds. What the model's own numbers do is computed once and kept; what a hypothesis's
+numbers do, at each step.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.hypothesis import Hypothesis, parameters, steps
+from analysis.diagnosis.tuning import Tuning
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.signal import FloatArray
+
+BOUND = 4.0
+"""Standard deviations of the calibration within which the model's own numbers may be re-tuned."""
+MOVED = 0.1
+"""Standard deviations that a number is moved by to see what it does."""
+LARGEST_STEP = 1.0
+"""Of a hypothesis's number: a factor of e on a log scale."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensitivity:
+    """What the model's numbers do to the residuals of the fitting samples."""
+
+    at: FloatArray
+    """(t,): deviations where it was taken,"""
+    columns: FloatArray
+    """(t, samples): change of prediction per standard deviation, and"""
+    squares: FloatArray
+    """(t, t): their products."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    hypothesis: Hypothesis
+    deviations: FloatArray
+    """(t,), of the model's own numbers, in standard deviations."""
+    residuals: tuple[FloatArray, ...]
+    """Per record (n, c), in units of the noise."""
+    cost: float
+    """Mean square over the fitting samples, with the calibration's pull."""
+
+
+def fitting(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
+    """The residuals of the samples that are fitted to, in one row."""
+    parts = [each[record.fit].ravel() for each, record in zip(residuals, measure.records, strict=True)]
+    return np.concatenate(parts)
+
+
+def sensitivity(
+    measure: ErrorMeasure, tuning: Tuning, at: FloatArray, hypothesis: Hypothesis, map_: object = map
+) -> Sensitivity:
+    """By moving each number. map_: `map`, or one that works in parallel."""
+    base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
+
+    def moved(number: int) -> FloatArray:
+        there = at.copy()
+        there[number] += MOVED
+        return (base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))) / MOVED
+
+    columns = np.array(list(map_(moved, range(len(at)))))  # type: ignore[operator]
+    columns = columns.reshape(len(at), len(base))
+    return Sensitivity(at, columns, columns @ columns.T)
+
+
+def fit(measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int) -> Fitted:
+    """Better than the start, or the start. known: of the model's numbers, taken anywhere near."""
+    best = start
+    for _ in range(rounds):
+        better = _stepped(measure, tuning, best, known)
+        if better is None:
+            return best
+        gained = best.cost - better.cost
+        best = better
+        if gained < 1e-3 * best.cost:
+            break
+    return best
+
+
+def evaluated(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
+    residuals = measure.residuals(tuning.tuned(deviations), hypothesis.placed())
+    return Fitted(hypothesis, deviations, residuals, _cost(fitting(measure, residuals), deviations))
+
+
+def _cost(errors: FloatArray, deviations: FloatArray) -> float:
+    cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
+    return cost if np.isfinite(cost) else np.inf
+
+
+def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity) -> Fitted | None:
+    errors = fitting(measure, from_.residuals)
+    own = _own_columns(measure, tuning, from_, errors)
+    t = len(from_.deviations)
+    cross = known.columns @ own.T
+    products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
+    pull = np.concatenate([known.columns @ errors - from_.deviations, own @ errors])
+    now = np.concatenate([from_.deviations, from_.hypothesis.point])
+    low, high = _bounds(from_.hypothesis, t)
+    for damping in (1e-9, 1e-3, 0.1, 3.0):
+        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low - now, high - now)
+        step[t:] = np.clip(step[t:], -_longest(from_.hypothesis), _longest(from_.hypothesis))
+        there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
+        try:
+            tried = evaluated(measure, tuning, from_.deviations + step[:t], there)
+        except (MechanicalModelError, np.linalg.LinAlgError):
+            continue
+        if tried.cost < from_.cost * (1 - 1e-9):
+            return tried
+    return None
+
+
+def _own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
+    """(numbers, samples): what the hypothesis's numbers do to the prediction."""
+    model: MechanicalModel = tuning.tuned(from_.deviations)
+    moves = steps(parameters(from_.hypothesis.claims))
+    columns = np.empty((len(moves), len(errors)))
+    for number, move in enumerate(moves):
+        point = from_.hypothesis.point.copy()
+        point[number] += move
+        columns[number] = (errors - fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))) / move
+    return columns
+
+
+def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
+    of = parameters(hypothesis.claims)
+    low = [np.log(p.lower) if p.scale == "log" else p.lower / p.step for p in of]
+    high = [np.log(p.upper) if p.scale == "log" else p.upper / p.step for p in of]
+    return np.concatenate([np.full(tuned, -BOUND), low]), np.concatenate([np.full(tuned, BOUND), high])
+
+
+def _longest(hypothesis: Hypothesis) -> FloatArray:
+    return np.array([LARGEST_STEP if p.scale == "log" else np.inf for p in parameters(hypothesis.claims)])
+
+
+def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Least squares within bounds: what presses against one is held there, and let go where it pulls back."""
+    step, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
+    for _ in range(2 * len(pull) + 2):
+        free = ~held
+        wanted = step.copy()
+        rest = pull[free] - products[np.ix_(free, held)] @ step[held]
+        wanted[free] = np.linalg.lstsq(products[np.ix_(free, free)], rest, rcond=1e-14)[0]
+        out = free & ((wanted < low) | (wanted > high))
+        if not out.any():
+            return wanted
+        step[out] = np.clip(wanted[out], low[out], high[out])
+        held |= out
+    return np.clip(step, low, high)

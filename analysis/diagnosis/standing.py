@@ -1,0 +1,46 @@
+"""How a fit stands: its errors against the noise, on what was fitted, on what is chosen by and on what was sealed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.observed import Mask, Observed
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """(c,) each: rms error over rms noise, 1 = noise alone."""
+
+    fit: FloatArray
+    choose: FloatArray
+    test: FloatArray
+
+    @property
+    def seen(self) -> float:
+        """The worst channel, on what decisions may see."""
+        return float(max(self.fit.max(), self.choose.max()))
+
+    @property
+    def chosen_by(self) -> float:
+        """Mean square over fit and choice together, in units of noise power: what explanations are compared by."""
+        return float(np.mean(self.fit**2) + np.mean(self.choose**2)) / 2
+
+
+def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...], noise: FloatArray) -> Standing:
+    """residuals: per record (n, c), in units of `measure.unit`; noise: (c,) rms."""
+    scale = measure.unit / noise
+    return Standing(
+        *(
+            rms_over(measure.records, residuals, [getattr(record, part) for record in measure.records]) * scale
+            for part in ("fit", "choose", "test")
+        )
+    )
+
+
+def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
+    """(c,)"""
+    squares = sum(np.einsum("nc,nc->c", each[mask], each[mask]) for each, mask in zip(residuals, masks, strict=True))
+    count = sum(int(mask.sum()) for mask in masks)
+    return np.asarray(np.sqrt(squares / max(count, 1)))

@@ -1,0 +1,50 @@
+"""Transfer functions of a mechanical model from forces along its driven axes, on the lines of a discrete Fourier
+transform."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_WELL_CONDITIONED = 1e8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisTransfer:
+    """From a force held over each sample along each driven axis; (lines, rows, m)."""
+
+    response: ComplexArray
+    """As the sensor reads it."""
+    position: ComplexArray
+    axis_position: ComplexArray
+    axis_velocity: ComplexArray
+
+
+def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
+    """frequency_hz: (lines,). Effects and actuator apart."""
+    steps = linear_steps(model, 1 / sample_rate_hz)
+    m, p = model.inputs, model.outputs
+    z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
+    rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
+    direct = np.vstack([np.zeros((2 * m, m)), steps.response_by_axis_force, np.zeros((p, m))])
+    # A force counts from the next sample on; what it does at once is seen one sample late.
+    seen = _through(steps.advance, steps.by_axis_force, rows, z) + direct / z[:, None, None]
+    response = seen[:, 2 * m : 2 * m + p]
+    if model.sensor.bandwidth_hz > 0:
+        decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)
+        response = response * ((1 - decay) / (1 - decay / z))[:, None, None]
+    return AxisTransfer(response, seen[:, 2 * m + p :], seen[:, :m], seen[:, m : 2 * m])
+
+
+def _through(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
+    """C (zI - A)^-1 B, (lines, rows, inputs)."""
+    poles, shapes = np.linalg.eig(A)
+    if np.linalg.cond(shapes) < _WELL_CONDITIONED:
+        left, right = C @ shapes, np.linalg.solve(shapes, B.astype(complex))
+        return np.asarray(np.einsum("rs,ls,sm->lrm", left, 1 / (z[:, None] - poles), right, optimize=True))
+    resolvent = z[:, None, None] * np.eye(len(A)) - A
+    return np.asarray(C @ np.linalg.solve(resolvent, np.broadcast_to(B.astype(complex), (len(z), *B.shape))))

@@ -1,0 +1,136 @@
+"""The numbers of a mechanical model that calibration left a little open, and the model that other values of them give.
+
+Open are the grounded mass, damping and stiffness at the driven axes and, for every mode of what hangs on them, its
+frequency, mass and damping. In the coordinates of Craig and Bampton (1968): the driven axes, and what moves while they
+are held.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
+from equalizer.signals.signal import FloatArray
+
+UNSTATED = Tolerance(modes=0.02)
+UNSTATED_SHARE = 0.1
+"""One standard deviation of what has no stated tolerance, as a share of the largest at any axis."""
+DAMPING_PER_MODES = 10.0
+"""A mode's damping is known so many times worse than its frequency."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tuning:
+    """`model` with `names` open. Values are counted in standard deviations of the calibration."""
+
+    model: MechanicalModel
+    names: tuple[str, ...]
+    deviation: FloatArray
+    """(parameters,): one standard deviation, SI or relative."""
+    units: tuple[str, ...]
+    tuned: Callable[[FloatArray], MechanicalModel]
+    """From deviations (parameters,), in standard deviations. Raises MechanicalModelError for a mass that is none."""
+
+    def values(self, deviations: FloatArray) -> FloatArray:
+        return np.asarray(deviations * self.deviation)
+
+
+def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
+    """What the model's tolerances leave open; where it states none, a tenth is taken."""
+    split = _split(model)
+    m = model.inputs
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    axes = [f"{input_channels[i]}{'' if i == j else ' ' + input_channels[j]}" for i, j in pairs]
+    modes = range(len(split.frequency_hz))
+    names = [f"{what} {axis}" for what in ("mass", "damping", "stiffness") for axis in axes]
+    names += [
+        f"{what} of the mode at {split.frequency_hz[k]:.3g} Hz"
+        for what in ("frequency", "mass", "damping")
+        for k in modes
+    ]
+    tolerance = model.tolerance or UNSTATED
+    relative = UNSTATED.modes if tolerance.modes is None else tolerance.modes
+    assert relative is not None
+    grounded = [
+        _stated(stated, matrix[:m, :m])
+        for stated, matrix in (
+            (tolerance.mass_kg, split.mass),
+            (tolerance.damping_n_s_per_m, split.damping),
+            (tolerance.stiffness_n_per_m, split.stiffness),
+        )
+    ]
+    deviation = np.concatenate(
+        [np.full(len(pairs), one) for one in grounded]
+        + [np.full(len(modes), relative * more) for more in (1.0, 1.0, DAMPING_PER_MODES)]
+    )
+    units = ("kg m^2", "N m s/rad", "N m/rad") if model.rotational else ("kg", "N s/m", "N/m")
+    return Tuning(
+        model,
+        tuple(names),
+        deviation,
+        tuple(unit for unit in units for _ in pairs) + ("1",) * (3 * len(modes)),
+        lambda deviations: _tuned(model, split, pairs, np.asarray(deviations) * deviation),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Split:
+    """Mass, damping and stiffness with the driven axes first, then the modes of unit mass."""
+
+    mass: FloatArray
+    damping: FloatArray
+    stiffness: FloatArray
+    back: FloatArray
+    """Takes a matrix back to the model's coordinates: back.T @ matrix @ back."""
+    frequency_hz: FloatArray
+
+
+def _stated(stated: float | None, grounded: FloatArray) -> float:
+    if stated is not None:
+        return stated
+    return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE
+
+
+def _split(model: MechanicalModel) -> _Split:
+    driven = driven_axes(model)
+    inside = null_space(driven.T)
+    m = driven.shape[1]
+    # Dual to the driven axes, so that a push along one moves that one alone.
+    axes = driven @ np.linalg.inv(driven.T @ driven)
+    basis = axes
+    frequency = np.zeros(0)
+    if inside.shape[1]:
+        stiffness, mass = inside.T @ model.stiffness @ inside, inside.T @ model.mass @ inside
+        squares, shapes = eigh((stiffness + stiffness.T) / 2, mass)
+        frequency = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        carried = -np.linalg.lstsq(stiffness, inside.T @ model.stiffness @ axes, rcond=None)[0]
+        basis = np.hstack([axes + inside @ carried, inside @ shapes])
+    parts = [np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)]
+    # What is left between driven axes and modes in the stiffness is rounding alone.
+    parts[2][:m, m:] = parts[2][m:, :m] = 0.0
+    return _Split(*parts, np.linalg.inv(basis), frequency)
+
+
+def _tuned(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
+    m, modes = model.inputs, len(split.frequency_hz)
+    grounded = values[: 3 * len(pairs)].reshape(3, len(pairs))
+    frequency, weight, loss = values[3 * len(pairs) :].reshape(3, modes)
+    matrices = [split.mass.copy(), split.damping.copy(), split.stiffness.copy()]
+    for matrix, added in zip(matrices, grounded, strict=True):
+        for (i, j), value in zip(pairs, added, strict=True):
+            matrix[i, j] += value
+            matrix[j, i] += value if i != j else 0.0
+    mass, damping, stiffness = matrices
+    for k in range(modes):
+        row = m + k
+        carried, heavier = split.mass[:m, row], max(1 + weight[k], 1e-3)
+        mass[:m, :m] += (heavier - 1) * np.outer(carried, carried)
+        mass[:m, row] *= np.sqrt(heavier)
+        mass[row, :m] *= np.sqrt(heavier)
+        stiffness[row, row] *= (1 + frequency[k]) ** 2
+        damping[row, row] *= (1 + frequency[k]) * (1 + loss[k])
+    mass, damping, stiffness = (split.back.T @ matrix @ split.back for matrix in matrices)
+    return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness)
