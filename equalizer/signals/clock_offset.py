@@ -1,0 +1,104 @@
+"""How far two clocks are apart, from one motion that both have recorded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal as sg
+from scipy.interpolate import make_interp_spline
+
+from equalizer.signals.resampling import Grid, Samples, resampled
+from equalizer.signals.signal import FloatArray
+
+IntArray = npt.NDArray[np.signedinteger]
+BoolArray = npt.NDArray[np.bool_]
+
+LEAST_CORRELATION = 0.5
+RIVAL = 0.98
+"""A second peak as high as this share of the highest could as well be the right one."""
+
+
+class NoOffsetError(ValueError):
+    """Two signals that do not say how far their clocks are apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockOffset:
+    offset_s: float
+    """Added to the other clock's time to give the reference's."""
+    correlation: float
+    """At this offset; below 0 where one signal is the other with its sign turned."""
+
+
+def offset_by_correlation(reference: Samples, other: Samples, about_s: float, within_s: float) -> ClockOffset:
+    """The offset between about_s - within_s and about_s + within_s at which the two agree best.
+
+    Both are put onto one band-limited grid at twice the faster rate; the peak of the normalised cross-correlation is
+    taken between its samples, along a spline. Raises NoOffsetError where nothing agrees, the best agreement is at the
+    end of the range, or another offset agrees as well.
+    """
+    rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, other))
+    one, two = (_on_grid(part, rate_hz) for part in (reference, other))
+    correlation = _normalised(one, two)
+    lags = np.arange(-(len(two) - 1), len(one))
+    offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
+    allowed = (np.abs(offsets_s - about_s) <= within_s) & _enough_overlap(lags, len(one), len(two))
+    if allowed.sum() < 8:
+        raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched")
+    offsets_s, correlation = offsets_s[allowed], correlation[allowed]
+    peak = int(np.argmax(np.abs(correlation)))
+    best = abs(correlation[peak])
+    if best < LEAST_CORRELATION:
+        raise NoOffsetError(f"the two signals agree nowhere (highest correlation {best:.2f})")
+    if not 0 < peak < len(correlation) - 1:
+        raise NoOffsetError(
+            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s)"
+        )
+    _refuse_rivals(offsets_s, np.abs(correlation), peak)
+    return _between_samples(offsets_s, correlation, peak)
+
+
+def _on_grid(samples: Samples, rate_hz: float) -> FloatArray:
+    count = int(np.floor((samples.times_s[-1] - samples.times_s[0]) * rate_hz)) + 1
+    values = resampled(samples, Grid(float(samples.times_s[0]), rate_hz, count), "band-limited")
+    centred = values - np.nanmean(values)
+    return np.nan_to_num(centred, nan=0.0)
+
+
+def _normalised(one: FloatArray, two: FloatArray) -> FloatArray:
+    """Cross-correlation over the overlap of each lag, by the energy of both there."""
+    raw = sg.correlate(one, two, mode="full", method="fft")
+    ones, twos = np.ones(len(one)), np.ones(len(two))
+    energy_one = sg.correlate(one**2, twos, mode="full", method="fft")
+    energy_two = sg.correlate(ones, two**2, mode="full", method="fft")
+    floor = 1e-9 * float(np.sum(one**2) * np.sum(two**2))
+    both: FloatArray = raw / np.sqrt(np.maximum(energy_one * energy_two, max(floor, np.finfo(float).tiny)))
+    return both
+
+
+def _enough_overlap(lags: IntArray, one: int, two: int) -> BoolArray:
+    overlap = np.minimum(one, lags + two) - np.maximum(0, lags)
+    enough: BoolArray = overlap >= 0.25 * min(one, two)
+    return enough
+
+
+def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None:
+    peaks, _ = sg.find_peaks(height)
+    rivals = [place for place in peaks if abs(place - peak) > 2 and height[place] > RIVAL * height[peak]]
+    if rivals:
+        raise NoOffsetError(
+            f"offsets of {offsets_s[peak]:g} s and {offsets_s[rivals[0]]:g} s agree equally well, as happens with "
+            "periodic signals; search a shorter range"
+        )
+
+
+def _between_samples(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
+    around = slice(max(0, peak - 8), peak + 9)
+    spline = make_interp_spline(
+        offsets_s[around] - offsets_s[peak], correlation[around], k=min(5, len(correlation) - 1)
+    )
+    step = offsets_s[1] - offsets_s[0]
+    fine = np.linspace(-step, step, 4001)
+    values = spline(fine)
+    best = int(np.argmax(np.abs(values)))
+    return ClockOffset(float(offsets_s[peak] + fine[best]), float(values[best]))

@@ -1,0 +1,140 @@
+"""A signal put onto another, uniform grid of time: held, along straight lines, or band-limited.
+
+It matters which: a command that stays until the next one is right when it is held and smeared when it is
+interpolated; a signal that was sampled behind a filter is right when it is band-limited and gets images when it is
+held. Missing samples (NaN, gaps in the stamps) stay missing.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal as sg
+from scipy.interpolate import make_interp_spline
+
+from equalizer.signals.signal import FloatArray
+
+BoolArray = npt.NDArray[np.bool_]
+Method = Literal["held", "linear", "band-limited"]
+
+FLAT_TO = 0.88
+"""Share of the lower Nyquist frequency up to which band-limited resampling is flat; the stop band begins at 1."""
+SAME_INSTANT = 1e-3
+"""Times closer than this share of a sample are the same."""
+_HALF_LENGTH = 48
+_BETA = 8.6
+_UPSAMPLED = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Values at growing times. NaN is a missing value."""
+
+    times_s: FloatArray
+    """(n,)"""
+    values: FloatArray
+    """(n,)"""
+    rate_hz: float
+    """0 where the stamps are not uniform."""
+    gap_s: float
+    """Times further apart than this have something missing between them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    start_s: float
+    rate_hz: float
+    count: int
+
+    def times_s(self) -> FloatArray:
+        return self.start_s + np.arange(self.count) / self.rate_hz
+
+
+def resampled(samples: Samples, grid: Grid, method: Method) -> FloatArray:
+    """(count,). Raises ValueError where no more than one sample is not missing, or the grid leaves the samples."""
+    times_s = grid.times_s()
+    near = SAME_INSTANT / grid.rate_hz
+    if times_s[0] < samples.times_s[0] - near or times_s[-1] > samples.times_s[-1] + near:
+        raise ValueError(
+            f"the grid from {times_s[0]:g} to {times_s[-1]:g} s leaves the samples, {samples.times_s[0]:g} to "
+            f"{samples.times_s[-1]:g} s"
+        )
+    good = np.isfinite(samples.values)
+    if good.sum() < 2:
+        raise ValueError("all samples but one are missing")
+    if method == "held":
+        index = np.searchsorted(samples.times_s, times_s + near, side="right") - 1
+        found: FloatArray = samples.values[np.maximum(index, 0)].copy()
+    else:
+        filled = np.interp(samples.times_s, samples.times_s[good], samples.values[good])
+        whole = Samples(samples.times_s, filled, samples.rate_hz, samples.gap_s)
+        found = np.interp(times_s, whole.times_s, filled) if method == "linear" else _band_limited(whole, grid)
+    found[_missing(samples, good, times_s, near, held=method == "held")] = np.nan
+    return found
+
+
+def _missing(samples: Samples, good: BoolArray, times_s: FloatArray, near: float, held: bool) -> BoolArray:
+    """Which times lie between two good samples that are not neighbours."""
+    stamps, places = samples.times_s[good], np.flatnonzero(good)
+    step = float(np.median(np.diff(samples.times_s)))
+    hole = (np.diff(stamps) > samples.gap_s) | (np.diff(places) > 1)
+    before = np.clip(np.searchsorted(stamps, times_s + near, side="right") - 1, 0, len(stamps) - 2)
+    after_begin = times_s - stamps[before]
+    inside = hole[before] & (after_begin > (step - near if held else near)) & (times_s < stamps[before + 1] - near)
+    missing: BoolArray = inside | (times_s < stamps[0] - near) | (times_s > stamps[-1] + (step if held else near))
+    return missing
+
+
+def _band_limited(samples: Samples, grid: Grid) -> FloatArray:
+    if not samples.rate_hz:
+        return _from_uneven(samples, grid)
+    first = (grid.start_s - samples.times_s[0]) * samples.rate_hz
+    ratio = Fraction(grid.rate_hz / samples.rate_hz).limit_denominator(1000)
+    exact = abs(float(ratio) * samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
+    if exact and abs(first - round(first)) < SAME_INSTANT:
+        return _by_ratio(samples.values, ratio, round(first), grid.count)
+    dense = _by_ratio(samples.values, Fraction(_UPSAMPLED), 0, _UPSAMPLED * (len(samples.values) - 1) + 1)
+    dense_rate_hz = _UPSAMPLED * samples.rate_hz
+    times_s = samples.times_s[0] + np.arange(len(dense)) / dense_rate_hz
+    return _along_spline(times_s, dense, grid, samples.rate_hz)
+
+
+def _from_uneven(samples: Samples, grid: Grid) -> FloatArray:
+    """Through a quintic spline; gaps are bridged by straight lines first, or the spline would swing in them."""
+    times_s, values = samples.times_s, samples.values
+    steps = np.diff(times_s)
+    median_s = float(np.median(steps))
+    wide = np.flatnonzero(steps > samples.gap_s)
+    if len(wide):
+        between = [np.arange(times_s[i] + median_s, times_s[i + 1] - median_s / 2, median_s) for i in wide]
+        every = np.sort(np.concatenate([times_s, *between]))
+        times_s, values = every, np.interp(every, times_s, values)
+    return _along_spline(times_s, values, grid, 1 / median_s)
+
+
+def _along_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_rate_hz: float) -> FloatArray:
+    """The spline on the grid, or on a finer one and then filtered, where the grid is slower than the source."""
+    order = min(5, (len(values) - 1) // 2 * 2 + 1)
+    origin_s = times_s[0]
+    spline = make_interp_spline(times_s - origin_s, values, k=order)
+    finer = int(np.ceil(2 * source_rate_hz / grid.rate_hz)) if grid.rate_hz < 0.99 * source_rate_hz else 1
+    dense_times_s = grid.start_s - origin_s + np.arange((grid.count - 1) * finer + 1) / (grid.rate_hz * finer)
+    dense: FloatArray = spline(np.clip(dense_times_s, 0.0, times_s[-1] - origin_s))
+    return dense if finer == 1 else _by_ratio(dense, Fraction(1, finer), 0, grid.count)
+
+
+def _by_ratio(values: FloatArray, ratio: Fraction, first: int, count: int) -> FloatArray:
+    """`ratio` times the rate, from the sample `first` on; ends are continued by their point reflection."""
+    up, down = ratio.numerator, ratio.denominator
+    if ratio == 1:
+        return values[first : first + count].copy()
+    reach = _HALF_LENGTH * (max(up, down) // up + 1)
+    pad = reach + (-(reach + first)) % down
+    slower = max(up, down)
+    taps = sg.firwin(2 * _HALF_LENGTH * slower + 1, (1 + FLAT_TO) / 2 / slower, window=("kaiser", _BETA))
+    padded = np.pad(values, pad, mode="reflect", reflect_type="odd")
+    whole: FloatArray = sg.resample_poly(padded, up, down, window=taps)
+    start = (pad + first) * up // down
+    return whole[start : start + count].copy()

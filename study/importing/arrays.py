@@ -1,0 +1,64 @@
+"""What a foreign file holds: arrays by name, whatever its kind."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.csv_arrays import read_csv_arrays
+from study.importing.import_map import CsvMap
+from study.importing.map_errors import ImportRefusedError
+from study.importing.stored_arrays import read_hdf5_arrays, read_mat_arrays, read_npz_arrays
+from study.store.file_errors import CannotReadError
+from study.store.hdf5_file import is_hdf5
+
+Array = npt.NDArray[Any]
+KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
+TABLES = (".csv", ".txt", ".tsv", ".dat")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrays:
+    """Of one file. Dimensions of one are gone: a column is (n,), a single number ()."""
+
+    path: Path
+    by_name: Mapping[str, Array]
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+
+def read_arrays(path: Path, csv: CsvMap) -> Arrays:
+    """Raises CannotReadError, ImportRefusedError."""
+    try:
+        with path.open("rb"):
+            pass
+    except OSError as problem:
+        raise CannotReadError(path, problem) from problem
+    try:
+        found = _read(path, csv)
+    except (OSError, ValueError, TypeError, KeyError, RuntimeError, NotImplementedError, EOFError) as problem:
+        # What numpy, scipy, h5py and pandas raise for files that are damaged or not what their name says.
+        raise ImportRefusedError(
+            path.name, str(problem), "Check the file; nothing else can be read from it."
+        ) from problem
+    if not found:
+        raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
+    return Arrays(path, {name: np.squeeze(array) for name, array in found.items()})
+
+
+def _read(path: Path, csv: CsvMap) -> dict[str, Array]:
+    match path.suffix.lower():
+        case ".npz" | ".npy":
+            return read_npz_arrays(path)
+        case ".mat":
+            return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat_arrays(path)
+        case ".h5" | ".hdf5":
+            return read_hdf5_arrays(path, transposed=False)
+        case suffix if suffix in TABLES:
+            return read_csv_arrays(path, csv)
+    raise ValueError(f"its kind is not known here; known are {KINDS}")

@@ -1,0 +1,112 @@
+"""Columns of a table as arrays: header, delimiter and comments are found, fields that are no numbers are named."""
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from study.importing.import_map import CsvMap
+from study.store.text_file import read_text
+
+_DELIMITERS = (",", ";", "\t", "|")
+_COMMENTS = ("#", "%")
+_EMPTY = ("", "nan", "na", "n/a", "null", "-", "none")
+
+
+def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]:
+    """Empty fields are missing samples. Raises CannotReadError; ValueError with line and column of what is wrong."""
+    numbered, comment = _lines(read_text(path), settings)
+    if not numbered:
+        raise ValueError("it holds no lines")
+    delimiter = settings.delimiter or _delimiter(numbered[0][1], settings)
+    header, body = _header(numbered, delimiter, settings)
+    if body is numbered and not settings.names and len(said := _fields(comment, delimiter)) == len(header):
+        header = said
+    if not body:
+        raise ValueError("it has a header, but no rows below it")
+    if doubled := sorted({name for name in header if header.count(name) > 1}):
+        raise ValueError(f"its header names '{doubled[0]}' twice; give the columns names of their own in [csv] names")
+    table = _table(body, header, delimiter)
+    return {name: _numbers(table[name], name, body, settings) for name in header}
+
+
+def _lines(text: str, settings: CsvMap) -> tuple[list[tuple[int, str]], str]:
+    """With their numbers in the file, without comments and empty lines; and the comment right above the first line,
+    which is the header in files of some programs."""
+    kept: list[tuple[int, str]] = []
+    above = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if number <= settings.skip_lines or not line.strip():
+            continue
+        if not line.lstrip().startswith(_COMMENTS):
+            kept.append((number, line))
+        elif not kept:
+            above = line.strip().lstrip("".join(_COMMENTS)).strip()
+    return kept, above
+
+
+def _delimiter(line: str, settings: CsvMap) -> str:
+    counts = {mark: line.count(mark) for mark in _DELIMITERS if mark != settings.decimal}
+    best = max(counts, key=lambda mark: counts[mark])
+    return best if counts[best] else " "
+
+
+def _header(
+    numbered: list[tuple[int, str]], delimiter: str, settings: CsvMap
+) -> tuple[list[str], list[tuple[int, str]]]:
+    first = _fields(numbered[0][1], delimiter)
+    if settings.names:
+        names, body = list(settings.names), numbered
+        if not all(_is_number(field, settings) for field in first):
+            body = numbered[1:]
+        return names, body
+    if all(_is_number(field, settings) for field in first):
+        return [f"column{number}" for number in range(1, len(first) + 1)], numbered
+    return [name or f"column{number}" for number, name in enumerate(first, start=1)], numbered[1:]
+
+
+def _fields(line: str, delimiter: str) -> list[str]:
+    if not line:
+        return []
+    if delimiter == " " and '"' not in line:
+        return line.split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+
+
+def _is_number(field: str, settings: CsvMap) -> bool:
+    try:
+        float(field.replace(",", ".") if settings.decimal == "," else field)
+    except ValueError:
+        return field.lower() in _EMPTY
+    return True
+
+
+def _table(body: list[tuple[int, str]], header: list[str], delimiter: str) -> pd.DataFrame:
+    for number, line in body:
+        count = len(_fields(line, delimiter)) if '"' in line or delimiter == " " else line.count(delimiter) + 1
+        if count != len(header):
+            raise ValueError(f"line {number} has {count} fields, but there are {len(header)} columns")
+    text = io.StringIO("\n".join(line for _, line in body))
+    separator = r"\s+" if delimiter == " " else delimiter
+    return pd.read_csv(
+        text, sep=separator, names=header, dtype=str, keep_default_na=False, skipinitialspace=True, index_col=False
+    )
+
+
+def _numbers(
+    column: "pd.Series[str]", name: str, body: list[tuple[int, str]], settings: CsvMap
+) -> npt.NDArray[np.float64]:
+    fields = column.str.strip()
+    if settings.decimal == ",":
+        fields = fields.str.replace(",", ".", regex=False)
+    missing = fields.str.lower().isin(_EMPTY)
+    values = pd.to_numeric(fields.where(~missing), errors="coerce")
+    wrong = np.flatnonzero((values.isna() & ~missing).to_numpy())
+    if len(wrong):
+        number = body[int(wrong[0])][0]
+        raise ValueError(f"line {number}, column '{name}': '{column.iloc[int(wrong[0])]}' is not a number")
+    return np.asarray(values, dtype=np.float64)

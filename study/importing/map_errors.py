@@ -1,0 +1,45 @@
+"""What an import stumbles over, as errors that a person can act on."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+from study.errors import StudyError, WrongUseError
+
+NOTHING_WRITTEN = "Nothing was written."
+
+
+class ImportProblemError(ValueError):
+    """One thing that cannot be understood: a sentence fragment that names the key, channel, array or file."""
+
+
+class ImportRefusedError(StudyError):
+    """An import that was not made."""
+
+    def __init__(self, what: str, problem: str, do_now: str = "") -> None:
+        super().__init__(
+            title=f"{what} cannot be imported",
+            happened=f"{problem[:1].upper()}{problem[1:].rstrip('.')}.",
+            saved=NOTHING_WRITTEN,
+            do_now=do_now or "Correct the map (docs/importing.md lists its keys) and import again.",
+        )
+
+
+class MapNeededError(WrongUseError):
+    """Nothing says what the arrays are. `skeleton`: a map for this very file, to be completed."""
+
+    def __init__(self, file: str, why: str, skeleton: str) -> None:
+        super().__init__(
+            title=f"{file} needs a map",
+            happened=f"{why[:1].upper()}{why[1:].rstrip('.')}.",
+            saved=NOTHING_WRITTEN,
+            do_now="A map for this file follows on the standard output: keep it as MAP.toml, complete it, and import "
+            "again with --map MAP.toml.",
+        )
+        self.skeleton = skeleton
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """ "; did you mean 'x'", where something is close."""
+    names = list(known)
+    close = get_close_matches(word, names, n=1) or [name for name in names if name.lower() == word.lower()][:1]
+    return f"; did you mean '{close[0]}'" if close else ""
