@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from analysis.diagnosis.hypothesis import Claim, Hypothesis, claimed
-from equalizer.effects.effect import Effect, Values
+from equalizer.effects.effect import ALL_SITES, Effect, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
@@ -21,21 +21,22 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothe
         if "one" in effect.sites or len(sites) == 1:
             found += [claimed(Claim(effect, "one", (site,)), [values]) for site in sites for values in starts[site]]
         if len(sites) > 1:
-            found += _shared(effect, tuple(sites), starts)
+            found += _each(effect, tuple(sites), starts)
+            found += _all(effect, tuple(sites), evidence)
     return tuple(found)
 
 
-def _shared(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values, ...]]) -> list[Hypothesis]:
+def _all(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:
+    starts = effect.starts(evidence, ALL_SITES)[:STARTS] if "all" in effect.sites else ()
+    return [claimed(Claim(effect, "all", sites), [values]) for values in starts]
+
+
+def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values, ...]]) -> list[Hypothesis]:
     first = [values[0] for values in starts if values]
-    if not first:
+    if "each" not in effect.sites or not first:
         return []
-    found = []
-    if "all" in effect.sites:
-        found += [claimed(Claim(effect, "all", sites), [values]) for values in first]
-    if "each" in effect.sites:
-        whole = [values[0] if values else _faint(effect, first[0]) for values in starts]
-        found.append(claimed(Claim(effect, "each", sites), whole))
-    return found
+    whole = [values[0] if values else _faint(effect, first[0]) for values in starts]
+    return [claimed(Claim(effect, "each", sites), whole)]
 
 
 def _faint(effect: Effect, values: Values) -> Values:

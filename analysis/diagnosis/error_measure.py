@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.observed import Observed
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulator import Played, simulate_mechanism
+from equalizer.effects.simulator import Played, Seen, simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -24,6 +24,10 @@ class ErrorMeasure(Protocol):
     def records(self) -> tuple[Observed, ...]: ...
 
     @property
+    def noise(self) -> FloatArray:
+        """(c,): rms of what no model can predict, in each channel's own unit."""
+
+    @property
     def unit(self) -> FloatArray:
         """(c,): what 1 in a residual is in each channel's own unit."""
 
@@ -37,6 +41,8 @@ class FreeSimulation:
 
     records: tuple[Observed, ...]
     unit: FloatArray
+    noise: FloatArray
+    """(c,): rms"""
     name: str = "free simulation"
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
@@ -46,8 +52,9 @@ class FreeSimulation:
         )
 
     def played(self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed) -> Played:
-        signals = record.recording
-        return simulate_mechanism(model, record.command, signals.sample_rate_hz, effects, signals.hold)
+        signals, p = record.recording, model.outputs
+        seen = Seen(record.measured[:, :p], self.noise[:p])
+        return simulate_mechanism(model, record.command, signals.sample_rate_hz, effects, signals.hold, seen)
 
 
 def channels(played: Played, count: int) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.candidates import candidates
 from analysis.diagnosis.error_measure import FreeSimulation
 from analysis.diagnosis.gather_evidence import gather_evidence
-from analysis.diagnosis.hypothesis import Hypothesis
+from analysis.diagnosis.hypothesis import NOTHING
 from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
 from analysis.diagnosis.rivalry import Arena, Contender, contest, refine
 from analysis.diagnosis.screening import screen
@@ -38,11 +38,10 @@ class Explanation:
 
 
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Explanation:
-    nothing = Hypothesis((), np.zeros(0))
     measure, tuning = arena.measure, arena.tuning
-    before = evaluated(measure, tuning, np.zeros(len(tuning.names)), nothing)
+    before = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.0)
-    known = sensitivity(measure, tuning, before.deviations, nothing, arena.map_)
+    known = sensitivity(measure, tuning, before.deviations, NOTHING, arena.map_)
     retuned = refine(arena, fit(measure, tuning, before, known, RETUNING_ROUNDS))
     base = arena.contender(retuned)
     rounds: list[tuple[Contender, ...]] = []
@@ -59,7 +58,7 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Ex
 
 def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted) -> tuple[Contender, ...]:
     assert isinstance(arena.measure, FreeSimulation)
-    evidence = gather_evidence(arena.measure, arena.tuning, base, arena.noise)
+    evidence = gather_evidence(arena.measure, arena.tuning, base)
     suggested = candidates(catalogue, evidence[0])
     known: Sensitivity = sensitivity(arena.measure, arena.tuning, base.deviations, base.hypothesis, arena.map_)
     screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)

@@ -13,8 +13,8 @@ EXPECTED = 0.1
 """Rms of a missing force, as a share of the command's."""
 
 
-def gather_evidence(measure: FreeSimulation, tuning: Tuning, fitted: Fitted, noise: FloatArray) -> tuple[Evidence, ...]:
-    """One per record. noise: (c,) rms."""
+def gather_evidence(measure: FreeSimulation, tuning: Tuning, fitted: Fitted) -> tuple[Evidence, ...]:
+    """One per record."""
     model, found = tuning.tuned(fitted.deviations), []
     for record, left in zip(measure.records, fitted.residuals, strict=True):
         played = measure.played(model, fitted.hypothesis.placed(), record)
@@ -34,11 +34,11 @@ def gather_evidence(measure: FreeSimulation, tuning: Tuning, fitted: Fitted, noi
                 axis_force=missing.force,
                 response=record.measured[:, :p],
                 predicted=predicted[:, :p],
-                noise=noise[:p],
+                noise=measure.noise[:p],
                 used=(record.fit | record.choose).astype(np.float64),
                 position=record.measured[:, p:] if seen else None,
                 predicted_position=predicted[:, p:] if seen else None,
-                position_noise=noise[p:] if seen else None,
+                position_noise=measure.noise[p:] if seen else None,
             )
         )
     return tuple(found)

@@ -31,61 +31,87 @@ class Claim:
         return self.groups * len(self.effect.parameters)
 
 
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A free number of a hypothesis, as a coordinate that a fit can step along."""
+
+    parameter: Parameter
+    unit: float
+    """What 1 is, off a log scale."""
+
+    def value(self, coordinate: float) -> float:
+        p = self.parameter
+        value = float(np.exp(min(coordinate, 700.0))) if p.scale == "log" else coordinate * self.unit
+        return min(max(value, p.lower), p.upper)
+
+    def coordinate(self, value: float) -> float:
+        p = self.parameter
+        inside = min(max(value, p.lower), p.upper)
+        return float(np.log(inside)) if p.scale == "log" else inside / self.unit
+
+    @property
+    def move(self) -> float:
+        """How far it is moved to see what it does."""
+        return 1.0 if self.parameter.scale == "linear" else self.parameter.step
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        return self.coordinate(self.parameter.lower), self.coordinate(self.parameter.upper)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
     """Claims that hold together, with the numbers that a fit starts from or has found."""
 
     claims: tuple[Claim, ...]
+    starts: tuple[Values, ...]
+    """One per group of each claim: what stays fixed, and the size of what may have either sign."""
     point: FloatArray
-    """Claim by claim, group by group: the logarithm of a number on a log scale, else the number over its step."""
+    """The free numbers, claim by claim, group by group: the logarithm on a log scale, else in steps or sizes."""
 
     @property
     def key(self) -> tuple[tuple[str, str, tuple[int, ...]], ...]:
         return tuple((claim.effect.name, claim.spread, claim.sites) for claim in self.claims)
 
+    @property
+    def numbers(self) -> tuple[Number, ...]:
+        """One per number of the point."""
+        groups = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
+        return tuple(
+            Number(p, _unit(p, start)) for of, start in zip(groups, self.starts, strict=True) for p in of if not p.fixed
+        )
+
     def placed(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
-        numbers = self.point if point is None else point
-        effects, first = [], 0
+        left = list(self.numbers)
+        coordinates = list(self.point if point is None else point)
+        effects: list[PlacedEffect] = []
+        starts = iter(self.starts)
         for claim in self.claims:
-            size = len(claim.effect.parameters)
             for group in range(claim.groups):
-                values = values_of(claim.effect.parameters, numbers[first : first + size])
+                values = dict(next(starts))
+                for p in claim.effect.parameters:
+                    if not p.fixed:
+                        values[p.name] = left.pop(0).value(float(coordinates.pop(0)))
                 sites = (claim.sites[group],) if claim.spread == "each" else claim.sites
                 effects.append(PlacedEffect(claim.effect, sites, values))
-                first += size
         return tuple(effects)
-
-
-def parameters(claims: Sequence[Claim]) -> tuple[Parameter, ...]:
-    """One per number of a point."""
-    return tuple(one for claim in claims for _ in range(claim.groups) for one in claim.effect.parameters)
 
 
 def claimed(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """values: one set per group."""
-    return Hypothesis((claim,), np.concatenate([point_of(claim.effect.parameters, one) for one in values]))
+    free = [(p, one) for one in values for p in claim.effect.parameters if not p.fixed]
+    point = np.array([Number(p, _unit(p, one)).coordinate(one[p.name]) for p, one in free])
+    return Hypothesis((claim,), tuple(dict(one) for one in values), point)
 
 
 def together(one: Hypothesis, other: Hypothesis) -> Hypothesis:
-    return Hypothesis(one.claims + other.claims, np.concatenate([one.point, other.point]))
+    return Hypothesis(one.claims + other.claims, one.starts + other.starts, np.concatenate([one.point, other.point]))
 
 
-def point_of(of: Sequence[Parameter], values: Values) -> FloatArray:
-    return np.array(
-        [
-            np.log(min(max(values[p.name], p.lower), p.upper)) if p.scale == "log" else values[p.name] / p.step
-            for p in of
-        ]
-    )
+NOTHING = Hypothesis((), (), np.zeros(0))
 
 
-def values_of(of: Sequence[Parameter], point: FloatArray) -> dict[str, float]:
-    return {
-        p.name: float(min(max(np.exp(x) if p.scale == "log" else x * p.step, p.lower), p.upper))
-        for p, x in zip(of, point, strict=True)
-    }
-
-
-def steps(of: Sequence[Parameter]) -> FloatArray:
-    """How far each number of a point is moved to see what it does."""
-    return np.array([p.step if p.scale == "log" else 1.0 for p in of])
+def _unit(p: Parameter, start: Values) -> float:
+    if p.scale == "signed":
+        return abs(start[p.name]) or 1.0
+    return p.step

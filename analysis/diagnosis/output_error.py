@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.error_measure import ErrorMeasure
-from analysis.diagnosis.hypothesis import Hypothesis, parameters, steps
+from analysis.diagnosis.hypothesis import Hypothesis
 from analysis.diagnosis.tuning import Tuning
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
@@ -116,7 +116,7 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
 def _own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
     """(numbers, samples): what the hypothesis's numbers do to the prediction."""
     model: MechanicalModel = tuning.tuned(from_.deviations)
-    moves = steps(parameters(from_.hypothesis.claims))
+    moves = [number.move for number in from_.hypothesis.numbers]
     columns = np.empty((len(moves), len(errors)))
     for number, move in enumerate(moves):
         point = from_.hypothesis.point.copy()
@@ -126,14 +126,12 @@ def _own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: F
 
 
 def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
-    of = parameters(hypothesis.claims)
-    low = [np.log(p.lower) if p.scale == "log" else p.lower / p.step for p in of]
-    high = [np.log(p.upper) if p.scale == "log" else p.upper / p.step for p in of]
-    return np.concatenate([np.full(tuned, -BOUND), low]), np.concatenate([np.full(tuned, BOUND), high])
+    own = np.array([number.bounds for number in hypothesis.numbers]).reshape(-1, 2)
+    return np.concatenate([np.full(tuned, -BOUND), own[:, 0]]), np.concatenate([np.full(tuned, BOUND), own[:, 1]])
 
 
 def _longest(hypothesis: Hypothesis) -> FloatArray:
-    return np.array([LARGEST_STEP if p.scale == "log" else np.inf for p in parameters(hypothesis.claims)])
+    return np.array([np.inf if number.parameter.scale == "linear" else LARGEST_STEP for number in hypothesis.numbers])
 
 
 def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

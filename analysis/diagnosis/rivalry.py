@@ -29,12 +29,10 @@ class Arena:
 
     measure: ErrorMeasure
     tuning: Tuning
-    noise: FloatArray
-    """(c,) rms"""
     map_: Mapper
 
     def contender(self, fitted: Fitted) -> Contender:
-        return Contender(fitted, standing(self.measure, fitted.residuals, self.noise))
+        return Contender(fitted, standing(self.measure, fitted.residuals, self.measure.noise))
 
 
 def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> tuple[Contender, ...]:
