@@ -1,0 +1,68 @@
+"""Chance of a statistic when blocks of a series are shuffled against another: blocks are longer than the series
+remembers, so that neighbouring samples do not count as independent."""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import gamma
+
+from equalizer.signals.signal import FloatArray
+
+IntArray = npt.NDArray[np.int64]
+_MEMORIES = 3.0
+"""Length of a block, in correlation times."""
+_COUNTED = 10
+SMALLEST = 1e-6
+"""p-value: the tail of a curve through a few shuffles is not believed beyond."""
+_LEAST_BLOCKS = 8
+"""Per stratum."""
+
+
+def correlation_time(series: FloatArray) -> float:
+    """In samples: 1 + twice the sum of the squared autocorrelation, which is what inflates a variance. (n,)"""
+    n = len(series)
+    centred = series - series.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    covariance = np.fft.irfft(spectrum)[: max(n // 4, 1)]
+    if covariance[0] <= 0:
+        return 1.0
+    return float(2 * np.sum((covariance / covariance[0]) ** 2) - 1)
+
+
+def shuffled(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
+    """Indices (n,) that exchange blocks within each stratum, cut from a random offset on. strata: (n,), contiguous."""
+    order = np.arange(len(strata))
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
+    for start, stop in pairwise(edges.tolist()):
+        length = stop - start
+        size = max(1, min(block, length // _LEAST_BLOCKS))
+        turned = np.roll(np.arange(start, stop), int(random.integers(length)))
+        blocks = length // size
+        cut = turned[: blocks * size].reshape(blocks, size)[random.permutation(blocks)].ravel()
+        order[start:stop] = np.concatenate([cut, turned[blocks * size :]])
+    return order
+
+
+def block_length(series: FloatArray) -> int:
+    return max(1, round(_MEMORIES * correlation_time(series)))
+
+
+def permutation_p_values(
+    statistics: Callable[[IntArray], FloatArray],
+    strata: IntArray,
+    block: int,
+    permutations: int,
+    random: np.random.Generator,
+) -> FloatArray:
+    """(tests,): upper tails of a gamma distribution with the shuffles' mean and variance (Winkler and others 2016),
+    never less than it says. statistics: of the indices by which the series is shuffled, (tests,)."""
+    seen = statistics(np.arange(len(strata)))
+    chance = np.array([statistics(shuffled(strata, block, random)) for _ in range(permutations)])
+    mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
+    p_values = gamma.sf(seen, mean**2 / variance, scale=variance / np.maximum(mean, np.finfo(np.float64).tiny))
+    # Shuffles that were as large are believed before the curve through them.
+    counted = (np.sum(chance >= seen, axis=0) + 1) / (permutations + 1)
+    believed = np.where(counted > _COUNTED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))
+    return np.asarray(believed, dtype=np.float64)

@@ -1,0 +1,87 @@
+"""A residual's spectrum over all channels at once, response first, then position: what an entry point is judged by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.channel_noise import ChannelNoise
+from analysis.diagnosis.detection_lines import BoolArray, detection_lines
+from analysis.diagnosis.mismatch_cells import Prediction
+from analysis.diagnosis.noise_floor import NoiseFloor
+from analysis.diagnosis.periods import Periods, look_spectra, settled_periods
+from equalizer.identification.experiments import instrument_of
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+_WINDOW_S = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualSpectra:
+    """Experiments on the same lines."""
+
+    frequency_hz: FloatArray
+    """(lines,), within the driven band"""
+    residual: ComplexArray
+    """(experiments, lines, channels)"""
+    noise: FloatArray
+    """(experiments, lines, channels): expected |error|²."""
+    responses: int
+    """So many of the channels are the response's."""
+
+
+def residual_spectra(
+    recording: Recording, prediction: Prediction, floor: NoiseFloor, used: BoolArray | None = None
+) -> ResidualSpectra | None:
+    """Of mean periods; of windows of two seconds where nothing is periodic. used: (n,), the samples that count.
+    None where there is no period and no window, or the noise is not known."""
+    left = [recording.response.samples - prediction.response]
+    noises = [floor.response]
+    if recording.position is not None and prediction.position is not None and floor.position is not None:
+        left.append(recording.position.samples - prediction.position)
+        noises.append(floor.position)
+    residual = np.hstack(left)
+    whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
+    looks = [one for one in (_within(periods, whole) for periods in settled_periods(recording)) if one.starts]
+    if not looks:
+        looks = _windows(recording, whole)
+    looks = [one for one in looks if one.length == looks[0].length]
+    if not looks or not floor.known:
+        return None
+    lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
+    excitation = np.stack([look_spectra(instrument_of(recording), one).mean(axis=0) for one in looks])
+    driven = detection_lines(np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128))
+    if driven is None:
+        return None
+    first, last = np.flatnonzero(driven.driven)[[0, -1]]
+    inside = slice(int(first), int(last) + 1)
+    spectra = np.stack([look_spectra(residual, one).mean(axis=0)[inside] for one in looks])
+    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], one) for one in looks])
+    return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
+
+
+def _within(periods: Periods, whole: BoolArray) -> Periods:
+    starts = tuple(start for start in periods.starts if whole[start : start + periods.length].all())
+    return Periods(periods.index, periods.segment, starts, periods.settled)
+
+
+def _windows(recording: Recording, whole: BoolArray) -> list[Periods]:
+    """Each a look of its own, for windows are not alike."""
+    length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
+    found = []
+    for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
+        for start in range(segment.start, segment.stop - length + 1, length):
+            if segment.kind != "rest" and whole[start : start + length].all():
+                window = Segment(start, start + length, segment.kind, segment.amplitude, length, segment.role)
+                found.append(Periods(index, window, (start,), True))
+    return found
+
+
+def _noise(noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods) -> FloatArray:
+    parts = []
+    for noise in noises:
+        density = np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1)
+        parts.append(((density - noise.rounding) / periods.looks + noise.rounding) / periods.length)
+    return np.hstack(parts)
