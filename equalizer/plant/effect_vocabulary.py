@@ -75,20 +75,54 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName(
         "stribeck_friction", "mechanism", (_level("coulomb"), _level("static"), _number("speed", "m/s", "rad/s"))
     ),
+    EffectName(
+        "position_dependent_friction",
+        "mechanism",
+        (_level("level"), _number("slope_per_m", "1/m", "1/rad"), _number("bend_per_m2", "1/m^2", "1/rad^2")),
+    ),
     EffectName("presliding_hysteresis", "mechanism", (_level("level"), _stiffness("stiffness"))),
     EffectName("viscous_damping", "mechanism", (_damping("damping"),)),
     EffectName("quadratic_damping", "mechanism", (_number("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
     EffectName("hardening_stiffness", "mechanism", (_number("k3", "N/m^3", "N m/rad^3"),)),
     EffectName("asymmetric_stiffness", "mechanism", (_number("k2", "N/m^2", "N m/rad^2"),)),
     EffectName("constant_force", "mechanism", (_level("force"),)),
-    EffectName("cogging", "mechanism", (_level("amplitude"), _number("pitch", "m", "rad"))),
-    EffectName("backlash", "mechanism", (_number("gap", "m", "rad"),)),
-    EffectName("end_stop", "mechanism", (_number("position", "m", "rad"), _stiffness("stiffness"))),
-    EffectName("pose_dependent_inertia", "mechanism", (_number("per_m", "1/m", "1/rad"),)),
-    EffectName("extra_mode", "mechanism", (_number("frequency", "Hz"), _mass("mass"), _number("damping_ratio", "1"))),
+    EffectName("cogging", "mechanism", (_level("amplitude"), _number("pitch", "m", "rad"), _optional("phase", "rad"))),
+    EffectName(
+        "backlash",
+        "mechanism",
+        (
+            _number("gap", "m", "rad"),
+            _optional("motor_mass", "kg", "kg m^2"),
+            _optional("contact_stiffness", "N/m", "N m/rad"),
+            _optional("contact_damping", "N s/m", "N m s/rad"),
+        ),
+    ),
+    EffectName("loose_joint", "mechanism", (_number("gap", "m", "rad"), _stiffness("stiffness"), _level("slip"))),
+    EffectName(
+        "end_stop", "mechanism", (_number("position", "m", "rad"), _stiffness("stiffness"), _optional("opposite", "1"))
+    ),
+    EffectName(
+        "pose_dependent_inertia", "mechanism", (_number("per_m", "1/m", "1/rad"), _optional("speed_share", "1"))
+    ),
+    EffectName(
+        "extra_mode",
+        "mechanism",
+        (
+            _number("frequency", "Hz"),
+            _mass("mass"),
+            _number("damping_ratio", "1"),
+            _optional("tilt_next", "1"),
+            _optional("tilt_after_next", "1"),
+        ),
+    ),
     EffectName("added_mass", "mechanism", (_mass("mass"),)),
     EffectName("hand_impedance", "hand", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
-    EffectName("time_varying_grip", "hand", (_number("rate_hz", "Hz"), _number("depth", "1"))),
+    EffectName(
+        "time_varying_grip",
+        "hand",
+        (_number("rate_hz", "Hz"), _number("depth", "1"), _optional("phase", "rad"), _optional("stiffness_share", "1")),
+    ),
+    EffectName("body_on_actuator", "actuator", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
     EffectName("force_saturation", "actuator", (_level("limit"),)),
     EffectName("force_deadband", "actuator", (_level("width"),)),
     EffectName("slew_limit", "actuator", (_number("rate", "N/s", "N m/s"),)),
