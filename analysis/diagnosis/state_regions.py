@@ -115,7 +115,7 @@ def _tested(
     p_values = permutation_p_values(statistics, asked.strata, asked.block, permutations, random)
     found = []
     for (state, v), bins, p_value in zip(states, by_size, p_values, strict=False):
-        region = _region(state, v, bins, power, asked.expected)
+        region = _region(state, v, bins, asked)
         if region is not None:
             share, occupied, words = region
             found.append(StateRegion(state.kind, state.symbol, "size", share, occupied, float(p_value), words))
@@ -129,11 +129,11 @@ def _tested(
     return found
 
 
-def _region(
-    state: State, values: FloatArray, bins: IntArray, power: FloatArray, expected: FloatArray
-) -> tuple[float, float, str] | None:
+def _region(state: State, values: FloatArray, bins: IntArray, asked: _Asked) -> tuple[float, float, str] | None:
     """Share, occupied, words of the stretch of bins around the largest that stand out; None where none does."""
-    ratio = _sums(bins, power) / np.maximum(_sums(bins, expected), _TINY)
+    power = asked.values**2
+    one_stratum = bool((asked.strata == asked.strata[0]).all())
+    ratio = _sums(bins, power) / np.maximum(_sums(bins, asked.expected), _TINY)
     top = int(np.argmax(ratio))
     if ratio[top] < _CONCENTRATED:
         return None
@@ -145,7 +145,7 @@ def _region(
     inside = (bins >= first) & (bins <= last)
     share = float(power[inside].sum() / max(float(power.sum()), _TINY))
     centre = float(np.average(values[inside], weights=power[inside]))
-    words = region_in_words(state.kind, state.symbol, state.unit, (first, last, len(ratio)), centre)
+    words = region_in_words(state.kind, state.symbol, state.unit, (first, last, len(ratio)), centre, one_stratum)
     return share, float(np.mean(inside)), words
 
 

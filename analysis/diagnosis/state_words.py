@@ -7,14 +7,15 @@ from equalizer.signals.signal import FloatArray
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
-def region_in_words(kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float) -> str:
+def region_in_words(
+    kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, one_stratum: bool
+) -> str:
     """bins: first and last of the region, and how many there are. centre: mean state of the mismatch in it."""
     first, last, count = bins
     low, high = first == 0, last == count - 1
     if kind == "time":
-        return (
-            "late in the record" if high and not low else "early in the record" if low else f"near t = {centre:.3g} s"
-        )
+        when = "midway through" if low == high else "late in" if high else "early in"
+        return f"{when} {'the record' if one_stratum else 'each segment'}"
     if kind == "position":
         named, factor = _READABLE.get(unit, (unit, 1.0))
         return f"near {symbol} = {centre * factor:.2g} {named}".rstrip()
