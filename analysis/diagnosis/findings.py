@@ -1,10 +1,13 @@
 """All that a diagnosis found: the document that is handed on, and what its figures and sentences are drawn from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from analysis.diagnosis.document import Diagnosis, Mismatch
 from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.mismatch_cells import MismatchCell
+from analysis.diagnosis.noise_floor import NoiseFloor
+from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -81,3 +84,13 @@ class Findings:
     black_box: BlackBox | None
     remarks: tuple[str, ...]
     """Sentences that a reader must know: what was assumed, what is weak, what is not sensible physically."""
+    maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
+    """By "before", "retuned", "after": every cell of the map, in units of the noise."""
+    floor: NoiseFloor | None = None
+    """Of the first recording: how the noise was measured, and its spectrum."""
+    tuning: Tuning | None = None
+    """What the deviations of `explanation` count: names, units, sizes."""
+    axes: tuple[str, ...] = ()
+    """The driven axes, as a reader calls them; empty = x, y, z."""
+    split_s: Mapping[str, float] = field(default_factory=dict)
+    """Seconds by "fit", "choose", "test"."""

@@ -1,0 +1,123 @@
+"""What people call the effects of the vocabulary, where they say an effect sits, and how they read out its numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from analysis.diagnosis.document import Estimate
+from analysis.diagnosis.unit_wording import percent_text, value_text
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
+
+_BARE = "{}"
+
+
+@dataclass(frozen=True, slots=True)
+class EffectWords:
+    noun: str
+    numbers: Mapping[str, str] = field(default_factory=dict)
+    """By parameter, in the order of reading; a parameter that is not here is not read out. Empty: the main one."""
+    shares: tuple[str, ...] = ()
+    """Parameters that are read as per cent."""
+
+
+def _words(noun: str, *shares: str, **numbers: str) -> EffectWords:
+    return EffectWords(noun, numbers, shares)
+
+
+EFFECT_WORDS: Mapping[str, EffectWords] = {
+    "coulomb_friction": _words("dry friction"),
+    "asymmetric_friction": _words(
+        "dry friction that differs with the direction", level_positive="{} forwards", level_negative="{} backwards"
+    ),
+    "stribeck_friction": _words(
+        "friction that is larger at rest (Stribeck)",
+        coulomb="{} in motion",
+        static="{} at rest",
+        speed="a transition over {}",
+    ),
+    "presliding_hysteresis": _words(
+        "dry friction with elastic presliding", level=_BARE, stiffness="a stiffness of {} before it slides"
+    ),
+    "viscous_damping": _words("viscous damping"),
+    "quadratic_damping": _words("damping that grows with the square of the speed"),
+    "hardening_stiffness": _words("a spring that hardens with displacement"),
+    "asymmetric_stiffness": _words("a spring that is stiffer to one side"),
+    "constant_force": _words("a constant force"),
+    "cogging": _words("a force ripple along the travel (cogging)", amplitude=_BARE, pitch="repeating every {}"),
+    "backlash": _words("play (backlash)", gap="a gap of {}"),
+    "end_stop": _words("an end stop", position="met at {}", stiffness="a stiffness of {}"),
+    "pose_dependent_inertia": _words("inertia that changes with the position", per_m=_BARE),
+    "extra_mode": _words(
+        "a resonance that the model lacks", frequency="at {}", mass="carrying {}", damping_ratio="damping ratio {}"
+    ),
+    "added_mass": _words("an added mass"),
+    "hand_impedance": _words(
+        "a hand that holds on", mass=_BARE, damping=_BARE, stiffness=_BARE
+    ),
+    "time_varying_grip": _words("a grip that varies in time", "depth", rate_hz="at {}", depth="by {}"),
+    "force_saturation": _words("force saturation", limit="at {}"),
+    "force_deadband": _words("a dead band of the force", width="± {}"),
+    "slew_limit": _words("a limited rate of change of the force", rate="at most {}"),
+    "amplifier_lag": _words("a lag of the amplifier", time_constant="time constant {}"),
+    "transport_delay": _words("a delay of the command"),
+    "force_gain": _words("a wrong force gain", gain="a factor of {}"),
+    "sensor_lag": _words("a low pass in the sensor", bandwidth="at {}"),
+    "sensor_clipping": _words("clipping in the sensor", limit="at {}"),
+    "sensor_misalignment": _words("a turned sensor"),
+    "cross_axis_sensitivity": _words(
+        "sensor axes that hear each other", "from_next", "from_after_next",
+        from_next="{} of the next axis", from_after_next="{} of the one after it",
+    ),
+    "sensor_gain": _words("a wrong sensor gain", gain="a factor of {}"),
+    "sensor_nonlinearity": _words("a sensor that is not linear", cubic="cubic term {}"),
+    "sensor_offset": _words("a sensor offset"),
+    "sensor_drift": _words("a drift of the sensor", total="{} in all"),
+    "quantization": _words("rounding to steps (quantisation)", step="steps of {}"),
+    "mains_hum": _words("mains hum", amplitude=_BARE, frequency="at {}"),
+    "clock_drift": _words("clocks that run apart", ppm=_BARE),
+    "logger_offset": _words("a logger that is late", offset=_BARE),
+    "lost_samples": _words("lost samples", "fraction", fraction="{} of all"),
+}  # fmt: skip
+
+
+def noun_of(effect: str) -> str:
+    """What people call it; its own name with spaces where there is no word for it."""
+    known = EFFECT_WORDS.get(effect)
+    return known.noun if known else effect.replace("_", " ")
+
+
+def place_words(place: Place, axis: str | None, single: bool = False) -> str:
+    """single: the device has one axis, which then needs no name."""
+    if place == "hand":
+        return "at the handle" if axis is None or single else f"at the handle, along {axis}"
+    one, all_ = _SEATS[place]
+    if axis is None:
+        return one.format("").replace("  ", " ") if single else all_
+    return one.format(axis)
+
+
+_SEATS: Mapping[str, tuple[str, str]] = {
+    "mechanism": ("on the {} drive", "on all drives"),
+    "actuator": ("in the {} actuator", "in all actuators"),
+    "sensor": ("in the {} channel of the sensor", "in all channels of the sensor"),
+}
+
+
+def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
+    """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
+    known = EFFECT_WORDS.get(effect)
+    named = dict(known.numbers) if known else {}
+    if not named:
+        main = EFFECTS_BY_NAME[effect].main.name if effect in EFFECTS_BY_NAME else next(iter(parameters), "")
+        named = {main: _BARE}
+    shares = known.shares if known else ()
+    return ", ".join(
+        said.format(estimate_text(parameters[name], name in shares))
+        for name, said in named.items()
+        if name in parameters
+    )
+
+
+def estimate_text(estimate: Estimate, share: bool = False) -> str:
+    if share:
+        return percent_text(estimate.value, estimate.ci95)
+    return value_text(estimate.value, estimate.unit, estimate.ci95)

@@ -1,0 +1,62 @@
+"""Means over bins, with standard errors that know how little independent neighbouring samples are."""
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.signal import FloatArray
+
+_BINS, _LAW_BINS = 30, 120
+_BLOCK_S = 0.5
+"""Samples so far apart count as independent."""
+_FEWEST = 20
+
+
+def binned(
+    at: FloatArray, values: FloatArray, used: npt.NDArray[np.bool_], rate_hz: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Abscissa, mean and its standard error per bin; half the bins hold as many samples each, half are as wide, so that
+    both the middle and the ends are seen. at, values, used: (n,)"""
+    blocks = (np.flatnonzero(used) / (_BLOCK_S * rate_hz)).astype(int)
+    x, y = at[used], values[used]
+    bin_of = np.digitize(x, _edges(x, _BINS)[1:-1])
+    rows = []
+    for k in range(bin_of.max(initial=0) + 1):
+        inside = bin_of == k
+        if inside.sum() >= _FEWEST:
+            rows.append((float(x[inside].mean()), *_mean(y[inside], blocks[inside])))
+    table = np.array(rows).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]
+
+
+def binned_law(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Means in finer bins, without error."""
+    bin_of = np.digitize(at, _edges(at, _LAW_BINS)[1:-1])
+    count = np.bincount(bin_of)
+    full = count >= 3
+    means = [np.bincount(bin_of, weights=each)[full] / count[full] for each in (at, values)]
+    return means[0], means[1]
+
+
+def running_rms(
+    seconds: FloatArray, values: FloatArray, used: npt.NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time, rms and its standard error in equal stretches of the time that counts."""
+    parts = [part for part in np.array_split(np.flatnonzero(used), _BINS) if len(part)]
+    rms = np.array([float(np.sqrt(np.mean(values[part] ** 2))) for part in parts])
+    error = np.array([float(np.std(values[part] ** 2) / np.sqrt(len(part))) for part in parts])
+    return np.array([float(seconds[part].mean()) for part in parts]), rms, error / np.maximum(2 * rms, 1e-300)
+
+
+def _edges(x: FloatArray, bins: int) -> FloatArray:
+    low, high = np.quantile(x, [0.001, 0.999])
+    return np.unique(np.concatenate([np.quantile(x, np.linspace(0, 1, bins // 2)), np.linspace(low, high, bins // 2)]))
+
+
+def _mean(values: FloatArray, blocks: npt.NDArray[np.int_]) -> tuple[float, float]:
+    _, where = np.unique(blocks, return_inverse=True)
+    weight = np.bincount(where).astype(float)
+    means = np.bincount(where, weights=values) / weight
+    mean = float(values.mean())
+    if len(means) < 2:
+        return mean, float(values.std())
+    return mean, float(np.sqrt(np.sum((weight * (means - mean)) ** 2)) / weight.sum())

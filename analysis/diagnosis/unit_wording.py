@@ -1,0 +1,83 @@
+"""A physical value as people write it: a sensible prefix, as many digits as its interval bears, raised exponents."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
+_KEPT = (0.01, 1e4)
+"""Between these a unit needs no prefix, unless people always give it one."""
+_ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
+_NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
+_RAISED = {"^2": "²", "^3": "³"}
+_SYMBOLS = {"deg": "°"}
+_MOST_DIGITS, _DIGITS = 5, 3
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How a unit is shown: a value in SI, times `factor`, is in `unit`."""
+
+    factor: float
+    unit: str
+
+
+def scale_of(unit: str, magnitude: float) -> Scale:
+    """For values of about this size. unit: SI in ASCII."""
+    size = abs(magnitude) if np.isfinite(magnitude) else 0.0
+    if unit == "kg":
+        return Scale(1.0, "kg") if size >= 1 or size == 0 else Scale(1e3, "g")
+    if unit == "kg m^2":
+        return Scale(1.0, "kg m²") if size >= 0.01 or size == 0 else Scale(1e7, "g cm²")
+    kept = _KEPT[0] <= size < _KEPT[1] and unit not in _ALWAYS_PREFIXED
+    if kept or size == 0 or unit in _NEVER_PREFIXED or unit.startswith("1/"):
+        return Scale(1.0, written(unit))
+    factor, prefix = max((one for one in _PREFIXES if one[0] <= size * (1 + 1e-9)), default=_PREFIXES[0])
+    return Scale(1 / factor, prefix + written(unit))
+
+
+def written(unit: str) -> str:
+    """ "m/s^2" as "m/s²"; a plain number has none."""
+    shown = "" if unit == "1" else unit
+    for ascii_, raised in _RAISED.items():
+        shown = shown.replace(ascii_, raised)
+    return _SYMBOLS.get(shown, shown)
+
+
+def value_text(value: float, unit: str, ci95: tuple[float, float] | None = None) -> str:
+    """ "54 µm [49, 60]"; without an interval three digits."""
+    scale = scale_of(unit, value)
+    shown = value * scale.factor
+    interval = None if ci95 is None else (ci95[0] * scale.factor, ci95[1] * scale.factor)
+    decimals = _decimals(shown, interval)
+    space = "" if scale.unit in ("", "°") else " "
+    text = f"{_number(shown, decimals)}{space}{scale.unit}"
+    if interval is None:
+        return text
+    return f"{text} [{_number(interval[0], decimals)}, {_number(interval[1], decimals)}]"
+
+
+def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
+    """A share as per cent, with its interval."""
+    shown = value_text(100 * share, "1", None if ci95 is None else (100 * ci95[0], 100 * ci95[1]))
+    value, bracket, interval = shown.partition(" [")
+    return f"{value} %{bracket}{interval}"
+
+
+def _decimals(value: float, interval: tuple[float, float] | None) -> int:
+    """So many that the interval's half is written with one digit, or two where the first is a one."""
+    size = np.floor(np.log10(abs(value))) if value else 0.0
+    if interval is None or not interval[1] > interval[0]:
+        return int(max(0, _DIGITS - 1 - size))
+    half = (interval[1] - interval[0]) / 2
+    wanted = -int(np.floor(np.log10(half * 1.0001)))
+    if half * 10**wanted < 1.3:
+        wanted += 1
+    return int(np.clip(wanted, 0, max(0, _MOST_DIGITS - 1 - size)))
+
+
+def _number(value: float, decimals: int) -> str:
+    if value and (abs(value) >= 1e6 or decimals > 5):
+        return f"{value:.3g}"
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", "−") if float(text) else text.replace("-", "")

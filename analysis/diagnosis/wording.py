@@ -1,0 +1,213 @@
+"""What a diagnosis says, in plain sentences: the same in the report, in the terminal and on the screen."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
+from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words
+from analysis.diagnosis.findings import BlackBox, Findings
+from analysis.diagnosis.retuned_numbers import MovedNumber, moved_numbers, retuned_sentence
+from analysis.diagnosis.unit_wording import value_text
+from analysis.wording import listed, p_text
+
+_PLACES_NAMED = 3
+_ALIKE = 1.05
+"""Errors that differ by less count as the same."""
+_CONFIRMED = 1.25
+"""Held-out error over the error on what was fitted, both in units of the noise, up to which a fit is confirmed."""
+
+
+def effect_title(effect: NamedEffect, single: bool = False) -> str:
+    """ "dry friction on the x drive". single: the device has one axis."""
+    return f"{noun_of(effect.effect)} {place_words(effect.place, effect.axis, single)}"
+
+
+def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
+    """signature: what is seen in the data where it is the cause, as the catalogue has it."""
+    said = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
+    return f"{capital(said)}: {signature}." if signature else f"{capital(said)}."
+
+
+def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), single: bool = False) -> str:
+    """The whole answer, first thing to be read."""
+    errors = diagnosis.fit.test
+    named = listed([effect_title(effect, single) for effect in diagnosis.effects])
+    if diagnosis.verdict == "no_mismatch":
+        return f"The model answers as the device does: {_one_error('as it was given', errors.before, errors)}."
+    if diagnosis.verdict == "parameters":
+        off = f": {listed([one.text for one in moved])}" if moved else ""
+        return (
+            f"No physics is missing; numbers of the model are off{off}. "
+            f"{capital(_fall(errors, ('before', 'as given'), ('retuned', 're-tuned')))}."
+        )
+    if diagnosis.verdict == "explained":
+        return f"The model lacks {named}. {capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}."
+    if diagnosis.verdict == "partly_explained":
+        return (
+            f"The model lacks {named}, but that is not all. "
+            f"{capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}, and a mismatch remains."
+        )
+    return (
+        "Model and device disagree, and no effect of the catalogue explains it. "
+        f"{capital(_one_error('re-tuned', errors.retuned, errors))}."
+    )
+
+
+_AFTER = ("after", "with it")
+
+
+def error_text(error: float | None) -> str:
+    """ "14 %" of the signal."""
+    if error is None:
+        return "unknown"
+    return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
+
+
+def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
+    """Why each was passed over; those that the data cannot tell from it come in `inseparable_sentence`."""
+    return tuple(
+        f"{capital(noun_of(rival.effect))} (probability {_probability(rival.probability)}): {_ended(rival.why_not)}"
+        for rival in effect.rivals
+        if not rival.inseparable
+    )
+
+
+def inseparable_sentence(effect: NamedEffect) -> str:
+    """Empty where the data single one out."""
+    others = [rival for rival in effect.rivals if rival.inseparable]
+    if not others:
+        return ""
+    both = "both are" if len(others) == 1 else "all of them are"
+    odds = ", ".join(
+        f"{noun_of(name)} {_probability(probability)}"
+        for name, probability in (
+            (effect.effect, effect.probability), *((one.effect, one.probability) for one in others)
+        )
+    )  # fmt: skip
+    return (
+        f"These data cannot tell {noun_of(effect.effect)} from {listed([noun_of(one.effect) for one in others])}: "
+        f"{both} named (probabilities: {odds})."
+    )
+
+
+def remainder_sentence(diagnosis: Diagnosis) -> str:
+    """What is still unexplained."""
+    left = diagnosis.remainder
+    if not left:
+        return "Nothing significant is left unexplained."
+    worst = sorted(left, key=lambda one: one.share, reverse=True)
+    more = len(left) - _PLACES_NAMED
+    rest = f"; and {more} smaller {'place' if more == 1 else 'places'}" if more > 0 else ""
+    return f"Still unexplained: {'; '.join(place_of(one) for one in worst[:_PLACES_NAMED])}{rest}."
+
+
+def place_of(mismatch: Mismatch) -> str:
+    """ "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % (p < 0.0001)"."""
+    low, high = mismatch.band_hz
+    level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
+    state = f", {mismatch.state}" if mismatch.state else ""
+    driven = f", driven by {mismatch.input}{level}" if mismatch.input else ""
+    share = f"{100 * mismatch.share:.2g} %"
+    return f"{mismatch.output} at {low:g} to {high:g} Hz{driven}{state}: {share} ({p_text(mismatch.p_value)})"
+
+
+def next_experiment_sentence(diagnosis: Diagnosis) -> str:
+    wanted = diagnosis.next_experiment
+    if wanted is None:
+        return ""
+    splits = f"would tell {listed([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
+    return f"The recording that {splits}: {wanted.command}. {capital(_ended(wanted.why))}"
+
+
+def black_box_sentence(box: BlackBox | None) -> str:
+    if box is None:
+        return ""
+    fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
+    errors = f"{error_text(box.test)} of the signal on the held-out data; the physics leaves {error_text(box.physics)}"
+    if box.test * _ALIKE < box.physics:
+        return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
+    if box.physics * _ALIKE < box.test:
+        return f"{fitted} {errors}. The physics predicts better."
+    return f"{fitted} {errors}: no better."
+
+
+def confirmation_sentence(fit: Errors, test: Errors) -> str:
+    """Where the held-out data do not bear out the fit; else empty. Both records' errors are counted in their noise."""
+    if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
+        return ""
+    assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise
+    if test.after > test.retuned:
+        return (
+            "The held-out data do not confirm this: there the re-tuned model alone does better "
+            f"({error_text(test.retuned)} of the signal against {error_text(test.after)})."
+        )
+    there, here = test.after / test.noise, fit.after / fit.noise
+    if there > _CONFIRMED * max(here, 1.0):
+        return (
+            f"The held-out data confirm this only in part: {there:.3g} times the noise is left there, "
+            f"{here:.3g} times on what was fitted."
+        )
+    return ""
+
+
+def summary_lines(found: Findings) -> tuple[str, ...]:
+    """The diagnosis in a few sentences, the verdict first."""
+    diagnosis, single = found.diagnosis, found.given.inputs == 1
+    moved = moved_of(found)
+    lines = [verdict_sentence(diagnosis, moved if diagnosis.verdict == "parameters" else (), single)]
+    signatures = signature_texts(found)
+    for effect in diagnosis.effects:
+        lines += [effect_sentence(effect, signatures.get(effect.effect, ""), single), inseparable_sentence(effect)]
+    if diagnosis.verdict in ("explained", "partly_explained"):
+        lines.append(confirmation_sentence(diagnosis.fit.fit, diagnosis.fit.test))
+    if diagnosis.verdict not in ("no_mismatch", "parameters"):
+        lines += [retuned_sentence(moved), remainder_sentence(diagnosis), black_box_sentence(found.black_box)]
+    lines += [next_experiment_sentence(diagnosis), *found.remarks]
+    return tuple(line for line in lines if line)
+
+
+def moved_of(found: Findings) -> tuple[MovedNumber, ...]:
+    """The model's own numbers as they stand in the end, those that moved furthest first."""
+    if found.tuning is None:
+        return ()
+    return moved_numbers(found.tuning, found.explanation.after.fitted.deviations)
+
+
+def signature_texts(found: Findings) -> Mapping[str, str]:
+    """By effect, as the catalogue has it."""
+    return {placed.effect.name: placed.effect.signature for placed in found.named}
+
+
+def capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
+def _fall(errors: Errors, *stages: tuple[str, str]) -> str:
+    (first, said_first), (last, said_last) = stages
+    before, after = getattr(errors, first), getattr(errors, last)
+    if before is None or after is None:
+        return "how much better it predicts held-out data is not known"
+    goes = "falls" if after * _ALIKE < before else "goes"
+    return (
+        f"the error on held-out data {goes} from {error_text(before)} of the signal ({said_first}) to "
+        f"{error_text(after)} ({said_last}){_noise(errors, after)}"
+    )
+
+
+def _one_error(said: str, error: float | None, errors: Errors) -> str:
+    if error is None:
+        return "its error on held-out data is not known"
+    return f"{said}, its error on held-out data is {error_text(error)} of the signal{_noise(errors, error)}"
+
+
+def _noise(errors: Errors, error: float) -> str:
+    if not errors.noise:
+        return "; what noise alone would leave is not known"
+    return f"; noise alone would leave {error_text(errors.noise)} ({error / errors.noise:.3g} times the noise)"
+
+
+def _probability(probability: float) -> str:
+    return value_text(probability, "1") if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
+
+
+def _ended(sentence: str) -> str:
+    return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
