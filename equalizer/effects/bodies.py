@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
+from equalizer.effects.command_path import Driven
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.mechanism_kernel import LAWS, Integers, Three, no_force, play
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
@@ -61,9 +62,9 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     return Bodies(structure, model.inputs, aligned, tuple(acts), tuple(where), tuple(numbers))
 
 
-def moved(bodies: Bodies, driven: FloatArray, size: tuple[int, int], step_s: float) -> tuple[FloatArray, FloatArray]:
+def moved(bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float) -> tuple[FloatArray, FloatArray]:
     """(n, 3 r + 2 p): the ports' positions, velocities and accelerations, the response and its rows' positions; and
-    (n, r), the forces. driven: (n, m) or (n steps, m); size: n and steps."""
+    (n, r), the forces. driven: n or n steps; size: n and steps."""
     linear = linear_steps(bodies.structure, step_s, bodies.ports)
     look = _transposed(_looked_at(linear))
     looked, added = np.empty((size[0], look[0].shape[1])), np.empty((size[0], bodies.ports.shape[1]))
@@ -74,8 +75,12 @@ def moved(bodies: Bodies, driven: FloatArray, size: tuple[int, int], step_s: flo
         play(
             laws, places, of, memory, _transposed((linear.advance, linear.by_command, linear.by_axis_force)), look,
             _whole((linear.motion, linear.motion_by_command, linear.motion_by_axis_force)),
-            np.ascontiguousarray(driven), np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
+            np.ascontiguousarray(driven.mean), np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
         )  # fmt: skip
+    if driven.end is not driven.mean:
+        # An acceleration shows the force of its very instant, not the last step's mean.
+        last = slice(len(driven.mean) // size[0] - 1, None, len(driven.mean) // size[0])
+        looked[1:] += (driven.end - driven.mean)[last][:-1] @ look[1]
     return looked, added
 
 

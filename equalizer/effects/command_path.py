@@ -1,29 +1,77 @@
-"""What an actuator makes of a held command. A sample in and out is the mean over its step."""
+"""What an actuator makes of a held command: the mean over each step, which moves masses, and the value at its end,
+which an acceleration that is sampled there shows at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter, resample_poly
 
+from equalizer.effects.effect import OnCommand, PlacedEffect
+from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 
-def finer(commands: FloatArray, steps: int, hold: Hold) -> FloatArray:
-    """(n steps, m) from (n, m), by how the command moves between its samples."""
-    if steps == 1:
-        return np.ascontiguousarray(commands)
-    if hold is Hold.ZERO_ORDER:
-        return np.repeat(commands, steps, axis=0)
+@dataclass(frozen=True, slots=True, eq=False)
+class Driven:
+    mean: FloatArray
+    """(n steps, m): over each step."""
+    end: FloatArray
+    """(n steps, m): just before the next one."""
+
+
+def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
+    """Whether the force changes between two commands."""
+    fine = any(isinstance(placed.effect.acts, OnCommand) and placed.effect.acts.fine for placed in effects)
+    return fine or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
+
+
+def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: Sequence[PlacedEffect]) -> Driven:
+    """First the left-out effects, in their order, then what the model knows of its actuators.
+
+    Raises ValueError where an effect befalls a channel that is not there.
+    """
+    mean, end = np.array(commands.mean, dtype=np.float64), np.array(commands.end, dtype=np.float64)
+    for placed in effects:
+        acts, values = placed.effect.acts, placed.values
+        for site in placed.sites if isinstance(acts, OnCommand) else ():
+            assert isinstance(acts, OnCommand)
+            if not 0 <= site < mean.shape[1]:
+                raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; there are {mean.shape[1]}")
+            at_end = acts.change if acts.at_end is None else acts.at_end
+            last = at_end(end[:, site] if acts.at_end is None else mean[:, site], step_s, values)
+            mean[:, site], end[:, site] = acts.change(mean[:, site], step_s, values), last
+    known = model.actuator
+    if known.bandwidth_hz > 0:
+        time_constant_s = 1 / (2 * np.pi * known.bandwidth_hz)
+        mean, end = lagged(mean, step_s, time_constant_s), lagged_at_end(mean, step_s, time_constant_s)
+    if known.delay_s > 0:
+        mean, end = delayed(mean, step_s, known.delay_s), delayed_at_end(end, step_s, known.delay_s)
+    if known.limit > 0:
+        mean, end = np.clip(mean, -known.limit, known.limit), np.clip(end, -known.limit, known.limit)
+    return Driven(mean, end)
+
+
+def finer(commands: FloatArray, steps: int, hold: Hold) -> Driven:
+    """From (n, m), by how the command moves between its samples."""
+    if steps == 1 or hold is Hold.ZERO_ORDER:
+        held = np.repeat(commands, steps, axis=0)
+        return Driven(held, held)
     if hold is Hold.LINEAR:
-        after = np.vstack([commands[1:], commands[-1:]])
-        share = ((np.arange(steps) + 0.5) / steps)[:, None]
-        return np.asarray((commands[:, None] + share * (after - commands)[:, None]).reshape(-1, commands.shape[1]))
+        change = np.diff(commands, axis=0, append=commands[-1:])
+        places = (np.arange(steps) + 0.5) / steps, (np.arange(steps) + 1.0) / steps
+        mean, end = (
+            (commands[:, None] + share[:, None] * change[:, None]).reshape(-1, commands.shape[1]) for share in places
+        )
+        return Driven(mean, end)
     samples = resample_poly(commands, 2 * steps, 1, axis=0)
-    # Every other one stands in the middle of a step.
-    return np.ascontiguousarray(samples[1::2])
+    # Every other one stands in the middle of a step, the ones between at its ends.
+    return Driven(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
 
 
 def lagged(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """One pole; exact for commands (n, …) that are held over a step."""
+    """One pole, mean over each step; exact for commands (n, …) that are held over a step."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
@@ -32,10 +80,23 @@ def lagged(commands: FloatArray, step_s: float, time_constant_s: float) -> Float
     return np.asarray(commands + (before - commands) * left)
 
 
+def lagged_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
+    """The same at each step's end."""
+    if time_constant_s <= 0:
+        return commands
+    decay = float(np.exp(-step_s / time_constant_s))
+    return np.asarray(lfilter([1 - decay], [1.0, -decay], commands, axis=0))
+
+
 def delayed(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """Held commands (n, …) that arrive later; nothing before the first."""
+    """Held commands (n, …) that arrive later, mean over each step; nothing before the first."""
     whole, part = divmod(max(delay_s, 0.0) / step_s, 1.0)
     late = np.zeros((len(commands) + 1, *commands.shape[1:]))
     shift = min(int(whole) + 1, len(late))
     late[shift:] = commands[: len(late) - shift]
     return np.asarray((1 - part) * late[1:] + part * late[:-1])
+
+
+def delayed_at_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
+    """The same at each step's end."""
+    return delayed(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)

@@ -84,6 +84,8 @@ class OnCommand:
     """Samples (n,), the seconds between them, values. A sample is the mean over its time."""
     fine: bool = False
     """It moves between samples, so that it must be followed more finely than they come."""
+    at_end: Callable[[FloatArray, float, Values], FloatArray] | None = None
+    """Such a one's force at the end of each step, from the same means; else `change` does for both."""
 
 
 @dataclass(frozen=True, slots=True)

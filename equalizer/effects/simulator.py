@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.effects.bodies import Bodies, bodies_of, moved
-from equalizer.effects.command_path import delayed, finer, lagged
-from equalizer.effects.effect import STEPS, OnCommand, OnResponse, PlacedEffect
+from equalizer.effects.command_path import Driven, driven_by, finer, moves_between_samples
+from equalizer.effects.effect import STEPS, OnResponse, PlacedEffect
 from equalizer.effects.sensor_path import low_passed, within_range
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
@@ -57,36 +57,13 @@ def simulate_mechanism(
     moves = moves_between_samples(model, effects, hold)
     steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
     step_s = 1 / (sample_rate_hz * steps)
-    driven = driven_by(
-        model, finer(commands, steps if moves else 1, hold), step_s if moves else steps * step_s, effects
-    )
+    fine = steps if moves else 1
+    driven = driven_by(model, finer(commands, fine, hold), 1 / (sample_rate_hz * fine), effects)
     played = _moved(bodies, driven, (len(commands), steps), step_s)
     return _sensed(model, played, sample_rate_hz, effects, seen)
 
 
-def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
-    """Whether the force changes between two commands."""
-    fine = any(isinstance(placed.effect.acts, OnCommand) and placed.effect.acts.fine for placed in effects)
-    return fine or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
-
-
-def driven_by(
-    model: MechanicalModel, commands: FloatArray, step_s: float, effects: Sequence[PlacedEffect]
-) -> FloatArray:
-    """What the actuators make of commands (n, m): first the left-out effects, then what the model knows of them."""
-    driven = np.array(commands, dtype=np.float64)
-    for placed in effects:
-        if isinstance(placed.effect.acts, OnCommand):
-            for site in placed.sites:
-                driven[:, site] = placed.effect.acts.change(driven[:, site], step_s, placed.values)
-    known = model.actuator
-    if known.bandwidth_hz > 0:
-        driven = lagged(driven, step_s, 1 / (2 * np.pi * known.bandwidth_hz))
-    driven = delayed(driven, step_s, known.delay_s) if known.delay_s > 0 else driven
-    return np.clip(driven, -known.limit, known.limit) if known.limit > 0 else driven
-
-
-def _moved(bodies: Bodies, driven: FloatArray, size: tuple[int, int], step_s: float) -> Played:
+def _moved(bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float) -> Played:
     m, p, ports = bodies.axes, bodies.structure.outputs, bodies.ports.shape[1]
     looked, added = moved(bodies, driven, size, step_s)
     rows = looked[:, 3 * ports :]

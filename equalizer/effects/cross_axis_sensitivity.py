@@ -1,0 +1,50 @@
+"""A channel that also reads a share of the others: sensing axes that are not square to each other."""
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.response_starts import shares_of
+from equalizer.signals.signal import FloatArray
+
+FROM = ("from_next", "from_after_next")
+LARGEST = 1.0
+LEAST = 1e-4
+
+
+def _others(channel: int, channels: int) -> list[int]:
+    """The one or two that follow, round about."""
+    return [(channel + ahead) % channels for ahead in range(1, min(channels, 3))]
+
+
+def _mixed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    read = response.copy()
+    for channel in channels:
+        for name, other in zip(FROM, _others(channel, response.shape[1]), strict=False):
+            read[:, channel] += of[name] * response[:, other]
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    others = _others(channel, evidence.response.shape[1])
+    residual = evidence.response - evidence.predicted
+    if not others:
+        return ()
+    shares = shares_of(residual[:, channel], evidence.predicted[:, [*others, channel]], evidence.used)[: len(others)]
+    if not LEAST < float(np.abs(shares).max()) < LARGEST:
+        return ()
+    return ({**dict.fromkeys(FROM, 0.0), **dict(zip(FROM, shares.tolist(), strict=False))},)
+
+
+EFFECT = Effect(
+    name="cross_axis_sensitivity",
+    equation="y_i = x_i + from_next x_(i+1) + from_after_next x_(i+2)",
+    source="IEEE Std 1293, single-axis accelerometers: cross-axis sensitivity",
+    signature="one channel reads a constant share of others at every frequency and level and they none of it, while "
+    "the position agrees",
+    parameters=tuple(Parameter(name, -LARGEST, LARGEST, none=0.0, scale="linear", step=1e-3) for name in FROM),
+    acts=OnResponse(_mixed, stage=-1),
+    starts=_starts,
+    sites=("one", "each"),
+    simpler=("sensor_misalignment",),
+)

@@ -1,0 +1,37 @@
+"""An actuator that gives another force than the command says: a wrong force constant."""
+
+import numpy as np
+
+from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+LEAST = 1e-4
+
+
+def _scaled(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
+    return np.asarray(of["gain"] * commands)
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    which, used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
+    commanded, missing = evidence.command[used, which], evidence.axis_force[used, which]
+    shares = [
+        float(np.sum(np.roll(commanded, shift, axis=0) * missing) / max(np.sum(commanded**2), np.finfo(float).tiny))
+        for shift in (0, 1)
+    ]
+    gain = 1 + max(shares, key=abs)
+    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > LEAST else ()
+
+
+EFFECT = Effect(
+    name="force_gain",
+    equation="F = gain u",
+    source="Hayward and Astley 1996, Robotics Research: calibrated output of haptic interfaces",
+    signature="the missing force is proportional to the command at every frequency and level, in position and response "
+    "alike",
+    parameters=(Parameter("gain", 0.05, 20.0, none=1.0),),
+    acts=OnCommand(_scaled),
+    starts=_starts,
+    sites=("one", "all"),
+)

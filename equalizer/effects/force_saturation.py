@@ -1,0 +1,34 @@
+"""An actuator that gives no more than so much force."""
+
+import math
+
+import numpy as np
+
+from equalizer.effects.command_starts import grid_of_peaks, likeliest_value
+from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+
+def _limited(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
+    return np.clip(commands, -of["limit"], of["limit"])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    limit = likeliest_value(
+        evidence, axis, lambda u, step_s, value: np.clip(u, -value, value), grid_of_peaks(evidence, axis), True
+    )
+    return () if limit is None else ({"limit": limit},)
+
+
+EFFECT = Effect(
+    name="force_saturation",
+    equation="F = max(-limit, min(u, limit))",
+    source="Isermann, Mechatronic Systems, Springer 2005, ch. 10: limits of actuators",
+    signature="force is missing only where more than the limit is commanded, and all that is above it; odd harmonics "
+    "at the top level alone",
+    parameters=(Parameter("limit", 1e-4, 1e4, none=math.inf),),
+    acts=OnCommand(_limited),
+    starts=_starts,
+    sites=("one", "all"),
+)

@@ -1,0 +1,69 @@
+"""Whether values lie on an evenly spaced lattice, and how wide it is."""
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+CLOSE = 0.02
+"""Shares of a step by which values may miss the lattice; single precision leaves less."""
+NEARLY_ALL = 0.999
+LEAST_VALUES, MOST_VALUES = 4, 0.2
+"""Different values that make a lattice, at least; and at most, as a share of the samples."""
+PEAK = 12.0
+"""Times its surroundings that the histogram's spectrum must rise for a staircase."""
+BIN_SHARE = 0.2
+"""Of the noise, that a histogram's bin is wide."""
+
+
+def lattice_offset(values: FloatArray, step: float) -> float | None:
+    """Where the lattice of this step starts, between minus and plus half a step; None where values are not on one."""
+    if step <= 0:
+        return None
+    turn = np.exp(2j * np.pi * values / step)
+    offset = float(np.angle(turn.mean()) / (2 * np.pi) * step)
+    away = np.abs((values - offset) / step - np.round((values - offset) / step))
+    return offset if float(np.mean(away < CLOSE)) > NEARLY_ALL else None
+
+
+def lattice_step(values: FloatArray) -> float | None:
+    """The widest step whose lattice holds nearly all values; None where they lie anywhere."""
+    different = np.unique(values)
+    if len(different) < LEAST_VALUES:
+        return None
+    # Single precision gives one lattice point several neighbours that are not meant.
+    gaps = np.diff(different)
+    gaps = gaps[gaps > 1e-5 * float(np.ptp(different)) / max(len(different), 1)]
+    if not len(gaps):
+        return None
+    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    points = np.unique(np.round((different - different[0]) / step))
+    if not LEAST_VALUES <= len(points) <= MOST_VALUES * len(values):
+        return None
+    # Over the whole range an error of the step adds up: it is measured there.
+    numbers = np.round((different - different[0]) / step)
+    for _ in range(2):
+        step = float(np.polyfit(numbers, different, 1)[0])
+        numbers = np.round((different - different[0]) / step)
+    return step if lattice_offset(values, step) is not None else None
+
+
+def staircase_step(values: FloatArray, noise: float) -> float | None:
+    """The step of a staircase under noise, from the ripple that it leaves in the histogram; None where there is none."""
+    span = float(np.ptp(values))
+    bins = int(span / (BIN_SHARE * noise)) if noise > 0 else 0
+    if not 64 <= bins <= 4_000_000:
+        return None
+    counts, edges = np.histogram(values, bins=bins)
+    width = float(edges[1] - edges[0])
+    padded = 8 * len(counts)
+    spectrum = np.abs(np.fft.rfft(counts, padded)) / np.sqrt(len(values))
+    per_unit = np.fft.rfftfreq(padded, width)
+    # Slow shapes are the response's own distribution.
+    inside = (per_unit > 10 / span) & (per_unit < 0.3 / noise)
+    if not inside.any():
+        return None
+    top = int(np.flatnonzero(inside)[np.argmax(spectrum[inside])])
+    around = (np.abs(per_unit - per_unit[top]) < 20 / span) & inside & (np.abs(per_unit - per_unit[top]) > 2 / span)
+    if not around.any() or spectrum[top] < PEAK * float(np.median(spectrum[around])):
+        return None
+    return float(1 / per_unit[top])

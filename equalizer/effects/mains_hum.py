@@ -1,0 +1,86 @@
+"""A tone of the mains, or another, that no command asked for."""
+
+import math
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.response_starts import shares_of
+from equalizer.signals.signal import FloatArray
+
+MAINS_HZ = (45.0, 65.0)
+ABOVE = 12.0
+"""Times the spectrum's local median (power) that a tone must have."""
+NEIGHBOURS_HZ = 3.0
+ROUNDS = 4
+
+
+def _hummed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    time_s = np.arange(len(response)) / sample_rate_hz
+    read = response.copy()
+    tone = of["amplitude"] * np.sin(2 * np.pi * of["frequency"] * time_s + of.get("phase", 0.0))
+    read[:, channels] += tone[:, None]
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The line that all channels share, between 45 and 65 Hz and anywhere, with this channel's amplitude and phase."""
+    residual = (evidence.response - evidence.predicted) * evidence.used[:, None]
+    power = np.sum(np.abs(np.fft.rfft(residual / evidence.noise, axis=0)) ** 2, axis=1)
+    lines_hz = np.fft.rfftfreq(len(residual), 1 / evidence.sample_rate_hz)
+    found: list[Values] = []
+    for low, high in (MAINS_HZ, (1.0, 0.49 * evidence.sample_rate_hz)):
+        inside = np.flatnonzero((lines_hz >= low) & (lines_hz <= high))
+        if not len(inside):
+            continue
+        top = int(inside[np.argmax(power[inside])])
+        near = np.abs(lines_hz - lines_hz[top]) < NEIGHBOURS_HZ
+        if power[top] < ABOVE * float(np.median(power[near])):
+            continue
+        tone = _tone(residual[:, channel], evidence, float(lines_hz[top]))
+        if not any(abs(tone["frequency"] - other["frequency"]) < lines_hz[1] for other in found):
+            found.append(tone)
+    return tuple(found)
+
+
+def _tone(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> Values:
+    """Least squares for amplitude and phase; the phase's drift then corrects the frequency."""
+    time_s = np.arange(len(residual)) / evidence.sample_rate_hz
+    # About the middle of the recording, so that frequency and phase do not compete.
+    middle = float(time_s.mean())
+    cosine = sine = 0.0
+    for _ in range(ROUNDS):
+        angle = 2 * np.pi * frequency_hz * (time_s - middle)
+        turning = 2 * np.pi * (time_s - middle)
+        waves = np.column_stack([np.cos(angle), np.sin(angle)])
+        cosine, sine = shares_of(residual, waves, evidence.used).tolist()
+        size = cosine**2 + sine**2
+        if size == 0:
+            break
+        slope = turning * (sine * waves[:, 0] - cosine * waves[:, 1])
+        more = shares_of(residual - waves @ [cosine, sine], slope[:, None], evidence.used)[0]
+        frequency_hz += float(np.clip(more, -0.3 / time_s[-1], 0.3 / time_s[-1]))
+    phase = math.atan2(cosine, sine) - 2 * np.pi * frequency_hz * middle
+    return {
+        "amplitude": math.hypot(cosine, sine),
+        "frequency": frequency_hz,
+        "phase": (phase + np.pi) % (2 * np.pi) - np.pi,
+    }
+
+
+EFFECT = Effect(
+    name="mains_hum",
+    equation="y = x + amplitude sin(2 pi frequency t + phase)",
+    source="IEC 61000-4-30: frequency of the mains",
+    signature="a tone goes through the whole response, at rest as in motion, that nothing commanded, while the "
+    "position agrees",
+    parameters=(
+        Parameter("amplitude", 1e-12, 1e9, none=0.0),
+        Parameter("frequency", 0.1, 1e5, none=None, scale="linear", step=1e-4),
+        Parameter("phase", -20.0, 20.0, none=None, scale="linear", step=0.02),
+    ),
+    acts=OnResponse(_hummed, stage=2),
+    starts=_starts,
+    sites=("each", "one"),
+)

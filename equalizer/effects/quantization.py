@@ -1,0 +1,71 @@
+"""A converter's steps: the response takes only whole multiples of one.
+
+Where the recording itself lies on such a lattice, what was read before rounding is known to half a step. The residual
+is then the quantile of the noise at which it must have been (Dunn and Smyth 1996, J. Comput. Graph. Stat. 5:236), so
+that noise which dithers the steps is not taken for a misfit. Otherwise noise came after, and the prediction is rounded.
+"""
+
+import numpy as np
+from scipy.stats import norm
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.lattice import lattice_offset, lattice_step, staircase_step
+from equalizer.effects.response_starts import channels_of
+from equalizer.signals.signal import FloatArray
+
+FAR = 1e-12
+"""Probability beyond which a quantile is not looked up."""
+
+
+def _rounded(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    read = response.copy()
+    if of["step"] > 0:
+        read[:, channels] = of["step"] * np.round(response[:, channels] / of["step"])
+    return read
+
+
+def _given(
+    response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], of: Values
+) -> FloatArray:
+    read, step = _rounded(response, 0.0, channels, of), of["step"]
+    for channel in channels:
+        if lattice_offset(measured[:, channel], step) is not None:
+            read[:, channel] = _within_step(response[:, channel], measured[:, channel], float(noise[channel]), step)
+    return read
+
+
+def _within_step(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
+    """What must have been predicted for the residual to be the noise's quantile."""
+    missing = measured - response
+    # From the side of the shorter tail, where probabilities keep their digits.
+    side = np.where(missing > 0, -1.0, 1.0)
+    low, high = norm.cdf((side * missing - step / 2) / noise), norm.cdf((side * missing + step / 2) / noise)
+    chance = np.random.default_rng(len(response)).random(len(response))
+    residual = side * noise * norm.ppf(np.clip(low + chance * (high - low), FAR, 1 - FAR))
+    far = high < FAR
+    residual[far] = (missing - np.sign(missing) * step / 2)[far]
+    return np.asarray(measured - residual)
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    used = evidence.used > 0
+    for each in channels_of(evidence, channel):
+        measured, noise = evidence.response[used, each], float(evidence.noise[each])
+        step = lattice_step(measured) or staircase_step(measured, noise)
+        if step is not None:
+            return ({"step": step},)
+    return ()
+
+
+EFFECT = Effect(
+    name="quantization",
+    equation="y = step round(x / step)",
+    source="Widrow and Kollar, Quantization Noise, Cambridge 2008",
+    signature="the response takes whole multiples of one step, with as much error at every level, while the position "
+    "agrees",
+    parameters=(Parameter("step", 1e-12, 1e9, none=0.0, fixed=True),),
+    acts=OnResponse(_rounded, stage=3, given=_given),
+    starts=_starts,
+    sites=("all", "one"),
+)

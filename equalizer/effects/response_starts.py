@@ -1,0 +1,60 @@
+"""Starting values of what a sensor does, from the response as measured against the response as predicted."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.signal import correlate, correlation_lags
+
+from equalizer.effects.command_starts import best_on_grid
+from equalizer.effects.effect import ALL_SITES
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+LEAST_SHARE = 1e-4
+"""Of the misfit, that a value must explain to be worth a try."""
+
+
+def channels_of(evidence: Evidence, site: int) -> tuple[int, ...]:
+    return tuple(range(evidence.response.shape[1])) if site == ALL_SITES else (site,)
+
+
+def likeliest_reading(
+    evidence: Evidence,
+    site: int,
+    change: Callable[[FloatArray, float], FloatArray],
+    grid: Sequence[float],
+) -> float | None:
+    """The value, near one of the grid's (rising, above zero), that makes most of the measured response out of the
+    predicted one. change: samples (n, channels), value. None where none makes it better."""
+    channels = list(channels_of(evidence, site))
+    used, noise = evidence.used > 0, evidence.noise[channels]
+    measured, predicted = evidence.response[:, channels], evidence.predicted[:, channels]
+
+    def left(read: FloatArray) -> float:
+        return float(np.sum((((measured - read) / noise) ** 2)[used]))
+
+    best, misfit = best_on_grid(lambda value: left(change(predicted, value)), grid)
+    return best if misfit < (1 - LEAST_SHARE) * left(predicted) else None
+
+
+def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> FloatArray:
+    """(k,): how much of each of the basis' (n, k) columns the residual (n,) holds."""
+    columns = basis[used > 0]
+    return np.asarray(np.linalg.lstsq(columns, residual[used > 0], rcond=None)[0], dtype=np.float64)
+
+
+def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float:
+    """By how many samples the measured response (n, p) comes after the predicted one, at most `longest`."""
+    total: FloatArray = np.zeros(2 * len(measured) - 1)
+    for after, before in zip(measured.T, predicted.T, strict=True):
+        size = float(np.linalg.norm(before) * np.linalg.norm(after))
+        if size > 0:
+            total = total + correlate(after, before, mode="full") / size
+    lags = correlation_lags(len(measured), len(measured))
+    near = np.flatnonzero(np.abs(lags) <= longest)
+    top = int(near[np.argmax(total[near])])
+    if top in (near[0], near[-1]):
+        return float(lags[top])
+    left, middle, right = total[top - 1 : top + 2]
+    bent = left - 2 * middle + right
+    return float(lags[top] + (0.5 * (left - right) / bent if bent < 0 else 0.0))

@@ -1,0 +1,42 @@
+"""A sensor that reads no more than so much."""
+
+import math
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.response_starts import channels_of, likeliest_reading
+from equalizer.signals.signal import FloatArray
+
+
+def _clipped(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    read = response.copy()
+    read[:, channels] = np.clip(response[:, channels], -of["limit"], of["limit"])
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    peak = float(np.abs(evidence.predicted[:, list(channels_of(evidence, channel))]).max())
+    if peak == 0:
+        return ()
+    limit = likeliest_reading(
+        evidence,
+        channel,
+        lambda samples, value: np.clip(samples, -value, value),
+        list(np.geomspace(0.05 * peak, 0.99 * peak, 12)),
+    )
+    return () if limit is None else ({"limit": limit},)
+
+
+EFFECT = Effect(
+    name="sensor_clipping",
+    equation="y = max(-limit, min(x, limit))",
+    source="Analog Devices ADXL335 data sheet: measurement range",
+    signature="the peaks of the response are cut off flat at one height, at the top level alone, while the position "
+    "agrees",
+    parameters=(Parameter("limit", 1e-9, 1e9, none=math.inf),),
+    acts=OnResponse(_clipped, stage=1),
+    starts=_starts,
+    sites=("one", "all"),
+)

@@ -1,0 +1,37 @@
+"""A sensor whose sensitivity is not what its sheet says."""
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.response_starts import channels_of
+from equalizer.signals.signal import FloatArray
+
+LEAST = 1e-4
+
+
+def _scaled(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    read = response.copy()
+    read[:, channels] *= of["gain"]
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    channels, used = list(channels_of(evidence, channel)), evidence.used > 0
+    measured = (evidence.response[:, channels] / evidence.noise[channels])[used]
+    predicted = (evidence.predicted[:, channels] / evidence.noise[channels])[used]
+    size = float(np.sum(predicted**2))
+    gain = float(np.sum(measured * predicted)) / size if size > 0 else 1.0
+    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > LEAST else ()
+
+
+EFFECT = Effect(
+    name="sensor_gain",
+    equation="y = gain x",
+    source="Analog Devices ADXL335 data sheet: sensitivity 270 to 330 mV/g, in proportion to the supply",
+    signature="the response is off by one factor at every frequency and level, while the position agrees",
+    parameters=(Parameter("gain", 0.01, 100.0, none=1.0),),
+    acts=OnResponse(_scaled),
+    starts=_starts,
+    sites=("one", "all"),
+)

@@ -1,0 +1,60 @@
+"""A sensor that is mounted at an angle: what it reads is turned, lengths stay.
+
+Two or three channels turn together; with two, about an axis that stands upright on both.
+"""
+
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+ABOUT = ("about_x", "about_y", "about_z")
+LARGEST_DEG = 120.0
+LEAST_DEG = 0.01
+
+
+def _turned(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    if len(channels) not in (2, 3):
+        raise ValueError(f"sensor_misalignment turns two or three channels together, not {len(channels)}")
+    rotation = Rotation.from_rotvec([of[name] for name in ABOUT], degrees=True).as_matrix()
+    read = response.copy()
+    read[:, channels] = response[:, channels] @ rotation[: len(channels), : len(channels)].T
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The rotation that brings the predicted response closest to the measured one."""
+    p = evidence.response.shape[1]
+    if channel > 0 or p not in (2, 3):
+        return ()
+    used = evidence.used > 0
+    ours, theirs = np.zeros((2, int(used.sum()), 3))
+    ours[:, :p], theirs[:, :p] = evidence.predicted[used], evidence.response[used]
+    left, _, right = np.linalg.svd(theirs.T @ ours)
+    handed = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
+    vector = Rotation.from_matrix(left @ handed @ right).as_rotvec(degrees=True)
+    if not LEAST_DEG < np.linalg.norm(vector) < LARGEST_DEG:
+        return ()
+    return (dict(zip(ABOUT, vector.tolist(), strict=True)),)
+
+
+def _report(of: Values) -> Values:
+    return {"degrees": math.hypot(*(of[name] for name in ABOUT)), **of}
+
+
+EFFECT = Effect(
+    name="sensor_misalignment",
+    equation="y = R x, R a rotation",
+    source="Titterton and Weston, Strapdown Inertial Navigation Technology, IET 2004, ch. 8: mounting misalignment",
+    signature="each channel reads a constant share of the others at every frequency and level, with opposite signs "
+    "both ways, while the position agrees",
+    parameters=tuple(Parameter(name, -LARGEST_DEG, LARGEST_DEG, none=0.0, scale="linear", step=0.05) for name in ABOUT),
+    acts=OnResponse(_turned, stage=-2, shared=True),
+    starts=_starts,
+    sites=("all",),
+    report=_report,
+)

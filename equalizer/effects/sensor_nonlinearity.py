@@ -1,0 +1,38 @@
+"""A sensor whose sensitivity changes with what it reads, alike both ways."""
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.response_starts import channels_of, shares_of
+from equalizer.signals.signal import FloatArray
+
+
+def _bent(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    read = response.copy()
+    read[:, channels] += of["cubic"] * response[:, channels] ** 3
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    channels = list(channels_of(evidence, channel))
+    weight = 1 / evidence.noise[channels]
+    predicted = evidence.predicted[:, channels]
+    residual = ((evidence.response[:, channels] - predicted) * weight).ravel()
+    basis = np.column_stack([(predicted**3 * weight).ravel(), (predicted * weight).ravel()])
+    # A share of the response itself is what re-tuned parameters can take up.
+    cubic = float(shares_of(residual, basis, np.repeat(evidence.used, len(channels)))[0])
+    return ({"cubic": cubic},) if cubic != 0 and np.isfinite(cubic) else ()
+
+
+EFFECT = Effect(
+    name="sensor_nonlinearity",
+    equation="y = x + cubic x^3",
+    source="IEEE Std 1293, single-axis accelerometers: third-order coefficient of the model equation",
+    signature="what the response is off by grows with its cube at every frequency, with odd harmonics that rise with "
+    "the level, while the position agrees",
+    parameters=(Parameter("cubic", -1e12, 1e12, none=0.0, scale="signed"),),
+    acts=OnResponse(_bent),
+    starts=_starts,
+    sites=("one", "all"),
+)

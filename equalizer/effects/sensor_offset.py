@@ -1,0 +1,35 @@
+"""A sensor that does not read zero at rest."""
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+LEAST_SIGMA = 4.0
+"""Standard errors of a mean below which there is no offset to speak of."""
+
+
+def _shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    read = response.copy()
+    read[:, channels] += of["offset"]
+    return read
+
+
+def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    residual = (evidence.response - evidence.predicted)[evidence.used > 0, channel]
+    offset = float(residual.mean())
+    large = abs(offset) * np.sqrt(len(residual)) > LEAST_SIGMA * float(residual.std())
+    return ({"offset": offset},) if large else ()
+
+
+EFFECT = Effect(
+    name="sensor_offset",
+    equation="y = x + offset",
+    source="IEEE Std 1293, single-axis accelerometers: bias",
+    signature="the response is off by the same amount all the time, at rest as in motion, while the position agrees",
+    parameters=(Parameter("offset", -1e12, 1e12, none=0.0, scale="signed"),),
+    acts=OnResponse(_shifted, stage=2),
+    starts=_starts,
+    sites=("one", "each"),
+)

@@ -1,0 +1,26 @@
+"""An actuator that cannot change its force faster than so, compiled."""
+
+from numba import njit, types
+
+from equalizer.signals.signal import FloatArray
+
+_IN = types.Array(types.float64, 1, "A", readonly=True)  # type: ignore[no-untyped-call]
+
+
+@njit(types.void(_IN, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
+def follow(commands: FloatArray, reach: float, mean: FloatArray, end: FloatArray) -> None:
+    """Fills the force's mean over each step and its value at the end, for held commands. reach: the largest change in
+    one step."""
+    force = 0.0
+    for k in range(commands.shape[0]):
+        missing = commands[k] - force
+        if abs(missing) <= reach:
+            # On the way for a share of the step.
+            on_way = abs(missing) / reach
+            mean[k] = commands[k] - missing * on_way / 2
+            force = commands[k]
+        else:
+            change = reach if missing > 0 else -reach
+            mean[k] = force + change / 2
+            force += change
+        end[k] = force
