@@ -21,6 +21,7 @@ from study.cli import (
     doctor,
     equalize,
     identify,
+    import_recording,
     noise,
     note,
     protocol,
@@ -53,6 +54,7 @@ app.command("rehearse")(rehearse.rehearse)
 app.command("reproduce")(reproduce.reproduce)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
+app.command("import")(import_recording.import_recording)
 app.command("identify")(identify.identify)
 app.command("equalize")(equalize.equalize)
 app.add_typer(protocol.app, name="protocol")

@@ -162,6 +162,9 @@ class ImportMap:
     let: Annotated[dict[str, str], Field(description="Expressions by name, for all others to use.")] = field(
         default_factory=dict
     )
+    numbers: Annotated[
+        dict[str, str], Field(description="Numbers from the file, such as gains, kept in meta for each part.")
+    ] = field(default_factory=dict)
     clock: Annotated[tuple[ClockMap, ...], Field(min_length=1, description="Clocks, one [[clock]] each.")] = (
         ClockMap(),
     )

@@ -74,9 +74,10 @@ def _allowed(place: Place) -> str:
 
 def _contradictions(found: ImportMap) -> Iterator[str]:
     clocks = [clock.name for clock in found.clock]
-    names = [*(channel.name for channel in found.channel), *(channel.name for channel in found.computed)]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        yield f"channel '{name}' is there twice"
+    keys = [(entry.role, entry.name) for entry in found.channel]
+    keys += [(entry.role, entry.name) for entry in found.computed]
+    for role, name in sorted({key for key in keys if keys.count(key) > 1}):
+        yield f"{role} '{name}' is there twice"
     for name in sorted({name for name in clocks if clocks.count(name) > 1}):
         yield f"clock '{name}' is there twice"
     for channel in found.channel:

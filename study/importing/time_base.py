@@ -3,12 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
+from equalizer.signals.resampling import Samples
 from equalizer.signals.units import UnknownUnitError, parse_unit
 from study.importing.functions import Value
 from study.importing.import_map import ClockMap
 from study.importing.map_errors import ImportProblemError
 from study.importing.namespace import Namespace, NoTime
+
+IntArray = npt.NDArray[np.int64]
 
 UNEVEN = 0.02
 """Stamps are uniform where none is further from its place than this share of a step."""
@@ -24,6 +28,8 @@ class TimeBase:
     """0 where stamps are not uniform."""
     stamps_s: Value | None
     """(n,) as the logger wrote them; None for a clock that is a rate only."""
+    places: IntArray | None
+    """(n,): which samples of the uniform rate the stamps are; None where they are not uniform."""
     gap_s: float
     offset_s: float = 0.0
     """Added to give the reference's time."""
@@ -33,12 +39,22 @@ class TimeBase:
         return self.rate_hz or 1 / float(np.median(np.diff(self.times_s(0))))
 
     def times_s(self, count: int) -> Value:
-        """(count,); with stamps, as many as there are."""
+        """(count,) in the logger's own time; with stamps, as many as there are."""
         if self.stamps_s is None:
             return np.arange(count) / self.rate_hz
-        if self.rate_hz:
-            return self.stamps_s[0] + np.arange(len(self.stamps_s)) / self.rate_hz
+        if self.places is not None:
+            evened: Value = self.stamps_s[0] + self.places / self.rate_hz
+            return evened
         return self.stamps_s
+
+    def samples(self, values: Value) -> Samples:
+        """In the reference's time; rows that a uniform logger has left out are missing samples."""
+        times_s = self.times_s(len(values)) + self.offset_s
+        if self.places is None or self.places[-1] == len(self.places) - 1:
+            return Samples(times_s, values, self.rate_hz, self.gap_s)
+        every = np.full(self.places[-1] + 1, np.nan)
+        every[self.places] = values
+        return Samples(times_s[0] + np.arange(len(every)) / self.rate_hz, every, self.rate_hz, self.gap_s)
 
 
 def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
@@ -48,7 +64,7 @@ def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
     rate_hz = clock.rate_hz or names.number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
-    return TimeBase(clock.name, rate_hz, None, clock.gap_s or 1.5 / rate_hz)
+    return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)
 
 
 def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
@@ -58,43 +74,42 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(f"clock '{clock.name}': time_unit: {error}") from error
     if unit.si != "s":
         raise ImportProblemError(f"clock '{clock.name}': time_unit is '{clock.time_unit}', which is no unit of time")
-    stamps_s = names.value_of(clock.time, NoTime()) * unit.factor
+    stamps_s: Value = names.value_of(clock.time, NoTime()) * unit.factor
     if stamps_s.ndim != 1 or len(stamps_s) < 2:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} has the shape {stamps_s.shape}; stamps are one row of two or more"
         )
-    _check(clock, stamps_s)
-    steps_s = np.diff(stamps_s)
-    rate_hz = _uniform_rate_hz(stamps_s)
-    return TimeBase(clock.name, rate_hz, stamps_s, clock.gap_s or 3 * float(np.median(steps_s)))
+    if problem := _wrong_stamps(stamps_s):
+        raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
+    rate_hz, places = _uniform(stamps_s)
+    gap_s = clock.gap_s or 3 * float(np.median(np.diff(stamps_s)))
+    return TimeBase(clock.name, rate_hz, stamps_s, places, gap_s)
 
 
-def _check(clock: ClockMap, stamps_s: Value) -> None:
+def _wrong_stamps(stamps_s: Value) -> str:
+    """Empty where they grow."""
     if not np.isfinite(stamps_s).all():
         first = int(np.argmax(~np.isfinite(stamps_s)))
-        raise ImportProblemError(
-            f"clock '{clock.name}': {clock.time} has no number at sample {first}; time is never missing"
-        )
+        return f"is no number at sample {first}; time is never missing"
     steps_s = np.diff(stamps_s)
     if (steps_s < 0).any():
         first = int(np.argmax(steps_s < 0)) + 1
-        raise ImportProblemError(
-            f"clock '{clock.name}': {clock.time} runs backwards at sample {first} ({stamps_s[first - 1]:.9g} to "
-            f"{stamps_s[first]:.9g} s)"
-        )
+        return f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
     if (steps_s == 0).any():
         first = int(np.argmax(steps_s == 0)) + 1
-        raise ImportProblemError(
-            f"clock '{clock.name}': {clock.time} stands still at sample {first} ({stamps_s[first]:.9g} s)"
-        )
+        return f"stands still at sample {first}, at {stamps_s[first]:.9g} s"
+    return ""
 
 
-def _uniform_rate_hz(stamps_s: Value) -> float:
-    """0 where they are not; a plain number (1000 for 1000.0003) where that fits all stamps as well."""
-    count = len(stamps_s) - 1
-    mean_hz = count / float(stamps_s[-1] - stamps_s[0])
-    for rate_hz in (*(float(f"{mean_hz:.{digits}g}") for digits in _PLAIN_DIGITS), mean_hz):
-        places = (stamps_s - stamps_s[0]) * rate_hz
-        if np.max(np.abs(places - np.arange(count + 1))) <= UNEVEN:
-            return rate_hz
-    return 0.0
+def _uniform(stamps_s: Value) -> tuple[float, IntArray | None]:
+    """Rate and places; 0 and None where stamps are uneven. A plain number (1000 for 1000.0003) where all fit that."""
+    since_s = stamps_s - stamps_s[0]
+    mean_hz = (len(stamps_s) - 1) / float(since_s[-1])
+    usual_hz = 1 / float(np.median(np.diff(stamps_s)))
+    for about_hz in (mean_hz, usual_hz):
+        for rate_hz in (*(float(f"{about_hz:.{digits}g}") for digits in _PLAIN_DIGITS), about_hz):
+            places = np.round(since_s * rate_hz).astype(np.int64)
+            uneven = np.max(np.abs(since_s * rate_hz - places))
+            if uneven <= UNEVEN and (np.diff(places) >= 1).all() and 2 * len(places) > places[-1]:
+                return rate_hz, places
+    return 0.0, None

@@ -1,0 +1,52 @@
+"""`hapteq import`: a laboratory's files as a recording of ours."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def import_recording(
+    files: Annotated[list[Path], typer.Argument(help="CSV, NPZ, MAT or HDF5 files, or a folder of them.")],
+    out: Annotated[Path, typer.Option(help="The recording to write, REC.h5.")],
+    by_map: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            help="What is what in them: MAP.toml, or the name of a map that comes with hapteq [default: found].",
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write one recording: units in SI, all channels on one rate, clocks aligned; what was done is said.
+
+    Without a map, a table whose header names units is understood (time [s], fx [N], ...), and so are recordings of
+    ours; for other files a map to be completed is printed.
+    """
+    from study.cli.progress import late_bar
+    from study.importing.map_errors import MapNeededError
+    from study.workflows.import_recording import ImportPlan, check_free
+    from study.workflows.import_recording import import_recording as run
+
+    check_free(out)
+    try:
+        with late_bar("Importing (%)", total=100) as show:
+            imported = run(ImportPlan(tuple(files), by_map, out), lambda share: show(round(100 * share)))
+    except MapNeededError as error:
+        typer.echo(error.skeleton, nl=False)
+        raise
+    found = imported.recording
+    if as_json:
+        facts = {
+            "recording": str(out), "map": imported.map, "sample_rate_hz": found.sample_rate_hz, "samples": len(found),
+            "command": list(found.command.channels), "response": list(found.response.channels),
+            "segments": len(found.segments), "notes": list(imported.notes),
+        }  # fmt: skip
+        typer.echo(json.dumps(facts, indent=2))
+    else:
+        typer.echo(str(out))
+    for note in imported.notes:
+        typer.echo(f"Note: {note}", err=True)

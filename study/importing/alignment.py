@@ -1,0 +1,87 @@
+"""Clocks of several loggers brought to the time of the first: by a stated offset, a trigger, or one motion in both."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.clock_offset import NoOffsetError, offset_by_correlation
+from study.importing.functions import Value
+from study.importing.import_map import ClockMap
+from study.importing.map_errors import ImportProblemError
+from study.importing.namespace import Namespace
+from study.importing.time_base import TimeBase
+
+
+@dataclass(frozen=True, slots=True)
+class Logger:
+    """A clock, and the arrays that were taken by it."""
+
+    clock: ClockMap
+    names: Namespace
+    base: TimeBase
+
+    def line(self, text: str) -> Value:
+        """(n,) of an expression. Raises ImportProblemError."""
+        values = self.names.value_of(text, self.base)
+        if values.ndim != 1:
+            raise ImportProblemError(f"clock '{self.clock.name}': {text} has the shape {values.shape}, not one row")
+        if self.base.stamps_s is not None and len(values) != len(self.base.stamps_s):
+            raise ImportProblemError(
+                f"clock '{self.clock.name}': {text} has {len(values)} samples, but the clock {len(self.base.stamps_s)}"
+            )
+        return values
+
+
+def aligned(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tuple[Logger, ...]:
+    """The same loggers with their offsets; `say` gets a sentence for each offset. Raises ImportProblemError."""
+    first, *others = loggers
+    return (first, *(_with_offset(first, other, say) for other in others))
+
+
+def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Logger:
+    clock = other.clock
+    if clock.align:
+        offset_s, how = _by_correlation(first, other)
+    elif clock.trigger:
+        offset_s, how = _by_trigger(first, other)
+    else:
+        offset_s, how = clock.offset_s, "as the map states"
+    say(f"Clock '{clock.name}' is moved by {offset_s * 1e3:.4g} ms to that of '{first.clock.name}', {how}.")
+    return replace(other, base=replace(other.base, offset_s=offset_s))
+
+
+def _by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
+    clock = other.clock
+    reference = first.base.samples(first.line(clock.align_to))
+    try:
+        found = offset_by_correlation(
+            reference, other.base.samples(other.line(clock.align)), clock.offset_s, clock.align_within_s
+        )
+    except ValueError as error:
+        kind = "" if isinstance(error, NoOffsetError) else "correlation is not possible: "
+        raise ImportProblemError(f"clock '{clock.name}' cannot be aligned: {kind}{error}") from error
+    turned = ", its sign turned" if found.correlation < 0 else ""
+    how = f"found by correlating {clock.align} with {clock.align_to} ({found.correlation:.3f} there{turned})"
+    return found.offset_s, how
+
+
+def _by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
+    clock = other.clock
+    here_s = _crossing_s(other, clock.trigger, clock.trigger_level)
+    there_s = _crossing_s(first, clock.reference_trigger, clock.reference_level)
+    return there_s - here_s, f"from the trigger in {clock.trigger} and {clock.reference_trigger}"
+
+
+def _crossing_s(logger: Logger, text: str, level: float) -> float:
+    """When it passes the level for the first time, along the straight line between samples."""
+    values: Any = logger.line(text)
+    times_s = logger.base.times_s(len(values))
+    above = values >= level
+    change = np.flatnonzero(above[1:] != above[:-1])
+    if not len(change):
+        raise ImportProblemError(f"clock '{logger.clock.name}': {text} never passes the trigger level of {level:g}")
+    k = int(change[0])
+    share = (level - values[k]) / (values[k + 1] - values[k])
+    return float(times_s[k] + share * (times_s[k + 1] - times_s[k]))

@@ -1,0 +1,180 @@
+"""Files and a map to one recording in SI units, with everything said that was done on the way."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.recording import Hold, Recording, Segment
+from equalizer.signals.recording_checks import recording_problems
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, quantity_of
+from study.importing.alignment import Logger, aligned
+from study.importing.arrays import Arrays, read_arrays
+from study.importing.import_map import ChannelMap, ComputedMap, ImportMap
+from study.importing.map_errors import ImportProblemError, ImportRefusedError
+from study.importing.map_files import PartFiles, part_files
+from study.importing.map_segments import segments_of
+from study.importing.namespace import of_file
+from study.importing.part_signals import Key, PartSignals, part_signals
+from study.importing.said import Said
+from study.importing.time_base import time_base
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Built:
+    recording: Recording
+    notes: tuple[str, ...]
+    """Sentences: what was resampled and how, which clock was moved, what is missing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    signals: PartSignals
+    facts: dict[str, Any]
+
+
+def build_recording(
+    wanted: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
+) -> Built:
+    """on_progress: share done, 0 to 1. Raises CannotReadError, ImportRefusedError."""
+    what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
+    said = Said()
+    try:
+        units = _units(wanted)
+        planned = part_files(wanted, files)
+        steps = len(planned) * (len(wanted.channel) + len(wanted.computed))
+        parts = []
+        for number, part in enumerate(planned):
+            counter = _Counter(number * steps / len(planned), steps, on_progress)
+            parts.append(_part(wanted, part, said, counter))
+        recording = _joined(wanted, parts, units)
+    except ImportProblemError as error:
+        raise ImportRefusedError(what, str(error)) from error
+    if problems := recording_problems(recording):
+        raise ImportRefusedError(what, "; ".join(problems))
+    notes = said.sentences([part.label for part in planned])
+    return Built(recording, notes)
+
+
+class _Counter:
+    def __init__(self, done: float, steps: int, on_progress: Callable[[float], None]) -> None:
+        self.done = done
+        self.steps = steps
+        self.on_progress = on_progress
+
+    def step(self) -> None:
+        self.done += 1
+        self.on_progress(min(1.0, self.done / self.steps))
+
+
+def _part(wanted: ImportMap, files: PartFiles, said: Said, counter: _Counter) -> _Part:
+    read: dict[Path, Arrays] = {}
+    loggers = []
+    for clock in wanted.clock:
+        path = files.by_clock[clock.name]
+        read[path] = read.get(path) or read_arrays(path, wanted.csv)
+        names = of_file(read[path], {**wanted.let, **files.part.let}, files.part.prefix)
+        loggers.append(Logger(clock, names, time_base(clock, names)))
+
+    def say(sentence: str) -> None:
+        said.add(files.label, sentence)
+
+    ready = aligned(tuple(loggers), say)
+    signals = part_signals(wanted, files.part, ready, say, counter.step)
+    numbers = {name: ready[0].names.number(text) for name, text in wanted.numbers.items()}
+    facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **numbers}
+    offsets = {logger.clock.name: logger.base.offset_s for logger in ready[1:]}
+    return _Part(signals, {**facts, **({"clock_offsets_s": offsets} if offsets else {})})
+
+
+@dataclass(frozen=True, slots=True)
+class _ChannelUnit:
+    si: str
+    factor: float
+    quantity: str
+
+
+def _units(wanted: ImportMap) -> dict[Key, _ChannelUnit]:
+    """Helpers need none. Raises ImportProblemError."""
+    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
+    return {(channel.role, channel.name): _unit(channel) for channel in every if channel.role != "helper"}
+
+
+def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
+    try:
+        unit = parse_unit(channel.unit)
+        check_quantity(channel.quantity, unit)
+    except UnknownUnitError as error:
+        raise ImportProblemError(f"channel '{channel.name}': {error}") from error
+    return _ChannelUnit(unit.si, unit.factor, channel.quantity or quantity_of(unit.si))
+
+
+def _joined(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
+    _require_one_rate(parts)
+    command = _signal("command", wanted, parts, units)
+    response = _signal("response", wanted, parts, units)
+    if command is None or response is None:
+        raise ImportProblemError("a recording needs both a command and a response")
+    facts, segments = _facts_and_segments(wanted, parts, units)
+    return Recording(
+        device=wanted.device,
+        command=command,
+        response=response,
+        position=_signal("position", wanted, parts, units),
+        excitation=_signal("excitation", wanted, parts, units),
+        hold=Hold(wanted.hold),
+        segments=segments,
+        meta={**wanted.meta, "title": wanted.title, "parts": facts},
+    )
+
+
+def _require_one_rate(parts: Sequence[_Part]) -> None:
+    first = parts[0]
+    for part in parts[1:]:
+        if part.signals.grid.rate_hz != first.signals.grid.rate_hz:
+            raise ImportProblemError(
+                f"{part.facts['file']} is at {part.signals.grid.rate_hz:g} Hz, but {first.facts['file']} at "
+                f"{first.signals.grid.rate_hz:g} Hz; state the rate_hz of the recording, and resample of each channel"
+            )
+
+
+def _signal(role: str, wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Signal | None:
+    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
+    names = tuple(channel.name for channel in every if channel.role == role)
+    if not names:
+        return None
+    told = [units[role, name] for name in names]
+    columns = [
+        np.concatenate([part.signals.columns[role, name] for part in parts]) * unit.factor
+        for name, unit in zip(names, told, strict=True)
+    ]
+    return Signal(
+        samples=np.column_stack(columns),
+        sample_rate_hz=parts[0].signals.grid.rate_hz,
+        quantity=tuple(unit.quantity for unit in told),
+        unit=tuple(unit.si for unit in told),
+        channels=names,
+    )
+
+
+def _facts_and_segments(
+    wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
+) -> tuple[list[dict[str, Any]], tuple[Segment, ...]]:
+    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
+    commands = [(channel.role, channel.name) for channel in every if channel.role == "command"]
+    factors = {units[key].factor for key in commands}
+    scale = factors.pop() if len(factors) == 1 else 1.0
+    facts, segments, start = [], [], 0
+    for part in parts:
+        grid = part.signals.grid
+        command: FloatArray = np.column_stack([part.signals.columns[key] for key in commands])
+        label = (str(part.facts["file"]), str(part.facts["prefix"]))
+        for segment in segments_of(wanted.segment, label, command, grid.rate_hz):
+            moved = replace(segment, start=segment.start + start, stop=segment.stop + start)
+            segments.append(replace(moved, amplitude=segment.amplitude * scale))
+        facts.append({**part.facts, "start": start, "stop": start + grid.count})
+        start += grid.count
+    return facts, tuple(segments)

@@ -1,0 +1,117 @@
+"""Maps by name, by path, and those that fit a folder of recordings."""
+
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from importlib.resources import files as resources
+from pathlib import Path
+
+from study.errors import StudyError, WrongUseError
+from study.importing.arrays import read_arrays
+from study.importing.expression import names_in
+from study.importing.import_map import ImportMap
+from study.importing.map_errors import ImportProblemError, suggestion
+from study.importing.map_files import part_files
+from study.importing.map_toml import is_map, parse_map
+from study.importing.namespace import of_file
+from study.store.text_file import read_text
+
+NO_DATA = (".toml", ".md")
+"""Kinds of files that lie beside data."""
+
+
+@dataclass(frozen=True, slots=True)
+class MapFile:
+    """A map and where it came from."""
+
+    name: str
+    map: ImportMap
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FoundMap:
+    """A map, and the files of a folder that make one recording by it."""
+
+    source: MapFile
+    files: tuple[Path, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the recording: that of the map, with the file's where each file is a recording of its own."""
+        return f"{self.source.name}_{self.files[0].stem}" if self.source.map.separate else self.source.name
+
+
+def shipped_maps() -> tuple[str, ...]:
+    """Names of the maps that come with hapteq."""
+    entries = resources("study.importing").joinpath("maps").iterdir()
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
+
+
+def read_map(name: str) -> MapFile:
+    """A shipped map by its name, or any by its path. Raises WrongUseError, CannotReadError, UnusableFileError."""
+    if name in shipped_maps():
+        text = resources("study.importing").joinpath("maps").joinpath(f"{name}.toml").read_text("utf-8")
+        return MapFile(name, parse_map(text, Path(f"{name}.toml")), text)
+    path = Path(name)
+    if path.suffix != ".toml" and not path.exists():
+        raise WrongUseError(
+            "There is no such map",
+            f"'{name}' is neither a file nor a map that comes with hapteq{suggestion(name, shipped_maps())}; these are "
+            f"{', '.join(shipped_maps())}.",
+            "Give the name of one of them, or the path of a map of yours.",
+        )
+    text = read_text(path)
+    return MapFile(path.stem, parse_map(text, path), text)
+
+
+def find_map(folder: Path) -> tuple[FoundMap, ...]:
+    """What the recordings in a folder can be imported with: maps found there, else ours that fit file names and
+    arrays. Raises CannotReadError, UnusableFileError (a map there that is not sound)."""
+    paths = sorted(path for path in folder.iterdir() if path.is_file())
+    own = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
+    if own:
+        candidates = [read_map(str(path)) for path in own]
+        return tuple(found for source in candidates for found in _recordings(source, paths))
+    shipped = (read_map(name) for name in shipped_maps())
+    return tuple(found for source in shipped for found in _recordings(source, paths) if _fits(found))
+
+
+def _is_map_file(path: Path) -> bool:
+    try:
+        return is_map(tomllib.loads(read_text(path)))
+    except tomllib.TOMLDecodeError:
+        return False
+
+
+def _recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
+    """Every pattern of a map must find something, or the recording is not here whole."""
+    data = [path for path in paths if path.suffix not in NO_DATA]
+    by_pattern = [[path for path in data if fnmatchcase(path.name, pattern)] for pattern in source.map.files]
+    fitting = tuple(dict.fromkeys(path for found in by_pattern for path in found))
+    if source.map.separate:
+        yield from (FoundMap(source, (path,)) for path in fitting)
+    elif all(by_pattern):
+        yield FoundMap(source, fitting)
+
+
+def _fits(found: FoundMap) -> bool:
+    """Whether the first part has all arrays that the map names."""
+    wanted = found.source.map
+    try:
+        part = part_files(wanted, found.files)[0]
+        definitions = {**wanted.let, **part.part.let}
+        spaces = {
+            clock: of_file(read_arrays(path, wanted.csv), definitions, part.part.prefix)
+            for clock, path in part.by_clock.items()
+        }
+        first = wanted.clock[0].name
+        needs = [(channel.clock or first, channel.value) for channel in wanted.channel]
+        needs += [(clock.name, text) for clock in wanted.clock for text in (clock.time, clock.rate) if text]
+        return all(
+            text in spaces[clock].arrays or all(spaces[clock].has(name) for name in names_in(text))
+            for clock, text in needs
+        )
+    except (ImportProblemError, StudyError):
+        return False

@@ -1,0 +1,102 @@
+"""A map for a file of which nothing is known but its arrays: to be completed by whoever recorded it."""
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.arrays import Arrays
+from study.importing.header_map import unit_in
+
+_LEAST_SAMPLES = 16
+_CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}
+_RATE_WORDS = {"fs", "rate", "samplerate"}
+_TIME_UNITS = ("s", "ms", "us", "min")
+
+
+def map_skeleton(arrays: Arrays) -> str:
+    """TOML. Every line that cannot be filled in from the file is an empty text, which an import refuses by name."""
+    return "\n".join(_lines(arrays)) + "\n"
+
+
+def _lines(arrays: Arrays) -> Iterator[str]:
+    clocks = [name for name, array in arrays.by_name.items() if _is_time(name, array)]
+    yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
+    yield 'device = ""               # what was recorded'
+    yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
+    yield from _clocks(arrays, clocks)
+    for name, array in arrays.by_name.items():
+        if name in clocks:
+            continue
+        if array.dtype.kind not in "fiub":
+            yield f"\n# {name} holds no numbers"
+        elif array.size < _LEAST_SAMPLES:
+            yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
+        elif array.ndim == 1:
+            own = [clock for clock in clocks if arrays.by_name[clock].shape == array.shape]
+            yield from _channel((name, name, name), _shape(array.shape), own[0] if own and len(clocks) > 1 else "")
+        elif array.ndim == 2:
+            yield from _table(name, array.shape)
+        else:
+            yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quoted(name)}[0, 0]"
+    yield ""
+    yield "[[segment]]"
+    yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
+    yield "split = { fit = 0.5, test = 0.5 }"
+
+
+def _is_time(name: str, array: npt.NDArray[Any]) -> bool:
+    grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= _LEAST_SAMPLES
+    return grows and bool(_words(name) & _CLOCK_WORDS) and bool((np.diff(array) > 0).all())
+
+
+def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
+    for name in clocks:
+        plain, unit = unit_in(name)
+        last = plain.rpartition("_")[2]
+        yield "\n[[clock]]"
+        if len(clocks) > 1:
+            yield f"name = {json.dumps(name)}"
+        yield f"time = {json.dumps(name)}"
+        yield f'time_unit = {json.dumps(unit or (last if last in _TIME_UNITS else ""))}            # "s", "ms"'
+    if clocks:
+        return
+    yield "\n[[clock]]"
+    rates = [name for name, array in arrays.by_name.items() if array.size == 1 and _words(name) & _RATE_WORDS]
+    yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000"
+
+
+def _table(name: str, shape: tuple[int, ...]) -> Iterator[str]:
+    rows_are_channels = shape[0] < shape[1]
+    for number in range(min(shape)):
+        index = f"[{number}]" if rows_are_channels else f"[:, {number}]"
+        yield from _channel((f"{name}{number + 1}", f"{_quoted(name)}{index}", name), _shape(shape), "")
+
+
+def _channel(names: tuple[str, str, str], shape: str, clock: str) -> Iterator[str]:
+    """names: of the channel, its value, the array's own."""
+    name, value, header = names
+    plain, unit = unit_in(header)
+    yield ""
+    yield f"[[channel]]               # {header}: {shape}"
+    yield 'role = ""                 # command, response, position, excitation, helper'
+    yield f"name = {json.dumps(plain if name == header else name)}"
+    yield f"value = {json.dumps(value)}"
+    yield f'unit = {json.dumps(unit)}                 # as in the file: "N", "m/s^2", "deg", "V"'
+    if clock:
+        yield f"clock = {json.dumps(clock)}"
+
+
+def _quoted(name: str) -> str:
+    return name if name.isidentifier() else f"array('{name}')"
+
+
+def _words(name: str) -> set[str]:
+    return set(re.split(r"[^a-z0-9]+", unit_in(name)[0].lower()))
+
+
+def _shape(shape: tuple[int, ...]) -> str:
+    return f"{' x '.join(str(count) for count in shape)} samples" if shape else "one number"

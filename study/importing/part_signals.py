@@ -1,0 +1,163 @@
+"""One part of a recording: every channel of the map on one uniform grid."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.resampling import FLAT_TO, SAME_INSTANT, Grid, Method, Samples, resampled
+from equalizer.signals.signal import FloatArray
+from study.importing.alignment import Logger
+from study.importing.functions import Value
+from study.importing.import_map import ChannelMap, ImportMap, PartMap
+from study.importing.map_errors import ImportProblemError
+from study.importing.namespace import Namespace
+
+Key = tuple[str, str]
+"""Role and name of a channel."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PartSignals:
+    """In the units of the map."""
+
+    grid: Grid
+    columns: Mapping[Key, FloatArray]
+    """By role and name, each (grid.count,); computed ones too."""
+
+
+@dataclass(frozen=True, slots=True)
+class _GridClock:
+    grid: Grid
+
+    def times_s(self, count: int) -> Value:
+        if count != self.grid.count:
+            raise ValueError(f"{count} samples are not the recording's {self.grid.count}")
+        return self.grid.times_s()
+
+
+def part_signals(
+    wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], say: Callable[[str], None], step: Callable[[], None]
+) -> PartSignals:
+    """`say` gets a sentence for everything that is not as it was in the file; `step` is called after each channel.
+    Raises ImportProblemError."""
+    by_clock = {logger.clock.name: logger for logger in loggers}
+    first = loggers[0].clock.name
+    sources: list[tuple[ChannelMap, Samples]] = []
+    for channel in wanted.channel:
+        logger = by_clock[channel.clock or first]
+        values = _values(channel, logger, wanted)
+        sources.append((channel, logger.base.samples(values)))
+    grid = _grid(wanted, part, loggers, [samples for _, samples in sources])
+    columns: dict[Key, FloatArray] = {}
+    for channel, samples in sources:
+        columns[channel.role, channel.name] = _on_grid(channel, samples, grid, say)
+        step()
+    for computed in wanted.computed:
+        named = {name: column for (_, name), column in reversed(columns.items())}  # of one name, the first counts
+        columns[computed.role, computed.name] = _computed(computed.name, computed.value, named, grid, loggers[0].names)
+        step()
+    return PartSignals(grid, columns)
+
+
+def _values(channel: ChannelMap, logger: Logger, wanted: ImportMap) -> Value:
+    where = f"channel '{channel.name}'"
+    try:
+        values = logger.names.value_of(channel.value, logger.base)
+    except ImportProblemError as error:
+        raise ImportProblemError(f"{where}: {error}") from error
+    if values.ndim > 1:
+        raise ImportProblemError(
+            f"{where}: {channel.value} has the shape {values.shape}; take one row or column, as in {channel.value}[0]"
+        )
+    count = _count(logger, wanted)
+    if values.ndim == 0:
+        return np.full(count or 1, float(values))
+    if count and len(values) != count:
+        clock = f"clock '{logger.clock.name}'"
+        raise ImportProblemError(f"{where}: {channel.value} has {len(values)} samples, but {clock} has {count}")
+    if np.isinf(values).any():
+        raise ImportProblemError(f"{where}: {channel.value} holds infinite values; a missing sample is NaN")
+    return values
+
+
+def _count(logger: Logger, wanted: ImportMap) -> int:
+    """Samples of a clock: of its stamps, or of the first of its channels that is no constant."""
+    if logger.base.stamps_s is not None:
+        return len(logger.base.stamps_s)
+    first = wanted.clock[0].name
+    for channel in wanted.channel:
+        if (channel.clock or first) == logger.clock.name:
+            values = logger.names.value_of(channel.value, logger.base)
+            if values.ndim == 1:
+                return len(values)
+    return 0
+
+
+def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
+    """What all have in common, at the stated rate or the fastest."""
+    uneven = [logger for logger in loggers if not logger.base.rate_hz]
+    if uneven and not wanted.rate_hz:
+        steps_ms = np.diff(uneven[0].base.times_s(0)) * 1e3
+        raise ImportProblemError(
+            f"clock '{uneven[0].clock.name}' has uneven stamps (steps of {steps_ms.min():.4g} to {steps_ms.max():.4g} "
+            "ms); state the rate_hz of the recording, and resample (held, band-limited, linear) of each channel"
+        )
+    rate_hz = wanted.rate_hz or max(logger.base.rate_hz for logger in loggers)
+    begin_s = max(float(samples.times_s[0]) for samples in sources)
+    end_s = min(float(samples.times_s[-1]) for samples in sources)
+    if part.stop_s:
+        end_s = min(end_s, begin_s + part.stop_s - (1 - SAME_INSTANT) / rate_hz)
+    begin_s += np.ceil(part.start_s * rate_hz - SAME_INSTANT) / rate_hz
+    count = int(np.floor((end_s - begin_s) * rate_hz + SAME_INSTANT)) + 1
+    if count < 2:
+        raise ImportProblemError(
+            f"{part.file}: nothing is left between {begin_s:g} and {end_s:g} s, where all clocks have samples"
+        )
+    return Grid(begin_s, rate_hz, count)
+
+
+def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
+    same = abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
+    first = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
+    if same and abs(first - round(first)) < SAME_INSTANT:
+        column = samples.values[round(first) : round(first) + grid.count]
+    elif channel.resample == "":
+        raise ImportProblemError(
+            f"channel '{channel.name}' has to be resampled to {grid.rate_hz:g} Hz; state how: resample = \"held\" for "
+            'a command that stays until the next, "band-limited" for a signal sampled behind a filter, or "linear"'
+        )
+    else:
+        column = _moved(channel, channel.resample, samples, grid, say)
+    if missing := int(np.isnan(column).sum()):
+        say(f"{channel.name}: {missing} of {len(column)} samples are missing.")
+    return column
+
+
+def _moved(channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
+    try:
+        column = resampled(samples, grid, method)
+    except ValueError as error:
+        raise ImportProblemError(f"channel '{channel.name}': {error}") from error
+    source_hz = samples.rate_hz or 1 / float(np.median(np.diff(samples.times_s)))
+    came = f"{samples.rate_hz:.6g} Hz" if samples.rate_hz else f"uneven stamps (about {source_hz:.4g} Hz)"
+    flat = f", flat to {FLAT_TO / 2 * min(source_hz, grid.rate_hz):.4g} Hz" if method == "band-limited" else ""
+    say(f"{channel.name}: resampled from {came} to {grid.rate_hz:.6g} Hz, {method}{flat}.")
+    return column
+
+
+def _computed(name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace) -> FloatArray:
+    own = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
+    try:
+        value = Namespace(own, file.definitions, file.where).value_of(text, _GridClock(grid))
+    except ImportProblemError as error:
+        raise ImportProblemError(f"computed channel '{name}': {error}") from error
+    if value.ndim == 0:
+        return np.full(grid.count, float(value))
+    if value.shape != (grid.count,):
+        raise ImportProblemError(
+            f"computed channel '{name}': {text} has the shape {value.shape}, but the recording has {grid.count} samples"
+        )
+    if np.isinf(value).any():
+        raise ImportProblemError(f"computed channel '{name}': {text} holds infinite values")
+    return value

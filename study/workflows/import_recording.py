@@ -1,0 +1,138 @@
+"""Recordings of others into a recording of ours, by a map, by a table's own header, or as they are."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from equalizer.signals.joining import join
+from equalizer.signals.recording import Recording
+from study.errors import WrongUseError
+from study.importing.arrays import read_arrays
+from study.importing.build_recording import build_recording
+from study.importing.header_map import header_map
+from study.importing.import_map import CsvMap
+from study.importing.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
+from study.importing.map_library import NO_DATA, MapFile, find_map, read_map
+from study.importing.map_skeleton import map_skeleton
+from study.store.hdf5_file import format_of, is_hdf5
+from study.store.provenance import gather_provenance
+from study.store.recording_file import read_recording, write_recording
+from study.store.recording_layout import FORMAT
+from study.workflows.free_name import require_free
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class ImportPlan:
+    files: tuple[Path, ...]
+    """Or one folder, whose map is found."""
+    map: str | None
+    """Name of a shipped map, or a path; None where the files speak for themselves."""
+    out: Path
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Imported:
+    path: Path
+    recording: Recording
+    map: str
+    """Name of the map; "header" or "recording" where there was none."""
+    notes: tuple[str, ...]
+
+
+def check_free(out: Path) -> None:
+    """Raises StudyError where the recording could not be written under this name."""
+    require_free(out, title="Nothing was imported", kind="recordings")
+
+
+def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> Imported:
+    """on_progress: share done, 0 to 1. Raises StudyError; then nothing is written."""
+    check_free(plan.out)
+    read = read_foreign(plan.files, plan.map, on_progress)
+    provenance = gather_provenance(parents=read.files).as_dict()
+    said: dict[str, Any] = {"map": read.map, "notes": list(read.notes)}
+    if read.map_hash:
+        said["map_sha256"] = read.map_hash
+    meta = {**read.recording.meta, "import": said, "provenance": provenance}
+    recording = replace(read.recording, meta=meta)
+    write_recording(plan.out, recording)
+    return Imported(plan.out, recording, read.map, read.notes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Foreign:
+    """What was read and not yet written."""
+
+    recording: Recording
+    files: tuple[Path, ...]
+    map: str
+    map_hash: str
+    notes: tuple[str, ...]
+
+
+def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None) -> Foreign:
+    """As `import_recording`, into memory. Raises StudyError."""
+    if map_name is not None:
+        return _by_map(read_map(map_name), _inside(files), on_progress)
+    if len(files) == 1 and files[0].is_dir():
+        return _by_found_map(files[0], on_progress)
+    if all(is_hdf5(path) and format_of(path) == FORMAT for path in files):
+        return _ours(files)
+    return _by_header(files, on_progress)
+
+
+def _inside(files: Sequence[Path]) -> tuple[Path, ...]:
+    """Files, folders opened. Maps and notes beside the data are no data."""
+    found: list[Path] = []
+    for path in files:
+        beside = sorted(path.iterdir()) if path.is_dir() else ()
+        found += [file for file in beside if file.is_file() and file.suffix not in NO_DATA] if beside else [path]
+    return tuple(found)
+
+
+def _by_map(source: MapFile, files: Sequence[Path], on_progress: Progress) -> Foreign:
+    built = build_recording(source.map, files, on_progress)
+    digest = hashlib.sha256(source.text.encode()).hexdigest()
+    return Foreign(built.recording, tuple(files), source.name, digest, built.notes)
+
+
+def _by_found_map(folder: Path, on_progress: Progress) -> Foreign:
+    found = find_map(folder)
+    if len(found) == 1:
+        return _by_map(found[0].source, found[0].files, on_progress)
+    listed = "; ".join(f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in found)
+    raise WrongUseError(
+        "Which recording is meant?",
+        f"The folder {folder.name} makes {len(found)} recordings: {listed}."
+        if found
+        else f"No map is for the files of the folder {folder.name}: there is none in it, and none of ours fits.",
+        "Give the files, and the map with --map." if found else "Give one file, to be told what a map for it would be.",
+        saved=NOTHING_WRITTEN,
+    )
+
+
+def _ours(files: Sequence[Path]) -> Foreign:
+    recordings = [read_recording(path) for path in files]
+    if len(recordings) == 1:
+        return Foreign(recordings[0], tuple(files), "recording", "", ())
+    facts = [{"file": path.name, **found.meta} for path, found in zip(files, recordings, strict=True)]
+    try:
+        joined = join(recordings, {"parts": facts})
+    except ValueError as error:
+        raise ImportRefusedError(files[0].name, str(error), "Import recordings of one device and rate.") from error
+    notes = (f"{len(files)} recordings were put one after another; time stamps were left out.",)
+    return Foreign(joined, tuple(files), "recording", "", notes)
+
+
+def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
+    arrays = read_arrays(files[0], CsvMap())
+    wanted = header_map(arrays)
+    if wanted is None:
+        why = "nothing says which array is what, and in which unit"
+        raise MapNeededError(files[0].name, why, map_skeleton(arrays))
+    built = build_recording(wanted, files, on_progress)
+    told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
+    return Foreign(built.recording, tuple(files), "header", "", (f"Taken from the header: {told}.", *built.notes))
