@@ -18,6 +18,7 @@ import typer
 
 from study.cli import (
     analyze,
+    diagnose,
     doctor,
     equalize,
     identify,
@@ -57,6 +58,7 @@ app.command("record")(record.record)
 app.command("import")(import_recording.import_recording)
 app.command("identify")(identify.identify)
 app.command("equalize")(equalize.equalize)
+app.command("diagnose")(diagnose.diagnose)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
 app.command("watch")(watch.watch)

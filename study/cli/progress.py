@@ -6,7 +6,15 @@ from contextlib import ExitStack, contextmanager
 from functools import cache
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 from study.session.views import Question
 
@@ -44,3 +52,22 @@ def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
             return stack.enter_context(bar(title, total))
 
         yield lambda done: started()(done)
+
+
+@contextmanager
+def steps(title: str) -> Iterator[Callable[[str, float], None]]:
+    """What is yielded takes what is being done now, and the share of all that is done. Quiet without a terminal."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    quiet = not sys.stderr.isatty()
+    with ExitStack() as stack:
+
+        @cache
+        def started() -> tuple[Progress, TaskID]:
+            progress = stack.enter_context(Progress(*columns, console=Console(file=sys.stderr), disable=quiet))
+            return progress, progress.add_task(title, total=1.0)
+
+        def show(what: str, share: float) -> None:
+            progress, task = started()
+            progress.update(task, description=f"{title}: {what}", completed=share)
+
+        yield show

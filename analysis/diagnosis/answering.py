@@ -1,0 +1,84 @@
+"""Whether the responses have anything to do with the commands: where all is noise, there is nothing to explain.
+
+By the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed., 7.3), which
+for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of freedom.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.signal.windows import hann
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+STRETCHES = 12
+"""Per command."""
+DRIVEN = 0.01
+"""Of the strongest line's power."""
+SURE = 5.0
+"""Standard deviations above what noise alone brings."""
+TELLING = 0.5
+"""A coherence that must stand out twice as far, or the recordings are too short to be judged by it."""
+SHARED_BY_WINDOW = 2.0
+"""Neighbouring lines share so much of a Hann window that so many count as one."""
+RANK = 1e-6
+
+
+def answer(recordings: Sequence[Recording]) -> float | None:
+    """In standard deviations of what chance brings, that of the best response channel; None where the recordings are
+    too short to tell. recordings: alike, commands without gaps."""
+    inputs, outputs = _spectra(recordings)
+    if not len(inputs):
+        return None
+    power = (np.abs(inputs) ** 2).sum(axis=(0, 2))
+    lines = np.flatnonzero(power > DRIVEN * power.max(initial=0.0))
+    lines = lines[lines > 0]
+    looks = [look for line in lines if (look := _coherence(inputs[:, line], outputs[:, line])) is not None]
+    if not looks:
+        return None
+    found, expected, variance = (np.array(column) for column in zip(*looks, strict=True))
+    spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(looks)
+    if (TELLING - expected.mean()) / spread < 2 * SURE:
+        return None
+    return float(((found.mean(axis=0) - expected.mean()) / spread).max())
+
+
+def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:
+    """(stretches, lines, inputs) and (stretches, lines, outputs)"""
+    inputs, outputs = len(recordings[0].command.channels), len(recordings[0].response.channels)
+    length = sum(len(one) for one in recordings) // (STRETCHES * inputs)
+    found = [pair for one in recordings for pair in _stretches(one, length)] if length >= 16 else []
+    if not found:
+        return np.zeros((0, 0, inputs), complex), np.zeros((0, 0, outputs), complex)
+    return np.array([u for u, _ in found]), np.array([y for _, y in found])
+
+
+def _stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray, ComplexArray]]:
+    """Without what is at rest, or has gaps."""
+    window = hann(length, sym=False)[:, None]
+    for start in range(0, len(recording) - length + 1, length):
+        u, y = (part.samples[start : start + length] for part in (recording.command, recording.response))
+        if np.ptp(u, axis=0).any() and np.isfinite(y).all():
+            yield _lines(u, window), _lines(y, window)
+
+
+def _lines(samples: FloatArray, window: FloatArray) -> ComplexArray:
+    return np.asarray(np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0))
+
+
+def _coherence(u: ComplexArray, y: ComplexArray) -> tuple[FloatArray, float, float] | None:
+    """(p,): the share of each response's power that the commands bring; with its mean and variance for noise.
+
+    u: (stretches, inputs), y: (stretches, outputs). None where too few stretches drive the line.
+    """
+    basis, size, _ = np.linalg.svd(u, full_matrices=False)
+    basis = basis[:, size > RANK * size.max()]
+    stretches, rank = basis.shape
+    power = (np.abs(y) ** 2).sum(axis=0)
+    if stretches < 2 * rank + 1 or not power.all():
+        return None
+    share = (np.abs(basis.conj().T @ y) ** 2).sum(axis=0) / power
+    mean = rank / stretches
+    return share, mean, mean * (1 - mean) / (stretches + 1)

@@ -1,0 +1,41 @@
+"""`hapteq diagnose`: where model and recording differ, and what physics the model lacks."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def diagnose(
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="REC.h5... | SESSION", help="Recordings of one device, or a session's folder."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the results; new, or empty.")],
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Mechanical model MODEL.toml [default: fitted to the recordings; for a session, the twin]."),
+    ] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(metavar="EFFECT", help="An effect not to be considered; may be repeated.")
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Draws which trials of a session are used, and which are kept for the test.")
+    ] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Locate the mismatch, name what is missing, and test it on held-out data.
+
+    Writes diagnosis.json, improved.toml, report.html and figures.
+    """
+    from study.cli.progress import steps
+    from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
+    from study.workflows.diagnosed_summary import diagnosed_lines, summary
+
+    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), seed)
+    with steps("Diagnosing") as show:
+        done = diagnose_recordings(plan, show)
+    typer.echo(json.dumps(summary(done), indent=2) if as_json else "\n".join(diagnosed_lines(done)))

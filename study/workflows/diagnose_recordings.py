@@ -1,0 +1,101 @@
+"""From recordings and a model to a folder that says what physics the model lacks."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+
+from analysis.diagnosis.explain import Progress
+from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.screening import Mapper
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel, nearest
+from equalizer.signals.recording import Recording
+from study.errors import WrongUseError
+from study.store.new_folder import new_folder, require_new_folder
+from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, read_input
+from study.workflows.worker_threads import worker_threads
+from study.workflows.write_diagnosis import write_diagnosis_into
+from study.workflows.write_twin import TWIN_NAME, twin_model
+
+READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
+"""Shares of the work at which the recordings are read, a model is fitted where none was given, and all is computed."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosePlan:
+    sources: tuple[Path, ...]
+    """Recordings, or one session's folder."""
+    out: Path
+    """A folder that is not there yet, or is empty."""
+    model: Path | None = None
+    without: tuple[str, ...] = ()
+    """Effects that are not to be considered."""
+    seed: int = 1
+    """Of what is drawn: which trials of a session are taken, and which are kept for the test."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiagnosedRecordings:
+    findings: Findings
+    out: Path
+
+
+class Engine(Protocol):
+    def __call__(
+        self,
+        recordings: Sequence[Recording],
+        model: MechanicalModel,
+        settings: DiagnosisSettings,
+        map_: Mapper,
+        progress: Progress,
+    ) -> Findings: ...
+
+
+def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
+    """`on_progress(what is being done, share)`. Interrupted or refused (StudyError), nothing is written."""
+    check_names(plan.without)
+    require_new_folder(plan.out)
+    on_progress("reading", 0.0)
+    found = read_input(plan.sources, plan.seed)
+    on_progress("reading", READ)
+    model, remarks = _model(plan, found, on_progress)
+    begun = FITTED if plan.model is None else READ
+    settings = DiagnosisSettings(without=plan.without, names=found.names)
+    with worker_threads() as threads:
+        findings = engine(found.recordings, model, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+    findings = replace(findings, remarks=(*found.remarks, *remarks, *findings.remarks))
+    on_progress("writing the report", DIAGNOSED)
+    parents = (*found.parents, *(() if plan.model is None else (plan.model,)))
+    with new_folder(plan.out) as folder:
+        write_diagnosis_into(folder, findings, parents)
+    on_progress("done", 1.0)
+    return DiagnosedRecordings(findings, plan.out)
+
+
+def check_names(without: Sequence[str]) -> None:
+    """Raises WrongUseError for a name that no effect has."""
+    for name in without:
+        if name not in EFFECTS_BY_NAME:
+            raise WrongUseError(
+                f"There is no effect '{name}' to do without",
+                f"The catalogue does not know it{nearest(name, tuple(EFFECTS_BY_NAME))}.",
+                f"Its names are {', '.join(EFFECTS_BY_NAME)}.",
+                saved="Nothing was written.",
+            )
+
+
+def _model(plan: DiagnosePlan, found: DiagnosisInput, on_progress: Progress) -> tuple[MechanicalModel, tuple[str, ...]]:
+    if plan.model is not None:
+        return given_model(plan.model, found), ()
+    if found.simulated:
+        return twin_model(), (f"No model was given: the session was compared with {TWIN_NAME}.",)
+    on_progress("fitting a linear model, as none was given", READ)
+    within = _within(on_progress, READ, FITTED)
+    return fitted_model(found, lambda share: within("fitting a linear model, as none was given", share))
+
+
+def _within(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
+    return lambda what, share: on_progress(what, begin + (end - begin) * min(max(share, 0.0), 1.0))

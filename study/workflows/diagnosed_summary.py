@@ -1,0 +1,35 @@
+"""What is said of a diagnosis at its end: lines for a person, the document for a program."""
+
+from typing import Any
+
+from analysis.diagnosis.document import FORMAT, VERSION, Errors, diagnosis_to_json
+from analysis.diagnosis.wording import error_text, summary_lines
+from study.workflows.diagnose_recordings import DiagnosedRecordings
+from study.workflows.write_diagnosis import MODEL_NAME, PAGE_NAME
+
+
+def summary(done: DiagnosedRecordings) -> dict[str, Any]:
+    """As diagnosis.json has it."""
+    return {"format": FORMAT, "version": VERSION, **diagnosis_to_json(done.findings.diagnosis)}
+
+
+def diagnosed_lines(done: DiagnosedRecordings) -> tuple[str, ...]:
+    """The verdict first; in the end where everything is."""
+    found = done.findings.diagnosis
+    return (
+        *summary_lines(done.findings),
+        "",
+        f"Errors, normalised over the channels, measured by {found.error}:",
+        _errors("fitted", found.fit.fit),
+        _errors("held out", found.fit.test),
+        "",
+        f"Report: {done.out / PAGE_NAME}",
+        f"Improved model: {done.out / MODEL_NAME}",
+    )
+
+
+def _errors(which: str, errors: Errors) -> str:
+    return (
+        f"  {which:<9} as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}, "
+        f"with the effects {error_text(errors.after)}; noise alone {error_text(errors.noise)}"
+    )

@@ -1,0 +1,123 @@
+"""What a diagnosis starts from: recordings or a session's trials, and the model that they are compared with."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.diagnosis.belonging import (
+    NothingToDiagnose,
+    require_alike,
+    require_model_of,
+    require_something,
+)
+from equalizer.identification.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+from study.errors import StudyError
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.recording_file import read_recording
+from study.workflows.session_as_recordings import session_recordings
+
+FITTED_NAME = "fitted to these recordings"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiagnosisInput:
+    recordings: tuple[Recording, ...]
+    names: tuple[str, ...]
+    parents: tuple[Path, ...]
+    """Files that it was read from."""
+    remarks: tuple[str, ...]
+    simulated: bool = False
+    """A session on the simulated omega.3."""
+
+
+def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
+    """Recordings, or one session's folder. Raises StudyError."""
+    folders = [source for source in sources if source.is_dir()]
+    if folders and len(sources) > 1:
+        raise nothing_to_diagnose(
+            (f"{folders[0]} is a folder: a session is diagnosed by itself",), "Give recordings, or one session."
+        )
+    if folders:
+        session = session_recordings(folders[0], seed)
+        found = DiagnosisInput(session.recordings, session.names, session.parents, session.remarks, session.simulated)
+    else:
+        read = tuple(read_recording(source) for source in sources)
+        found = DiagnosisInput(read, _names(sources), tuple(sources), ())
+    try:
+        require_alike(found.recordings, found.names)
+        require_something(found.recordings, found.names)
+    except NothingToDiagnose as refusal:
+        raise nothing_to_diagnose(refusal.problems) from refusal
+    return _same_position(found)
+
+
+def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
+    """Raises StudyError where it cannot be of the recordings' device."""
+    model = read_mechanical_model(path)
+    try:
+        require_model_of(model, found.recordings)
+    except NothingToDiagnose as refusal:
+        raise StudyError(
+            "Model and recording do not belong together",
+            _sentences(refusal.problems),
+            f"Correct {path.name}, or give the model of the device that was recorded; without --model a linear one is "
+            "fitted first.",
+            saved="Nothing was written.",
+        ) from refusal
+    return model
+
+
+def fitted_model(
+    found: DiagnosisInput, on_progress: Callable[[float], None]
+) -> tuple[MechanicalModel, tuple[str, ...]]:
+    """A linear one, and what must be known of it. Raises StudyError where the recordings do not carry one."""
+    try:
+        fit = fit_mechanical_model(found.recordings, on_progress=on_progress, name=FITTED_NAME)
+    except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+        raise nothing_to_diagnose(
+            (f"no model was given, and none can be fitted: {refusal}",),
+            "Give a model with --model, or a recording that carries one.",
+        ) from refusal
+    tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
+    said = (
+        f"No model was given. A linear one was fitted to these recordings first, with an error of "
+        f"{100 * fit.error:.1f} %{tested}; what it could take on itself, such as friction at one level as damping, "
+        "is not missing from it any more, and is not named."
+    )
+    return fit.model, (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
+
+
+def nothing_to_diagnose(problems: Sequence[str], do_now: str = "Correct them, or record again.") -> StudyError:
+    return StudyError(
+        "These recordings cannot be diagnosed", _sentences(problems), do_now, saved="Nothing was written."
+    )
+
+
+def _sentences(problems: Sequence[str]) -> str:
+    return " ".join(f"{problem[:1].upper()}{problem[1:].rstrip('.')}." for problem in problems)
+
+
+def _names(sources: Sequence[Path]) -> tuple[str, ...]:
+    """File names; with their folders where they are not enough."""
+    names = tuple(source.name for source in sources)
+    if len(set(names)) == len(names):
+        return names
+    return tuple(f"{source.parent.name}/{source.name} ({number})" for number, source in enumerate(sources, start=1))
+
+
+def _same_position(found: DiagnosisInput) -> DiagnosisInput:
+    """Compared where every recording has it in the same channels."""
+    kinds = {None if one.position is None else (one.position.channels, one.position.units) for one in found.recordings}
+    if len(kinds) < 2:
+        return found
+    said = "Only some recordings hold the same position channels: the position was left out of the comparison."
+    return replace(
+        found,
+        recordings=tuple(replace(one, position=None) for one in found.recordings),
+        remarks=(*found.remarks, said),
+    )

@@ -1,0 +1,178 @@
+"""The trials of a session as recordings to be diagnosed: one per frequency, its trials one after the other.
+
+A trial's recording holds the middle of a vibration that was on before. A simulation starts from rest, so before each
+trial a full cycle of its own command is played, over and over and fading in, with nothing to compare with.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+from study.errors import StudyError
+from study.store.archive import SessionFolder, find_session
+from study.store.recording_file import read_recording
+from study.workflows.fold_session import fold_session
+
+MOST_S = 120.0
+"""Of vibration, over all trials that are taken: more would cost time without telling much more."""
+LEAD_S = 0.6
+"""Before each trial: a handle that is held settles in less."""
+LEVEL_STEP_DB = 4.0
+"""Levels within so many decibels count as one: a staircase's own are too many to be compared one by one."""
+TESTED_OF = 4
+"""Every so many-th trial of a frequency and a level is kept for the test."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionRecordings:
+    recordings: tuple[Recording, ...]
+    names: tuple[str, ...]
+    parents: tuple[Path, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    """The device was the simulated omega.3."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    path: Path
+    recording: Recording
+    frequency_hz: float
+    level_n: float
+
+
+def session_recordings(session: Path, seed: int) -> SessionRecordings:
+    """seed: draws which trials are taken where there are many, and which are kept for the test. Raises StudyError."""
+    folder = find_session(str(session), session.absolute().parent)
+    opened = fold_session(folder).state.opened
+    found = [_trial(path) for path in sorted(folder.recordings.glob("*.h5"))]
+    usable = [trial for trial in found if trial is not None]
+    if not usable:
+        raise StudyError(
+            "This session holds nothing to diagnose",
+            f"{folder.name} has {len(found)} recordings of trials, and none is whole.",
+            "Give a session in which trials were measured, or recordings of `hapteq record`.",
+            saved="Nothing was written.",
+        )
+    draw = np.random.default_rng(seed)
+    taken = _taken(usable, draw)
+    groups = [list(group) for _, group in groupby(taken, key=lambda trial: trial.frequency_hz)]
+    return SessionRecordings(
+        recordings=tuple(_merged(group, folder, draw) for group in groups),
+        names=tuple(f"{folder.name}, {group[0].frequency_hz:g} Hz" for group in groups),
+        parents=(folder.log, *(trial.path for trial in taken)),
+        remarks=tuple(_remarks(folder, found, usable, taken)),
+        simulated=opened.device.simulated,
+    )
+
+
+def _trial(path: Path) -> _Trial | None:
+    """None where samples are missing or something was wrong while it was played."""
+    recording = read_recording(path)
+    meta = recording.meta
+    whole = np.isfinite(recording.command.samples).all() and np.isfinite(recording.response.samples).all()
+    if not whole or meta.get("flags") or not isinstance(meta.get("frequency_hz"), int | float):
+        return None
+    if not recording.segments or not isinstance(meta.get("level_n"), int | float):
+        return None
+    return _Trial(path, recording, float(meta["frequency_hz"]), float(meta["level_n"]))
+
+
+def _taken(trials: Sequence[_Trial], draw: np.random.Generator) -> list[_Trial]:
+    """By frequency and level. Where there are too many, the same share of each group is drawn, and one at least."""
+    seconds = sum(trial.recording.response.duration_s for trial in trials)
+    share = min(1.0, MOST_S / seconds)
+    taken: list[_Trial] = []
+    for _, members in groupby(sorted(trials, key=_key), key=_key):
+        group = list(members)
+        count = max(1, round(share * len(group)))
+        taken += [group[place] for place in sorted(draw.permutation(len(group))[:count])]
+    return taken
+
+
+def _key(trial: _Trial) -> tuple[float, int]:
+    return trial.frequency_hz, _rung(trial.level_n)
+
+
+def _rung(level_n: float) -> int:
+    return round(20 * np.log10(max(level_n, 1e-6)) / LEVEL_STEP_DB)
+
+
+def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
+    """Of one frequency."""
+    first = trials[0].recording
+    lead = round(LEAD_S * first.sample_rate_hz)
+    parts: list[Mapping[str, FloatArray]] = []
+    segments: list[Segment] = []
+    begin = 0
+    for _, members in groupby(trials, key=_key):
+        group = list(members)
+        amplitude = float(np.exp(np.mean([np.log(max(trial.level_n, 1e-6)) for trial in group])))
+        tested = set(draw.permutation(len(group))[: len(group) // TESTED_OF].tolist())
+        for place, trial in enumerate(group):
+            parts.append(_with_lead(trial.recording, lead))
+            own = trial.recording.segments[0]
+            start, stop = begin + lead + own.start, begin + lead + own.stop
+            role = "test" if place in tested else "fit"
+            segments.append(Segment(start, stop, "sine", amplitude, own.period, role))
+            begin += lead + len(trial.recording)
+    return Recording(
+        device=first.device,
+        command=_joined("command", parts, first.command),
+        response=_joined("response", parts, first.response),
+        position=None if first.position is None else _joined("position", parts, first.position),
+        excitation=None if first.excitation is None else _joined("excitation", parts, first.excitation),
+        hold=first.hold,
+        segments=tuple(segments),
+        meta={"session": folder.name, "hand": "held"},
+    )
+
+
+def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
+    """Each signal, (lead + n, channels): what was commanded goes on backwards, what came out is not known there."""
+    period = recording.segments[0].period or len(recording)
+    fade = np.minimum(1.0, np.arange(lead) / max(1, lead // 2))[:, None]
+    signals = {
+        "command": recording.command, "response": recording.response, "position": recording.position,
+        "excitation": recording.excitation,
+    }  # fmt: skip
+    found = {}
+    for name, signal in signals.items():
+        if signal is None:
+            continue
+        if name in ("command", "excitation"):
+            before = fade * signal.samples[np.arange(-lead, 0) % min(period, len(signal))]
+        else:
+            before = np.full((lead, len(signal.channels)), np.nan)
+        found[name] = np.vstack([before, signal.samples])
+    return found
+
+
+def _joined(name: str, parts: Sequence[Mapping[str, FloatArray]], like: Signal) -> Signal:
+    return replace(like, samples=np.vstack([part[name] for part in parts]))
+
+
+def _remarks(
+    folder: SessionFolder, found: Sequence[Any], usable: Sequence[_Trial], taken: Sequence[_Trial]
+) -> Iterator[str]:
+    seconds = sum(trial.recording.response.duration_s for trial in taken)
+    yield (
+        f"{len(taken)} of the {len(found)} trials of {folder.name} were used, {seconds:.0f} s in all, with a hand on "
+        "the handle: they show single frequencies at the levels of the staircases, and nothing slow, nothing strong "
+        "and nothing in between. What shows only there cannot be found here."
+    )
+    if len(usable) < len(found):
+        yield (
+            f"{len(found) - len(usable)} trials were left out: samples were missing, or something was wrong while they "
+            "were played."
+        )
+    yield (
+        f"Levels within {LEVEL_STEP_DB:g} dB of each other count as one. Of each frequency and level, one trial in "
+        f"{TESTED_OF} is kept for the test."
+    )

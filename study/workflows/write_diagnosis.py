@@ -1,0 +1,37 @@
+"""The folder of a diagnosis: the document, the improved model, the figures and the page."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from analysis.reports.diagnosis_report import diagnosis_pictures, render_diagnosis_report
+
+from analysis.diagnosis.findings import Findings
+from study.devices.clock import RealClock
+from study.store.diagnosis_file import write_diagnosis
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.provenance import Provenance, gather_provenance
+from study.store.text_file import write_text
+from study.workflows.picture_files import write_pictures
+
+DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "report.html"
+
+
+def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> None:
+    """parents: files that it was made from. Raises StudyError."""
+    origin = gather_provenance(parents=parents)
+    write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, origin)
+    improved = replace(findings.improved, provenance=origin.as_dict())
+    write_mechanical_model(folder / MODEL_NAME, improved)
+    pictures = diagnosis_pictures(findings)
+    write_pictures(folder / "figures", pictures)
+    page = render_diagnosis_report(findings, pictures, _shown(origin), RealClock().utc())
+    write_text(folder / PAGE_NAME, page)
+
+
+def _shown(origin: Provenance) -> dict[str, str]:
+    return {
+        "made from": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
+        "command": " ".join(origin.command),
+        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
+    }
