@@ -6,7 +6,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.instant import V_FREE, V_PER_N
 from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import moving_force
+from equalizer.effects.starting_values import beside_linear, sliding
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -23,7 +23,8 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    level = moving_force(evidence, axis, np.sign)
+    of = sliding(evidence, axis)
+    level = float(beside_linear(of).fit(-np.sign(of.velocity)).strengths[0])
     return ({"level": level},) if level > 0 else ()
 
 
@@ -33,7 +34,7 @@ EFFECT = Effect(
     source="Coulomb; held still as in Karnopp 1985, J. Dyn. Syst. Meas. Control 107:100",
     signature="the missing force flips its sign with the velocity and does not grow with it; its odd harmonics fall "
     "as the level rises",
-    parameters=(Parameter("level", 1e-5, 1e4, none=0.0),),
+    parameters=(Parameter("level", 1e-9, 1e6, none=0.0),),
     acts=AxisForce(_law, _pack),
     starts=_starts,
 )

@@ -1,0 +1,52 @@
+"""Dry friction that is stronger one way than the other."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import V_FREE, V_PER_N
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, sliding
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+_GUESS = 1.3
+"""How many times stronger one way, where the data do not say."""
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """What stops the axis by the step's end, as far as friction against that motion is strong enough."""
+    stopping = -at[V_FREE] / at[V_PER_N]
+    return float(min(max(stopping, -of[0]), of[1]))
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["level_positive"], values["level_negative"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = sliding(evidence, axis)
+    forward = np.asarray(of.velocity > 0, dtype=np.float64)
+    # A constant beside them would be the asymmetry itself.
+    positive, negative = beside_linear(of, constant=False).fit(-forward, 1 - forward).strengths.tolist()
+    mean = (positive + negative) / 2
+    if mean <= 0:
+        return ()
+    measured = {"level_positive": max(positive, 0.05 * mean), "level_negative": max(negative, 0.05 * mean)}
+    more, less = 2 * mean * _GUESS / (1 + _GUESS), 2 * mean / (1 + _GUESS)
+    guesses = ((more, less), (less, more))
+    return (measured, *({"level_positive": one, "level_negative": other} for one, other in guesses))
+
+
+EFFECT = Effect(
+    name="asymmetric_friction",
+    equation="F = -level_positive where v > 0, +level_negative where v < 0",
+    source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30:1083",
+    signature="the missing force flips its sign with the velocity, by unequal amounts; odd and even harmonics fall as "
+    "the level rises",
+    parameters=(Parameter("level_positive", 1e-9, 1e6, none=0.0), Parameter("level_negative", 1e-9, 1e6, none=0.0)),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+    simpler=("coulomb_friction",),
+)

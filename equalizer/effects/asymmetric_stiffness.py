@@ -1,0 +1,45 @@
+"""A spring that is stiffer one way than the other."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, moving
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The mean of the force at the step's start and end, where the position at its end depends on it."""
+    half, start = 0.5 * of[0], at[X] ** 2
+    force = -half * (start + at[X_FREE] ** 2)
+    for _ in range(4):
+        end = at[X_FREE] + at[X_PER_N] * force
+        off = force + half * (start + end**2)
+        force -= off / max(1 + 2 * half * at[X_PER_N] * end, 0.5)
+    return float(force)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["k2"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    k2 = float(beside_linear(of).fit(-(of.position**2)).strengths[0])
+    return ({"k2": k2},) if k2 != 0 else ()
+
+
+EFFECT = Effect(
+    name="asymmetric_stiffness",
+    equation="F = -k2 x^2",
+    source="Helmholtz 1863, Tonempfindungen, appendix 12",
+    signature="the missing force is an even curve over the position; its even harmonics rise with the level and the "
+    "mean position moves",
+    parameters=(Parameter("k2", -1e12, 1e12, none=0.0, scale="signed"),),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

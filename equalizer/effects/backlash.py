@@ -1,0 +1,131 @@
+"""Play in a drive: the motor moves alone until it hits the handle's side of the gap."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import welch
+
+from equalizer.effects.bodies import bodies_of, moved
+from equalizer.effects.command_path import Driven
+from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import STEP_S, X_FREE, X_PER_N, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import own
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+STEPS = 20
+"""Per sample: a contact lasts a millisecond."""
+MOTOR_SHARE, CONTACT_HZ, CONTACT_RATIO = 0.3, 300.0, 0.03
+"""Of the moving mass; of the motor on the contact; its damping ratio. They stand for what a file leaves out."""
+GAPS, TRIED_S, BAND_S = np.geomspace(0.03, 3.0, 13), 6.0, 0.128
+"""Tried, over the way that the motor would go alone; on how much of the record; per window of a spectrum."""
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """Spring and damper of the contact, between their force at the step's start and end; it pushes apart only."""
+    half, stiffness, rate = 0.5 * of[0], of[1], of[2] / at[STEP_S]
+    for way in (1.0, -1.0):
+        start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
+        if start <= 0 and end <= 0:
+            continue
+        push = 0.5 * stiffness * (start + end) + rate * (end - start)
+        push /= 1 + at[X_PER_N] * (0.5 * stiffness + rate)
+        if end - at[X_PER_N] * push < 0:
+            push = 0.5 * stiffness * start
+        return float(-way * max(push, 0.0))
+    return 0.0
+
+
+def _motor(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
+    """Its mass, and the contact's stiffness and damping."""
+    known = own(model.mass, driven_axes(model)[:, axis])
+    mass = min(values.get("motor_mass", MOTOR_SHARE * known), 0.9 * known)
+    stiffness = values.get("contact_stiffness", mass * (2 * np.pi * CONTACT_HZ) ** 2)
+    return mass, stiffness, values.get("contact_damping", 2 * CONTACT_RATIO * float(np.sqrt(stiffness * mass)))
+
+
+def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
+    along = driven_axes(model)[:, axis]
+    if values["gap"] <= 0:
+        return model, np.zeros_like(along)
+    motor = _motor(model, axis, values)[0]
+    mass = np.pad(model.mass - motor * np.outer(along, along), ((0, 1), (0, 1)))
+    mass[-1, -1] = motor
+    force = np.pad(model.input, ((0, 1), (0, 0)))
+    force[-1, axis] = np.linalg.norm(model.input[:, axis])
+    force[:-1, axis] = 0
+    split = replace(
+        model,
+        mass=mass,
+        damping=np.pad(model.damping, ((0, 1), (0, 1))),
+        stiffness=np.pad(model.stiffness, ((0, 1), (0, 1))),
+        input=force,
+        output=np.pad(model.output, ((0, 0), (0, 1))),
+    )
+    return split, np.append(-along, 1.0)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["gap"], *_motor(model, axis, values)[1:]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """No waveform of impacts can be predicted; their spectrum can."""
+    kept = _loudest(evidence, axis)
+    missed = _spectrum(evidence, (evidence.response - evidence.predicted)[kept])
+    mass, stiffness, damping = _motor(evidence.model, axis, {})
+    alone = np.std(evidence.command[kept, axis]) / mass / (2 * np.pi * 10.0) ** 2
+    tried = []
+    for gap in (GAPS * alone).tolist():
+        values = {"gap": gap, "motor_mass": mass, "contact_stiffness": stiffness, "contact_damping": damping}
+        rattled = _spectrum(evidence, _played(evidence, axis, values, kept) - _played(evidence, axis, None, kept))
+        tried.append(
+            (float(np.mean(np.log((rattled + 1e-12 * missed.max()) / (missed + 1e-12 * missed.max())) ** 2)), gap)
+        )
+    best = [gap for _, gap in sorted(tried)[:2]]
+    rest = {"motor_mass": mass, "contact_stiffness": stiffness, "contact_damping": damping}
+    return tuple({"gap": gap, **rest} for gap in best if gap > 0)
+
+
+def _loudest(evidence: Evidence, axis: int) -> slice:
+    length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
+    power = np.cumsum(np.append(0.0, (evidence.command[:, axis] ** 2) * evidence.used))
+    first = int(np.argmax(power[length:] - power[:-length]))
+    return slice(first, first + length)
+
+
+def _played(evidence: Evidence, axis: int, values: Values | None, kept: slice) -> FloatArray:
+    placed = () if values is None else (PlacedEffect(EFFECT, (axis,), values),)
+    bodies = bodies_of(evidence.model, placed)
+    commands = evidence.command[kept]
+    looked, _ = moved(
+        bodies, Driven(commands, commands), (kept.stop - kept.start, STEPS), 1 / evidence.sample_rate_hz / STEPS
+    )
+    ports, p = bodies.ports.shape[1], evidence.model.outputs
+    return looked[:, 3 * ports : 3 * ports + p]
+
+
+def _spectrum(evidence: Evidence, signal: FloatArray) -> FloatArray:
+    window = max(int(BAND_S * evidence.sample_rate_hz), 16)
+    return np.asarray(welch(signal, evidence.sample_rate_hz, nperseg=min(window, len(signal)), axis=0)[1])[1:]
+
+
+EFFECT = Effect(
+    name="backlash",
+    equation="F = contact_stiffness (|r| - gap / 2) + contact_damping d|r|/dt where |r| > gap / 2, r = motor - handle",
+    source="Nordin and Gutman 2002, Automatica 38:1633",
+    signature="the handle feels no drive until the gap is crossed, then a blow: short peaks that no waveform predicts, "
+    "most of all at low levels",
+    parameters=(
+        Parameter("gap", 1e-9, 1e3, none=0.0, step=0.03),
+        Parameter("motor_mass", 1e-9, 1e6, none=None, step=0.05),
+        Parameter("contact_stiffness", 1e-3, 1e12, none=None, step=0.05),
+        Parameter("contact_damping", 1e-9, 1e6, none=None, step=0.1),
+    ),
+    acts=JointForce(_change, _law, _pack, steps=STEPS),
+    starts=_starts,
+)

@@ -1,0 +1,44 @@
+"""A body that an actuator shakes through something soft: a finger, a case, a wrist."""
+
+import numpy as np
+
+from equalizer.effects.attached_oscillator import hung, missing_mass, with_oscillator
+from equalizer.effects.effect import Effect, Parameter, Structure, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+
+RATIOS = (0.1, 0.3, 0.8, 2.0)
+"""Damping ratios to start from."""
+
+
+def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    along = driven_axes(model)[:, axis]
+    return with_oscillator(model, along, values["mass"], values["damping"], values["stiffness"])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    seen = missing_mass(evidence, axis)
+    natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
+    starts = []
+    for one in hung(seen, axis, natural, RATIOS)[:2]:
+        wave = 2 * np.pi * one.natural_hz
+        damping, stiffness = 2 * one.damping_ratio * one.mass * wave, one.mass * wave**2
+        starts.append({"mass": one.mass, "damping": damping, "stiffness": stiffness})
+    return tuple(starts)
+
+
+EFFECT = Effect(
+    name="body_on_actuator",
+    equation="F = -(damping (v - q') + stiffness (x - q)), mass q'' = -F",
+    source="Den Hartog, Mechanical Vibrations, chapter 3; well damped",
+    signature="the device is heavier than the model at low frequencies and not at high ones, at every level; nothing "
+    "appears at silent lines",
+    parameters=(
+        Parameter("mass", 1e-9, 1e6, none=0.0),
+        Parameter("damping", 1e-9, 1e6, none=None, step=0.03),
+        Parameter("stiffness", 1e-6, 1e12, none=None, step=0.03),
+    ),
+    acts=Structure(_change),
+    starts=_starts,
+)

@@ -1,0 +1,60 @@
+"""All effects that a diagnosis can name and a simulation can play."""
+
+from equalizer.effects import (
+    added_mass,
+    amplifier_lag,
+    asymmetric_friction,
+    asymmetric_stiffness,
+    backlash,
+    body_on_actuator,
+    clock_drift,
+    cogging,
+    constant_force,
+    coulomb_friction,
+    cross_axis_sensitivity,
+    end_stop,
+    extra_mode,
+    force_deadband,
+    force_gain,
+    force_saturation,
+    hand_impedance,
+    hardening_stiffness,
+    logger_offset,
+    loose_joint,
+    lost_samples,
+    mains_hum,
+    pose_dependent_inertia,
+    position_dependent_friction,
+    presliding_hysteresis,
+    quadratic_damping,
+    quantization,
+    sensor_clipping,
+    sensor_drift,
+    sensor_gain,
+    sensor_lag,
+    sensor_misalignment,
+    sensor_nonlinearity,
+    sensor_offset,
+    slew_limit,
+    stribeck_friction,
+    time_varying_grip,
+    transport_delay,
+    viscous_damping,
+)
+from equalizer.effects.effect import Effect
+
+CATALOGUE: tuple[Effect, ...] = tuple(
+    module.EFFECT
+    for module in (
+        coulomb_friction, asymmetric_friction, stribeck_friction, position_dependent_friction, presliding_hysteresis,
+        viscous_damping, quadratic_damping, hardening_stiffness, asymmetric_stiffness, constant_force, cogging,
+        backlash, loose_joint, end_stop, pose_dependent_inertia, extra_mode, added_mass,
+        hand_impedance, time_varying_grip,
+        body_on_actuator, force_saturation, force_deadband, slew_limit, amplifier_lag, transport_delay, force_gain,
+        sensor_lag, sensor_clipping, sensor_misalignment, cross_axis_sensitivity, sensor_gain, sensor_nonlinearity,
+        sensor_offset, sensor_drift, quantization, mains_hum, clock_drift, logger_offset, lost_samples,
+    )
+)  # fmt: skip
+"""In the vocabulary's order."""
+
+EFFECTS: dict[str, Effect] = {effect.name: effect for effect in CATALOGUE}

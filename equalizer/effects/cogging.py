@@ -1,0 +1,86 @@
+"""A force that repeats along the way: magnets over iron, teeth, the lay of a cable."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import Beside, Moving, beside_linear, moving
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+CELLS = 4096
+"""Of the travelled way."""
+PITCHES = 3
+"""Tried, the strongest first."""
+_FINER = 8
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The mean of the force at the step's start and end, where the position at its end depends on it."""
+    start, force = np.sin(of[1] * at[X] + of[2]), 0.0
+    for _ in range(4):
+        force = 0.5 * of[0] * (start + np.sin(of[1] * (at[X_FREE] + at[X_PER_N] * force) + of[2]))
+    return float(force)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["amplitude"], 2 * np.pi / values["pitch"], values.get("phase", 0.0)])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    beside = beside_linear(of)
+    found = [_at(of, beside, pitch) for pitch in _likely_pitches(of, beside)]
+    return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
+
+
+def _likely_pitches(of: Moving, beside: Beside) -> list[float]:
+    """By a periodogram of the missing force over the position."""
+    way = float(np.ptp(of.position))
+    if way == 0:
+        return []
+    cell = ((of.position - of.position.min()) / way * (CELLS - 1)).astype(int)
+    force = np.bincount(cell, beside.force, CELLS)
+    density = np.bincount(cell, minlength=CELLS).astype(float)
+    smooth = np.convolve(density, np.ones(9) / 9, "same")
+    # Where the axis stays most of the time, its noise would drown what is seen elsewhere.
+    weight = 1 / np.sqrt(np.maximum(smooth, 1.0))
+    power = np.abs(np.fft.rfft(force * weight, CELLS * _FINER)) ** 2
+    power[: 2 * _FINER] = 0
+    power[CELLS * _FINER // 4 :] = 0
+    pitches = []
+    for _ in range(PITCHES):
+        line = int(np.argmax(power))
+        if power[line] <= 0:
+            break
+        pitches.append(way * CELLS / (CELLS - 1) * _FINER / line)
+        power[max(line - _FINER, 0) : line + _FINER + 1] = 0
+    return pitches
+
+
+def _at(of: Moving, beside: Beside, pitch: float) -> tuple[float, Values]:
+    angle = 2 * np.pi * of.position / pitch
+    fit = beside.fit(np.sin(angle), np.cos(angle))
+    sine, cosine = fit.strengths.tolist()
+    return fit.explained, {
+        "amplitude": float(np.hypot(sine, cosine)), "pitch": pitch, "phase": float(np.arctan2(cosine, sine))
+    }  # fmt: skip
+
+
+EFFECT = Effect(
+    name="cogging",
+    equation="F = amplitude sin(2 pi x / pitch + phase)",
+    source="Hanselman, Brushless Permanent Magnet Motor Design, chapter 5",
+    signature="the missing force has one line in its spectrum over the position, at every level; odd and even "
+    "harmonics alike",
+    parameters=(
+        Parameter("amplitude", 1e-9, 1e6, none=0.0),
+        Parameter("pitch", 1e-9, 1e3, none=None, step=0.002),
+        Parameter("phase", -1e3, 1e3, none=None, scale="linear", step=0.02),
+    ),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

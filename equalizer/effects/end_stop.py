@@ -1,0 +1,70 @@
+"""A stop that the motion runs into."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, moving
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+SHARES = np.linspace(0.3, 0.98, 18)
+"""Of the farthest position, where a stop may stand."""
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The mean of the force at the step's start and end; a stop pushes back only, and how far one is in it at the end
+    depends on the force."""
+    force = 0.0
+    for side in range(2):
+        way = of[2 + side]
+        stiffness = of[1] if side == 0 else of[1] * of[4]
+        start = max(way * at[X] - of[0], 0.0)
+        end = way * (at[X_FREE] + at[X_PER_N] * force) - of[0]
+        push = 0.5 * stiffness * (start + end) / (1 + 0.5 * stiffness * at[X_PER_N])
+        if end - at[X_PER_N] * push < 0:
+            push = 0.5 * stiffness * start
+        force -= way * max(push, 0.0)
+    return float(force)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    way = -1.0 if values["position"] < 0 else 1.0
+    return np.array([abs(values["position"]), values["stiffness"], way, -way, values.get("opposite", 0.0)])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    beside, farthest = beside_linear(of), float(np.abs(of.position).max())
+    tried = []
+    for way in (1.0, -1.0):
+        for stop in (SHARES * farthest).tolist():
+            inside, outside = (np.maximum(side * of.position - stop, 0.0) for side in (way, -way))
+            if not (inside > 0).any():
+                continue
+            laws = (-way * inside, way * outside) if (outside > 0).any() else (-way * inside,)
+            fit = beside.fit(*laws)
+            stiffness, other = float(fit.strengths[0]), float(fit.strengths[-1]) if len(laws) > 1 else 0.0
+            if stiffness > 0 and other <= 1.001 * stiffness:
+                share = min(max(other / stiffness, 0.0), 1.0)
+                tried.append((fit.explained, {"position": way * stop, "stiffness": stiffness, "opposite": share}))
+    return tuple(values for _, values in sorted(tried, key=lambda item: -item[0])[:2])
+
+
+EFFECT = Effect(
+    name="end_stop",
+    equation="F = -stiffness (x - position) beyond position; at -position a stop of opposite times that stiffness",
+    source="Brogliato, Nonsmooth Mechanics, chapter 2",
+    signature="nothing is missing until the axis comes near its farthest positions; then a force pushes back, and odd "
+    "and even harmonics appear",
+    parameters=(
+        Parameter("position", -1e3, 1e3, none=None, scale="signed"),
+        Parameter("stiffness", 1e-6, 1e12, none=0.0),
+        Parameter("opposite", 0.0, 1.5, none=None, scale="linear", step=0.05),
+    ),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

@@ -1,0 +1,67 @@
+"""A part that swings on a spring of its own, which the model takes for stiff."""
+
+import numpy as np
+
+from equalizer.effects.attached_oscillator import Hung, hung, missing_mass, with_oscillator
+from equalizer.effects.effect import Effect, Parameter, Structure, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+
+LOWEST_HZ, STARTS = 2.0, 3
+RATIOS = (0.01, 0.04, 0.12)
+"""Damping ratios to start from."""
+FINER, COARSER = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
+"""Natural frequencies and damping ratios around the likeliest."""
+TILTS = ("tilt_next", "tilt_after_next")
+
+
+def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    axes, m = driven_axes(model), model.inputs
+    along = axes[:, axis].copy()
+    for place, tilt in enumerate(TILTS[: m - 1], start=1):
+        along += values.get(tilt, 0.0) * axes[:, (axis + place) % m]
+    along /= np.linalg.norm(along)
+    mass, natural = values["mass"], 2 * np.pi * values["frequency"]
+    return with_oscillator(model, along, mass, 2 * values["damping_ratio"] * mass * natural, mass * natural**2)
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    seen = missing_mass(evidence, axis)
+    natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
+    found: list[Hung] = []
+    for one in hung(seen, axis, natural, RATIOS):
+        if all(abs(np.log(one.natural_hz / other.natural_hz)) > 0.15 for other in found):
+            found.append(one)
+        if len(found) == STARTS:
+            break
+    finer = [
+        hung(seen, axis, (one.natural_hz * FINER).tolist(), (one.damping_ratio * COARSER).tolist()) for one in found
+    ]
+    return tuple(_values(best[0], axis, evidence.model.inputs) for best in finer)
+
+
+def _values(one: Hung, axis: int, m: int) -> Values:
+    tilts = [float(np.clip(one.by_axis[(axis + place) % m], -1, 1)) if place < m else 0.0 for place in (1, 2)]
+    # The pull on the own axis is that of the whole mass, less what its tilt takes away.
+    mass = one.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
+    values = {"frequency": one.natural_hz, "mass": mass, "damping_ratio": one.damping_ratio}
+    return values | dict(zip(TILTS, tilts, strict=True))
+
+
+EFFECT = Effect(
+    name="extra_mode",
+    equation="q'' + 2 damping_ratio w (q' - s') + w^2 (q - s) = 0, F = -mass q'', w = 2 pi frequency, s the axis",
+    source="Den Hartog, Mechanical Vibrations, chapter 3",
+    signature="the missing force over the acceleration has a resonance at one frequency, at every level; nothing "
+    "appears at silent lines",
+    parameters=(
+        Parameter("frequency", 1e-3, 1e6, none=None, step=0.003),
+        Parameter("mass", 1e-9, 1e6, none=0.0),
+        Parameter("damping_ratio", 1e-4, 0.7, none=None, step=0.03),
+        Parameter("tilt_next", -1.0, 1.0, none=None, scale="linear", step=0.02),
+        Parameter("tilt_after_next", -1.0, 1.0, none=None, scale="linear", step=0.02),
+    ),
+    acts=Structure(_change),
+    starts=_starts,
+)

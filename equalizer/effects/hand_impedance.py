@@ -1,0 +1,54 @@
+"""A hand on the handle: a mass, a damper and a spring to the ground along each axis."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, Parameter, Structure, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.starting_values import Beside, moving, own
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+
+_GUESS = 0.1
+"""Of the model's own, where the data show none."""
+
+
+def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    along = driven_axes(model)[:, axis]
+    square = np.outer(along, along)
+    return replace(
+        model,
+        mass=model.mass + values["mass"] * square,
+        damping=model.damping + values["damping"] * square,
+        stiffness=model.stiffness + values["stiffness"] * square,
+    )
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    beside = Beside(of.force, np.ones((len(of.force), 1)))
+    found = beside.fit(-of.acceleration, -of.velocity, -of.position).strengths.tolist()
+    along, model = driven_axes(evidence.model)[:, axis], evidence.model
+    known = [_GUESS * own(matrix, along) for matrix in (model.mass, model.damping, model.stiffness)]
+    values = [one if one > 0 else 0.1 * other for one, other in zip(found, known, strict=True)]
+    names = ("mass", "damping", "stiffness")
+    return tuple(dict(zip(names, numbers, strict=True)) for numbers in (values, known))
+
+
+EFFECT = Effect(
+    name="hand_impedance",
+    equation="F = -(mass dv/dt + damping v + stiffness x), along each axis",
+    source="Hasser and Cutkosky 2002, Haptics Symposium: a pinched knob as mass, damper and spring",
+    signature="the device is heavier, more damped and stiffer than the model along every axis, at every level; nothing "
+    "appears at silent lines",
+    parameters=(
+        Parameter("mass", 1e-9, 1e6, none=0.0),
+        Parameter("damping", 1e-9, 1e6, none=0.0),
+        Parameter("stiffness", 1e-6, 1e9, none=0.0),
+    ),
+    acts=Structure(_change),
+    starts=_starts,
+    sites=("each",),
+    simpler=("added_mass",),
+)

@@ -1,0 +1,45 @@
+"""A spring that gets stiffer the further it is pushed, either way."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, moving
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The mean of the force at the step's start and end, where the position at its end depends on it."""
+    half, start = 0.5 * of[0], at[X] ** 3
+    force = -half * (start + at[X_FREE] ** 3)
+    for _ in range(4):
+        end = at[X_FREE] + at[X_PER_N] * force
+        off = force + half * (start + end**3)
+        force -= off / (1 + 3 * half * at[X_PER_N] * end * end)
+    return float(force)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["k3"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    k3 = float(beside_linear(of).fit(-(of.position**3)).strengths[0])
+    return ({"k3": k3},) if k3 > 0 else ()
+
+
+EFFECT = Effect(
+    name="hardening_stiffness",
+    equation="F = -k3 x^3",
+    source="Duffing 1918, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz",
+    signature="the missing force is an odd curve over the position; its odd harmonics rise with the level and the "
+    "lowest resonance moves up",
+    parameters=(Parameter("k3", 1e-9, 1e15, none=0.0),),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

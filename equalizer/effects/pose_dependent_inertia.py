@@ -1,0 +1,56 @@
+"""A mass that depends on where the axis is, as of a linkage."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import STEP_S, V_FREE, V_PER_N, X_FREE, V, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, moving, own
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+LAGRANGE = 0.5
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """With the step's mean acceleration, which itself depends on the force."""
+    middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
+    more = of[0] * middle
+    free, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
+    return float(-(more * free + of[0] * of[1] * speed * speed) / max(1 + more * per_newton, 0.1))
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    mass = own(model.mass, driven_axes(model)[:, axis])
+    return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE)])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    mass = own(evidence.model.mass, driven_axes(evidence.model)[:, axis])
+    by_place, by_speed = -mass * of.position * of.acceleration, -mass * of.velocity**2
+    beside = beside_linear(of)
+    free, bound = beside.fit(by_place, by_speed), beside.fit(by_place + LAGRANGE * by_speed)
+    per_m, momentum = free.strengths.tolist()
+    together = float(bound.strengths[0])
+    starts = [{"per_m": together, "speed_share": LAGRANGE}]
+    if abs(momentum) < 1.5 * abs(per_m):
+        starts.insert(0, {"per_m": per_m, "speed_share": max(momentum / per_m, 0.0)})
+    return tuple(values for values in starts if values["per_m"] != 0)
+
+
+EFFECT = Effect(
+    name="pose_dependent_inertia",
+    equation="F = -per_m M (x dv/dt + speed_share v^2), M the mass along the axis; speed_share is 1/2 by Lagrange",
+    source="Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 7",
+    signature="the missing force goes with position times acceleration; its even harmonics rise with the level",
+    parameters=(
+        Parameter("per_m", -1e6, 1e6, none=0.0, scale="signed"),
+        Parameter("speed_share", -0.5, 1.5, none=None, scale="linear", step=0.02),
+    ),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

@@ -1,0 +1,50 @@
+"""Dry friction that changes along the way: a bent screw, a rack, a cable that lies differently."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import V_FREE, V_PER_N, X_FREE, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, sliding
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """What stops the axis, up to the friction at the step's mean position."""
+    mean = 0.5 * (at[X] + at[X_FREE])
+    level = max(of[0] * (1 + of[1] * mean + of[2] * mean * mean), 0.0)
+    stopping = -at[V_FREE] / at[V_PER_N]
+    return float(min(max(stopping, -level), level))
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["level"], values["slope_per_m"], values["bend_per_m2"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = sliding(evidence, axis)
+    sign = -np.sign(of.velocity)
+    found = beside_linear(of).fit(sign, sign * of.position, sign * of.position**2)
+    level, slope, bend = found.strengths.tolist()
+    if level <= 0:
+        return ()
+    return ({"level": level, "slope_per_m": slope / level, "bend_per_m2": bend / level},)
+
+
+EFFECT = Effect(
+    name="position_dependent_friction",
+    equation="F = -level (1 + slope_per_m x + bend_per_m2 x^2) sgn(v), never along the motion",
+    source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30:1083, section 2.4",
+    signature="the missing force flips its sign with the velocity by an amount that depends on where the axis is",
+    parameters=(
+        Parameter("level", 1e-9, 1e6, none=0.0),
+        Parameter("slope_per_m", -1e6, 1e6, none=None, scale="signed"),
+        Parameter("bend_per_m2", -1e9, 1e9, none=None, scale="signed"),
+    ),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+    simpler=("coulomb_friction",),
+)

@@ -1,0 +1,70 @@
+"""Dry friction through bristles that bend before they slip, so that small motions meet a spring with a loop."""
+
+import numpy as np
+
+from equalizer.effects.bristle_kernel import bent
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, best_of, moving
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+BENDS = np.geomspace(3e-4, 1.0, 15)
+"""Where the bristle slips, over the rms position."""
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """Dahl's bristle, bent by the travel that its own force allows. Its force is between that of the step's middle,
+    exact for a soft bristle, and that of its end, stable for a stiff one. memory: the bend."""
+    if of[0] <= 0:
+        return 0.0
+    stiffness, longest, start = of[1], of[0] / of[1], memory[0]
+    slack = stiffness * at[X_PER_N]
+    late = (0.5 + slack) / (1 + slack)
+    allowed = at[X_FREE] - at[X]
+    travel = allowed / (1 + slack)
+    bend = start
+    for _ in range(20):
+        full = longest * np.sign(travel)
+        bend = full + (start - full) * np.exp(-abs(travel) / longest)
+        # Of the bend by the travel.
+        rate = 1 - bend * np.sign(travel) / longest
+        off = travel - allowed + slack * ((1 - late) * start + late * bend)
+        step = off / (1 + slack * late * max(rate, 0.0))
+        travel -= step
+        if abs(step) < 1e-7 * longest:
+            break
+    full = longest * np.sign(travel)
+    bend = full + (start - full) * np.exp(-abs(travel) / longest)
+    memory[0] = bend
+    return float(-stiffness * ((1 - late) * start + late * bend))
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["level"], values["stiffness"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    path, used = evidence.axis_position[:, axis], evidence.used > 0
+    rms = float(np.sqrt(np.mean(of.position**2)))
+    longest, found = best_of(beside_linear(of), (BENDS * rms).tolist(), lambda slip: (-bent(path, slip)[used],))
+    level = float(found.strengths[0])
+    return ({"level": level, "stiffness": level / longest},) if level > 0 else ()
+
+
+EFFECT = Effect(
+    name="presliding_hysteresis",
+    equation="F = -stiffness z, dz/dt = v - stiffness |v| z / level",
+    source="Dahl 1968, Aerospace Corp. TOR-0158(3107-18)-1; Canudas de Wit and others 1995, IEEE Trans. Autom. Control "
+    "40:419",
+    signature="the missing force flips its sign with the velocity only after some travel: a loop over the position "
+    "near each reversal",
+    parameters=(Parameter("level", 1e-9, 1e6, none=0.0), Parameter("stiffness", 1e-3, 1e9, none=None, step=0.03)),
+    acts=AxisForce(_law, _pack, memory=1),
+    starts=_starts,
+    simpler=("coulomb_friction",),
+)

@@ -1,0 +1,41 @@
+"""Drag that grows with the square of the velocity: air, oil, iron losses."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import V_FREE, V_PER_N, V
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, moving
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The mean of the drag at the step's start and end, where the velocity at its end depends on it."""
+    reach = 0.5 * of[0] * at[V_PER_N]
+    aim = at[V_FREE] - reach * at[V] * abs(at[V])
+    end = 2 * aim / (1 + np.sqrt(1 + 4 * reach * abs(aim)))
+    return float(-0.5 * of[0] * (at[V] * abs(at[V]) + end * abs(end)))
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["coefficient"]])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    coefficient = float(beside_linear(of).fit(-of.velocity * np.abs(of.velocity)).strengths[0])
+    return ({"coefficient": coefficient},) if coefficient > 0 else ()
+
+
+EFFECT = Effect(
+    name="quadratic_damping",
+    equation="F = -coefficient v |v|",
+    source="Newton's drag at high Reynolds numbers",
+    signature="the missing force is a parabola over the velocity, odd; its odd harmonics rise with the level",
+    parameters=(Parameter("coefficient", 1e-9, 1e9, none=0.0),),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+)

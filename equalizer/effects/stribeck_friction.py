@@ -1,0 +1,65 @@
+"""Dry friction that is strongest at rest and weakens as the motion gets faster."""
+
+import numpy as np
+
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import V_FREE, V_PER_N, V
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import beside_linear, best_of, sliding
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+SPEEDS = np.geomspace(0.03, 1.5, 12)
+"""Of the rms velocity."""
+_MORE = 1.2
+"""Static over Coulomb friction, where the data show none."""
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """What stops the axis, up to the friction at the step's mean velocity, which itself depends on the force."""
+    stopping = -at[V_FREE] / at[V_PER_N]
+    mean, force = at[V], 0.0
+    for _ in range(3):
+        level = of[0] + (of[1] - of[0]) * np.exp(-((mean / of[2]) ** 2))
+        force = min(max(stopping, -level), level)
+        mean = 0.5 * (at[V] + at[V_FREE] + at[V_PER_N] * force)
+    return float(force)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    return np.array([values["coulomb"], values["static"], max(values["speed"], 1e-12)])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = sliding(evidence, axis)
+    sign, rms = np.sign(of.velocity), float(np.sqrt(np.mean(of.velocity**2)))
+    speed, found = best_of(
+        beside_linear(of),
+        (SPEEDS * rms).tolist(),
+        lambda slow: (-sign, -sign * np.exp(-((of.velocity / slow) ** 2))),
+    )
+    coulomb, more = found.strengths.tolist()
+    if coulomb <= 0 and coulomb + more <= 0:
+        return ()
+    coulomb = max(coulomb, 0.05 * more)
+    static = coulomb + more if more > 0.02 * coulomb else _MORE * coulomb
+    return ({"coulomb": coulomb, "static": static, "speed": speed},)
+
+
+EFFECT = Effect(
+    name="stribeck_friction",
+    equation="F = -(coulomb + (static - coulomb) exp(-(v / speed)^2)) sgn(v)",
+    source="Bo and Pavelescu 1982, Wear 82:277; Armstrong-Helouvry 1994, Automatica 30:1083",
+    signature="the missing force flips its sign with the velocity and has a hump at low speed; its odd harmonics fall "
+    "steeply as the level rises",
+    parameters=(
+        Parameter("coulomb", 1e-9, 1e6, none=0.0),
+        Parameter("static", 1e-9, 1e6, none=0.0),
+        Parameter("speed", 1e-6, 1e3, none=None, step=0.03),
+    ),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+    simpler=("coulomb_friction",),
+)

@@ -1,0 +1,113 @@
+"""A grip that tightens and loosens: the damping and the stiffness towards the ground come and go."""
+
+import numpy as np
+
+from equalizer.effects.effect import ALL_SITES, AxisForce, Effect, Parameter, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.instant import STEP_S, TIME_S, V_FREE, V_PER_N, X_FREE, X_PER_N, V, X
+from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.starting_values import Beside, beside_linear, moving
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+FASTEST_HZ, STARTS = 15.0, 2
+_FINER = 4
+
+
+@compiled_law
+def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """The mean over the step, in which the motion at its end depends on the force."""
+    swing = of[1] * np.sin(of[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + of[2])
+    damping, stiffness = swing * of[3], swing * of[4]
+    force = -0.5 * (damping * (at[V] + at[V_FREE]) + stiffness * (at[X] + at[X_FREE]))
+    return float(force / max(1 + 0.5 * (damping * at[V_PER_N] + stiffness * at[X_PER_N]), 0.2))
+
+
+def grounded(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
+    """Of a damping or stiffness, what holds a driven axis to the ground: bodies that hang on it go along."""
+    carried = np.linalg.norm(axes, axis=1) < 1e-9
+    rest = matrix[np.ix_(~carried, ~carried)]
+    if carried.any():
+        between = matrix[np.ix_(~carried, carried)]
+        rest = rest - between @ np.linalg.pinv(matrix[np.ix_(carried, carried)]) @ between.T
+    along = axes[~carried, axis]
+    return float(along @ rest @ along)
+
+
+def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    axes = driven_axes(model)
+    damping, stiffness = grounded(model.damping, axes, axis), grounded(model.stiffness, axes, axis)
+    turning, share = 2 * np.pi * values["rate_hz"], values.get("stiffness_share", 0.0)
+    return np.array([turning, values["depth"], values.get("phase", 0.0), damping, share * stiffness])
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
+    n, rate = len(evidence.command), evidence.sample_rate_hz
+    force, drag = np.zeros((n, len(sites))), np.zeros((n, len(sites)))
+    pull = np.zeros((n, len(sites)))
+    axes, used = driven_axes(evidence.model), evidence.used > 0
+    for column, site in enumerate(sites):
+        force[used, column] = beside_linear(moving(evidence, site)).force
+        drag[used, column] = -grounded(evidence.model.damping, axes, site) * evidence.axis_velocity[used, site]
+        pull[used, column] = -grounded(evidence.model.stiffness, axes, site) * evidence.axis_position[used, site]
+    found = []
+    for rate_hz in _rates(force, drag, rate):
+        angle = 2 * np.pi * rate_hz * np.arange(n)[:, None] / rate
+        shapes = [part * wave for part in (drag, pull) for wave in (np.sin(angle), np.cos(angle))]
+        fit = Beside(force.ravel(), np.column_stack([drag.ravel(), pull.ravel()])).fit(*(s.ravel() for s in shapes))
+        found.append((fit.explained, _values(rate_hz, fit.strengths)))
+    return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
+
+
+def _values(rate_hz: float, strengths: FloatArray) -> Values:
+    sine, cosine, stiff_sine, stiff_cosine = strengths.tolist()
+    depth = float(np.hypot(sine, cosine))
+    share = (stiff_sine * sine + stiff_cosine * cosine) / max(depth**2, np.finfo(float).tiny)
+    phase = float(np.arctan2(cosine, sine))
+    share = float(np.clip(share, -0.5, 2.0))
+    return {"rate_hz": rate_hz, "depth": depth, "phase": phase, "stiffness_share": share}
+
+
+def _rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:
+    """How often the damping comes and goes: the missing force against the drag, times a wave, at every rate."""
+    n = len(force)
+    size = _FINER * n
+    last = int(FASTEST_HZ / rate * size)
+    against = np.conj(np.fft.rfft(np.sum(force * drag, axis=1), size))[: last + 1]
+    square = np.conj(np.fft.rfft(np.sum(drag**2, axis=1), size))[: 2 * last + 1]
+    twice, whole = square[: 2 * last + 1 : 2], float(square[0].real)
+    normal = np.empty((last + 1, 3, 3))
+    normal[:, 0, 0] = whole
+    normal[:, 0, 1] = normal[:, 1, 0] = square[: last + 1].imag
+    normal[:, 0, 2] = normal[:, 2, 0] = square[: last + 1].real
+    normal[:, 1, 1], normal[:, 2, 2] = (whole - twice.real) / 2, (whole + twice.real) / 2
+    normal[:, 1, 2] = normal[:, 2, 1] = twice.imag / 2
+    seen = np.stack([np.full(last + 1, against[0].real), against.imag, against.real], axis=1)
+    normal += 1e-6 * whole * np.eye(3)
+    power = np.sum(seen * np.linalg.solve(normal, seen[:, :, None])[:, :, 0], axis=1)
+    power[:_FINER] = -np.inf
+    rates = []
+    for _ in range(STARTS):
+        line = int(np.argmax(power))
+        rates.append(line * rate / size)
+        power[max(line - 2 * _FINER, 0) : line + 2 * _FINER + 1] = -np.inf
+    return rates
+
+
+EFFECT = Effect(
+    name="time_varying_grip",
+    equation="F = -depth sin(2 pi rate_hz t + phase) (D v + stiffness_share K x), D and K those towards the ground",
+    source="Hasser and Cutkosky 2002, Haptics Symposium: damping and stiffness grow with the grip force",
+    signature="periods differ from one another though the commands repeat, the more the higher the level",
+    parameters=(
+        Parameter("rate_hz", 1e-4, 1e3, none=None, step=0.002),
+        Parameter("depth", 1e-6, 1.5, none=0.0),
+        Parameter("phase", -1e3, 1e3, none=None, scale="linear", step=0.02),
+        Parameter("stiffness_share", -0.5, 2.0, none=None, scale="linear", step=0.02),
+    ),
+    acts=AxisForce(_law, _pack),
+    starts=_starts,
+    sites=("all", "one"),
+)

@@ -1,0 +1,39 @@
+"""More damping than the model has: a bearing, eddy currents, a motor on a voltage drive."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.effects.effect import Effect, Parameter, Structure, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.starting_values import Beside, moving, own
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+
+_GUESS = 0.3
+"""Of the model's own damping, where re-tuning has hidden the rest."""
+
+
+def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    along = driven_axes(model)[:, axis]
+    return replace(model, damping=model.damping + values["damping"] * np.outer(along, along))
+
+
+def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    of = moving(evidence, axis)
+    fit = Beside(of.force, np.column_stack([of.position, of.acceleration, np.ones_like(of.position)])).fit(-of.velocity)
+    damping = float(fit.strengths[0])
+    known = own(evidence.model.damping, driven_axes(evidence.model)[:, axis])
+    guesses = (damping, _GUESS * known)
+    return tuple({"damping": guess} for guess in guesses if guess > 0)
+
+
+EFFECT = Effect(
+    name="viscous_damping",
+    equation="F = -damping v",
+    source="Rayleigh's dissipation; eddy currents and back-EMF act alike",
+    signature="the missing force is a straight line over the velocity, at every level; nothing appears at silent lines",
+    parameters=(Parameter("damping", 1e-9, 1e6, none=0.0),),
+    acts=Structure(_change),
+    starts=_starts,
+)
