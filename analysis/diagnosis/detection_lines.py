@@ -36,9 +36,11 @@ class DetectionLines:
         return bool((self.odd | self.even | self.either).any())
 
 
-def detection_lines(excitation: ComplexArray) -> DetectionLines | None:
-    """excitation: (lines, inputs), line k in row k - 1. None where nothing is driven."""
+def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
+    """excitation: (lines, inputs), line k in row k - 1. held: samples that each value of the command is held for; above half
+    its own rate there are its images only. None where nothing is driven."""
     size = np.abs(excitation)
+    size[(len(size) + 1) // held :] = 0
     strongest = size.max()
     if strongest == 0:
         return None
@@ -55,19 +57,6 @@ def detection_lines(excitation: ComplexArray) -> DetectionLines | None:
     return DetectionLines(
         driven, np.asarray(silent & (multiple % 2 == 1)), np.asarray(silent & (multiple % 2 == 0)), none, step
     )
-
-
-def image_lines(driven: BoolArray, repeats: int) -> BoolArray:
-    """(lines,): where a command that is held over `repeats` samples leaves images of its driven lines."""
-    lines = len(driven)
-    length = 2 * (lines + 1)
-    found = np.zeros(lines, dtype=np.bool_)
-    numbers = np.flatnonzero(driven) + 1
-    for multiple in range(1, repeats // 2 + 1):
-        centre = multiple * length // repeats
-        for image in (centre - numbers, centre + numbers):
-            found[image[(image >= 1) & (image <= lines)] - 1] = True
-    return np.asarray(found & ~driven)
 
 
 def held_samples(command: npt.NDArray[np.float64]) -> int:

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.diagnosis.detection_lines import BoolArray, DetectionLines, detection_lines
+from analysis.diagnosis.detection_lines import BoolArray, DetectionLines, detection_lines, held_samples
 from analysis.diagnosis.driven_looks import DrivenLook, driven_looks
 from analysis.diagnosis.frequency_cells import Band, octaves_between, within
 from analysis.diagnosis.line_statistics import excess
@@ -17,9 +17,9 @@ from equalizer.identification.experiments import instrument_of
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
-Kind = Literal["odd", "even", "either", "varying", "images"]
+Kind = Literal["odd", "even", "either", "varying"]
 """Odd and even distortion; distortion of either kind where even lines were driven; what differs between periods beyond
-the noise; images of a command that is held over several samples."""
+the noise."""
 
 
 class _Where(NamedTuple):
@@ -67,7 +67,9 @@ def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
     if not floor.known:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
     found = settled_periods(recording)
-    lines = [detection_lines(look_spectra(instrument_of(recording), one).mean(axis=0)) for one in found]
+    excitation = instrument_of(recording)
+    held = held_samples(excitation)
+    lines = [detection_lines(look_spectra(excitation, one).mean(axis=0), held) for one in found]
     periods = [(one, its) for one, its in zip(found, lines, strict=True) if its is not None]
     if not periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be told apart.",))
@@ -119,14 +121,12 @@ def _kinds(look: DrivenLook, channel: int, inside: BoolArray, where: _Where, who
         freedom = float(2 * max(look.looks - 1, 1) * chosen.sum())
         beyond = excess(power[chosen], error[chosen], freedom)
         found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
-    free = float(look.floor_freedom[channel])
-    if whole and look.images.any():
-        beyond = excess(power[look.images], error[look.images], free)
-        found.append(("images", beyond, 1.0, int(look.images.sum())))
     if look.looks > 1:
         # Each line is known from looks - 1 differences.
         seen = np.repeat(look.spread[inside, channel], look.looks - 1)
-        beyond = excess(seen, np.repeat(look.floor[inside, channel], look.looks - 1), free)
+        beyond = excess(
+            seen, np.repeat(look.floor[inside, channel], look.looks - 1), float(look.floor_freedom[channel])
+        )
         found.append(("varying", beyond, 1 / (look.looks - 1), int(inside.sum())))
     return [
         Distortion(*where, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)

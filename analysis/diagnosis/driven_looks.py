@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.channel_noise import ChannelNoise
 from analysis.diagnosis.commanded_response import between_lines, commanded, line_responses
-from analysis.diagnosis.detection_lines import BoolArray, DetectionLines, held_samples, image_lines
+from analysis.diagnosis.detection_lines import DetectionLines
 from analysis.diagnosis.frequency_cells import driving_inputs
 from analysis.diagnosis.periods import Periods, look_spectra
 from equalizer.identification.experiments import instrument_of
@@ -29,7 +29,6 @@ class DrivenLook:
     """Driven inputs, joined by "+"."""
     amplitude: float
     lines: DetectionLines
-    images: BoolArray
     frequency_hz: FloatArray
     mean: ComplexArray
     """Over looks; on silent lines without what the command brings."""
@@ -53,7 +52,6 @@ def driven_looks(
 ) -> list[DrivenLook]:
     """noise: of the signal, on the lines floor_hz."""
     found = []
-    repeats = held_samples(recording.command.samples)
     for length in dict.fromkeys(one.length for one, _ in periods):
         alike = [(one, lines) for one, lines in periods if one.length == length]
         commands = [look_spectra(recording.command.samples, one).mean(axis=0) for one, _ in alike]
@@ -67,9 +65,8 @@ def driven_looks(
             if linear is not None:
                 brought, doubt = commanded(linear, np.where(lines.driven[:, None], 0, command))
                 mean, error = mean - brought, error + doubt
-            images, inputs = image_lines(lines.driven, repeats), inputs_of(recording, one)
-            look = (lines, images, lines_hz, mean, error, spread, floor, one.looks, noise.freedom)
-            found.append(DrivenLook(inputs, one.segment.amplitude, *look))
+            look = (lines, lines_hz, mean, error, spread, floor, one.looks, noise.freedom)
+            found.append(DrivenLook(inputs_of(recording, one), one.segment.amplitude, *look))
     return found
 
 

@@ -61,7 +61,9 @@ class LevelTrend:
 def level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
     groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
     for cell in cells:
-        key = (cell.output, cell.quantity, cell.input, cell.band_hz, cell.whole_band, cell.kind)
+        # Realisations differ a little in the band that they drive.
+        band = _ALL if cell.whole_band else cell.band_hz
+        key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
         groups.setdefault(key, []).append(cell)
     return tuple(_trend(key, sorted(group, key=lambda cell: cell.amplitude)) for key, group in groups.items())
 
@@ -74,6 +76,9 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
     seen = np.array([cell.p_value < PRESENT for cell in cells])
     slope, slope_p = _course(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
+    if key[4]:
+        band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
+        key = (*key[:3], band, *key[4:])
     return LevelTrend(*key, float(relative_db[-1]), p_value, slope, slope_p, bool(seen.any() and not seen[0]))
 
 
@@ -100,3 +105,4 @@ def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) ->
 
 
 _TINY = 1e-300
+_ALL: Band = (0.0, np.inf)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.channel_noise import ChannelNoise
-from analysis.diagnosis.detection_lines import BoolArray, detection_lines
+from analysis.diagnosis.detection_lines import BoolArray, detection_lines, held_samples
 from analysis.diagnosis.frequency_cells import Band, driving_inputs, octaves_between, within
 from analysis.diagnosis.periods import Periods, look_spectra, settled_periods, spectra
 from equalizer.identification.experiments import instrument_of
@@ -84,7 +84,7 @@ def residual_lines(recording: Recording, seen: Observation, used: BoolArray) -> 
 
 def _of_periods(recording: Recording, seen: Observation, periods: Periods) -> list[ResidualLines]:
     excitation = look_spectra(instrument_of(recording), periods).mean(axis=0)
-    driven = detection_lines(excitation)
+    driven = detection_lines(excitation, held_samples(instrument_of(recording)))
     if driven is None:
         return []
     lines_hz = periods.frequency_hz(recording.sample_rate_hz)

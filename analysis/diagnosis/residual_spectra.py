@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.channel_noise import ChannelNoise
-from analysis.diagnosis.detection_lines import BoolArray, detection_lines
+from analysis.diagnosis.detection_lines import BoolArray, detection_lines, held_samples
 from analysis.diagnosis.mismatch_cells import Prediction
 from analysis.diagnosis.noise_floor import NoiseFloor
 from analysis.diagnosis.periods import Periods, look_spectra, settled_periods
@@ -52,7 +52,8 @@ def residual_spectra(
         return None
     lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
     excitation = np.stack([look_spectra(instrument_of(recording), one).mean(axis=0) for one in looks])
-    driven = detection_lines(np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128))
+    together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
+    driven = detection_lines(together, held_samples(instrument_of(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]
