@@ -25,10 +25,12 @@ def correlation_time(series: FloatArray) -> float:
     n = len(series)
     centred = series - series.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    covariance = np.fft.irfft(spectrum)[: max(n // 4, 1)]
+    lags = max(n // 4, 1)
+    covariance = np.fft.irfft(spectrum)[:lags]
     if covariance[0] <= 0:
         return 1.0
-    return float(2 * np.sum((covariance / covariance[0]) ** 2) - 1)
+    # At each lag, chance alone leaves an n-th of the result.
+    return float((2 * np.sum((covariance / covariance[0]) ** 2) - 1) / (1 + 2 * lags / n))
 
 
 def shuffled(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:

@@ -9,6 +9,9 @@ from analysis.diagnosis.residual_spectra import ResidualSpectra
 
 _TELLING = 4.0
 """Times the noise that a residual must bring to the other sensor before its absence there says something."""
+_LOUD = 10.0
+"""Times its own noise, on a line, that the response's residual must be."""
+_LEAST_LINES = 5
 _ABSENT, _PRESENT = 0.1, 0.5
 """Share of what the response's residual would be in position, below which it is absent and above which it is there."""
 
@@ -32,8 +35,8 @@ def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
     response, position = np.abs(spectra.residual[:, :, :p]) ** 2, np.abs(spectra.residual[:, :, p:]) ** 2
     noise = spectra.noise[:, :, p:]
     moved = np.maximum(response - spectra.noise[:, :, :p], 0.0) / per_position[:, None]
-    telling = moved > _TELLING * noise
-    if not telling.any():
+    telling = (moved > _TELLING * noise) & (response > _LOUD * spectra.noise[:, :, :p])
+    if telling.sum() < _LEAST_LINES:
         return SensorRule("undecided", 0.0, 0.0)
     expected = float(np.mean((moved / noise)[telling]))
     seen = float(np.mean(((position - noise) / noise)[telling]))
