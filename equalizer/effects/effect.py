@@ -100,6 +100,8 @@ class OnResponse:
     """Orders those on the same side of the low pass: alignment, range, what is added, numbers, clock."""
     shared: bool = False
     """It cannot befall one channel alone."""
+    bandwidth_hz: Callable[[float, Values], float] | None = None
+    """Of its channels' low pass, from what the model says it is; 0 = none."""
     position_too: bool = False
     """The position is read by the same clock or logger and undergoes the same."""
     given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None

@@ -48,7 +48,7 @@ def lattice_step(values: FloatArray) -> float | None:
 
 
 def staircase_step(values: FloatArray, noise: float) -> float | None:
-    """The step of a staircase under noise, from the ripple that it leaves in the histogram; None where there is none."""
+    """The step of a staircase under noise, from the ripple that it leaves in the histogram; None without one."""
     span = float(np.ptp(values))
     bins = int(span / (BIN_SHARE * noise)) if noise > 0 else 0
     if not 64 <= bins <= 4_000_000:

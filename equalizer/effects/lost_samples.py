@@ -10,7 +10,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.reading_kernel import repeat_as_measured, repeat_where
+from equalizer.effects.reading_kernel import Flags, repeat_as_measured, repeat_where
 from equalizer.signals.signal import FloatArray
 
 CLEAR = 4.0
@@ -42,7 +42,7 @@ def _given(
 
 def _repeated(
     samples: FloatArray, measured: FloatArray, noise: FloatArray, fraction: float
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[FloatArray, Flags]:
     read, lost = np.empty(samples.shape), np.zeros(len(samples), dtype=np.bool_)
     repeat_as_measured(
         np.ascontiguousarray(samples),

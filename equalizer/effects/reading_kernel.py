@@ -1,18 +1,21 @@
 """Where a clock runs wrong or samples are lost: what is read of a sampled response, compiled."""
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 
 _MATRIX = types.float64[:, ::1]
-_IN = types.Array(types.float64, 2, "C", readonly=True)  # type: ignore[no-untyped-call]
-_VECTOR_IN = types.Array(types.float64, 1, "C", readonly=True)  # type: ignore[no-untyped-call]
+_IN = types.Array(types.float64, 2, "C", readonly=True)
+_VECTOR_IN = types.Array(types.float64, 1, "C", readonly=True)
 _FLAGS = types.boolean[::1]
+
+Flags = npt.NDArray[np.bool_]
 
 
 @njit(types.void(_IN, types.float64, types.float64, _IN, types.float64, _MATRIX), cache=True, nogil=True)
-def read_at(  # noqa: PLR0913 - a kernel takes flat arrays
+def read_at(
     samples: FloatArray, per_sample: float, offset: float, between: FloatArray, straight: float, out: FloatArray
 ) -> None:
     """out[k] = samples at k per_sample + offset; held beyond both ends. samples, out: (n, p). between: (phases + 1,
@@ -39,7 +42,7 @@ def read_at(  # noqa: PLR0913 - a kernel takes flat arrays
 
 
 @njit(types.void(_IN, _FLAGS, _MATRIX), cache=True, nogil=True)
-def repeat_where(samples: FloatArray, lost: FloatArray, out: FloatArray) -> None:
+def repeat_where(samples: FloatArray, lost: Flags, out: FloatArray) -> None:
     """A lost sample shows what was read before it. samples, out: (n, p), lost: (n,)"""
     out[0] = samples[0]
     for k in range(1, samples.shape[0]):
@@ -47,8 +50,8 @@ def repeat_where(samples: FloatArray, lost: FloatArray, out: FloatArray) -> None
 
 
 @njit(types.void(_IN, _IN, _VECTOR_IN, types.float64, _MATRIX, _FLAGS), cache=True, nogil=True)
-def repeat_as_measured(  # noqa: PLR0913 - a kernel takes flat arrays
-    samples: FloatArray, measured: FloatArray, noise: FloatArray, odds_against: float, out: FloatArray, lost: FloatArray
+def repeat_as_measured(
+    samples: FloatArray, measured: FloatArray, noise: FloatArray, odds_against: float, out: FloatArray, lost: Flags
 ) -> None:
     """Fills out (n, p) and lost (n,): each sample was lost where that is the likelier by the measurement.
     odds_against: 2 ln of the odds that a sample is not lost."""

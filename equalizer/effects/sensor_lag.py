@@ -1,4 +1,4 @@
-"""A sensor, or the filter of one channel, that is slower than the model says."""
+"""A sensor, or the filter of one channel, that is slower or faster than the model says."""
 
 import math
 
@@ -7,27 +7,28 @@ import numpy as np
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.response_starts import likeliest_reading
-from equalizer.effects.sensor_path import low_passed
+from equalizer.effects.sensor_path import before_low_pass, low_passed
 from equalizer.signals.signal import FloatArray
 
 SLOWEST, FASTEST = 0.002, 1.5
 """Bandwidths worth a try, as shares of the sample rate."""
 
 
-def _filtered(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
-    if math.isinf(of["bandwidth"]):
-        return response
-    read = response.copy()
-    read[:, channels] = low_passed(response[:, channels], sample_rate_hz, of["bandwidth"])
-    return read
+def _as_filtered(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
+    """The low pass is the model's own, with another bandwidth."""
+    return response
+
+
+def _bandwidth_hz(known_hz: float, of: Values) -> float:
+    return known_hz if math.isinf(of["bandwidth"]) else of["bandwidth"]
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    rate = evidence.sample_rate_hz
+    rate, known_hz = evidence.sample_rate_hz, evidence.model.sensor.bandwidth_hz
     bandwidth = likeliest_reading(
         evidence,
         channel,
-        lambda samples, value: low_passed(samples, rate, value),
+        lambda samples, value: low_passed(before_low_pass(samples, rate, known_hz), rate, value),
         list(np.geomspace(SLOWEST * rate, FASTEST * rate, 10)),
     )
     return () if bandwidth is None else ({"bandwidth": bandwidth},)
@@ -35,11 +36,11 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 EFFECT = Effect(
     name="sensor_lag",
-    equation="y' = 2 pi bandwidth (x - y)",
+    equation="y' = 2 pi bandwidth (x - y), instead of the model's bandwidth",
     source="Analog Devices ADXL335 data sheet: bandwidth set by an RC filter of 32 kOhm +-15 %",
     signature="the response falls short and late at high frequencies, at every level alike, while the position agrees",
     parameters=(Parameter("bandwidth", 1e-2, 1e5, none=math.inf),),
-    acts=OnResponse(_filtered),
+    acts=OnResponse(_as_filtered, bandwidth_hz=_bandwidth_hz),
     starts=_starts,
     sites=("all", "one"),
 )

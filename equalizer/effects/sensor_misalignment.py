@@ -20,10 +20,16 @@ LEAST_DEG = 0.01
 def _turned(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
     if len(channels) not in (2, 3):
         raise ValueError(f"sensor_misalignment turns two or three channels together, not {len(channels)}")
-    rotation = Rotation.from_rotvec([of[name] for name in ABOUT], degrees=True).as_matrix()
+    rotation = Rotation.from_rotvec(_vector(of), degrees=True).as_matrix()
     read = response.copy()
     read[:, channels] = response[:, channels] @ rotation[: len(channels), : len(channels)].T
     return read
+
+
+def _vector(of: Values) -> list[float]:
+    """Degrees about each axis; about the last where only the angle is known."""
+    about = [of.get(name, 0.0) for name in ABOUT]
+    return about if any(name in of for name in ABOUT) else [0.0, 0.0, of["degrees"]]
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
@@ -43,7 +49,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _report(of: Values) -> Values:
-    return {"degrees": math.hypot(*(of[name] for name in ABOUT)), **of}
+    return {"degrees": math.hypot(*_vector(of)), **{name: of[name] for name in ABOUT if name in of}}
 
 
 EFFECT = Effect(

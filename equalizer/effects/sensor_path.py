@@ -14,5 +14,13 @@ def low_passed(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float)
     return np.asarray(lfilter([1 - decay], [1.0, -decay], response, axis=0))
 
 
+def before_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
+    """Undoes `low_passed`."""
+    if bandwidth_hz <= 0:
+        return response
+    decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
+    return np.asarray(lfilter([1.0, -decay], [1 - decay], response, axis=0))
+
+
 def within_range(response: FloatArray, limit: float) -> FloatArray:
     return np.clip(response, -limit, limit) if limit > 0 else response

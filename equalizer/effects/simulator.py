@@ -78,7 +78,8 @@ def _sensed(
     response, position = np.array(played.response), np.array(played.position)
     for after_filter in (False, True):
         if after_filter:
-            response = low_passed(response, sample_rate_hz, model.sensor.bandwidth_hz)
+            for channel, bandwidth_hz in enumerate(_bandwidths(model, response.shape[1], on_response)):
+                response[:, channel] = low_passed(response[:, channel], sample_rate_hz, bandwidth_hz)
         for acts, placed in on_response:
             if acts.after_filter is not after_filter:
                 continue
@@ -90,3 +91,14 @@ def _sensed(
                 position = acts.change(position, sample_rate_hz, tuple(range(position.shape[1])), placed.values)
     response = within_range(response, model.sensor.range)
     return Played(response, position, played.axis_position, played.axis_velocity, played.axis_force)
+
+
+def _bandwidths(
+    model: MechanicalModel, channels: int, on_response: Sequence[tuple[OnResponse, PlacedEffect]]
+) -> list[float]:
+    found = [model.sensor.bandwidth_hz] * channels
+    for acts, placed in on_response:
+        for channel in placed.sites if acts.bandwidth_hz is not None else ():
+            assert acts.bandwidth_hz is not None
+            found[channel] = acts.bandwidth_hz(found[channel], placed.values)
+    return found

@@ -4,7 +4,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 
-_IN = types.Array(types.float64, 1, "A", readonly=True)  # type: ignore[no-untyped-call]
+_IN = types.Array(types.float64, 1, "A", readonly=True)
 
 
 @njit(types.void(_IN, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)

@@ -12,11 +12,11 @@ from equalizer.signals.signal import FloatArray
 
 
 def _followed(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return _both(commands, step_s, of["rate"])[0]
+    return np.asarray(_both(commands, step_s, of["rate"])[0])
 
 
 def _followed_at_end(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return _both(commands, step_s, of["rate"])[1]
+    return np.asarray(_both(commands, step_s, of["rate"])[1])
 
 
 def _both(commands: FloatArray, step_s: float, rate: float) -> FloatArray:

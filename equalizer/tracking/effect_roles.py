@@ -57,5 +57,5 @@ def lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
             case "transport_delay":
                 late += effect.parameters["delay"]
             case "sensor_lag":
-                corners.append(effect.parameters["bandwidth"])
+                corners[1] = effect.parameters["bandwidth"]
     return late + sum(1 / (2 * np.pi * corner) for corner in corners if corner > 0)

@@ -1,0 +1,74 @@
+"""Effects as a model's file names them, by axis and parameters, and as a simulation plays them, both ways."""
+
+from collections.abc import Iterator
+
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, nearest
+
+
+class PlacingError(ValueError):
+    """An effect that cannot be placed in this model. Says which and why."""
+
+
+def placed_effects(
+    model: MechanicalModel, input_channels: tuple[str, ...], output_channels: tuple[str, ...]
+) -> tuple[PlacedEffect, ...]:
+    """`model.effects`, at the axes and channels that they name: where they name none, at all.
+
+    An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A number that a file leaves out is as if
+    what it says were not there. Raises PlacingError.
+    """
+    return tuple(_placed(effect, input_channels, output_channels) for effect in model.effects)
+
+
+def model_effects(
+    placed: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
+) -> tuple[ModelEffect, ...]:
+    """As `placed_effects` reads them back: one per site, or one without an axis where all share it."""
+    return tuple(
+        ModelEffect(one.effect.name, axis, dict(one.effect.report(one.values)))
+        for one in placed
+        for axis in _axes(one, output_channels if _is_sensors(one.effect.name) else input_channels)
+    )
+
+
+def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
+    """'x' of 'fx' where no two channels end alike, else the channel's whole name."""
+    ends = [name[-1:] for name in channels]
+    return channel[-1:] if len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel
+
+
+def _axes(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
+    if set(placed.sites) == set(range(len(channels))) and (len(channels) > 1 or "one" not in placed.effect.sites):
+        yield None
+        return
+    for site in placed.sites:
+        if not 0 <= site < len(channels):
+            raise PlacingError(f"{placed.effect.name} is placed at number {site + 1}, but there are {len(channels)}")
+        yield axis_letter(channels[site], channels)
+
+
+def _placed(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> PlacedEffect:
+    entry = EFFECTS.get(effect.kind)
+    if entry is None:
+        raise PlacingError(
+            f"no simulation plays '{effect.kind}'{nearest(effect.kind, tuple(EFFECTS))}; it plays {', '.join(EFFECTS)}"
+        )
+    return PlacedEffect(entry, _sites(effect, outputs if _is_sensors(effect.kind) else inputs), effect.parameters)
+
+
+def _sites(effect: ModelEffect, channels: tuple[str, ...]) -> tuple[int, ...]:
+    if effect.axis is None:
+        return tuple(range(len(channels)))
+    exact = tuple(number for number, channel in enumerate(channels) if channel == effect.axis)
+    named = exact or tuple(number for number, channel in enumerate(channels) if channel[-1:] == effect.axis)
+    if len(named) != 1:
+        found = "is on several of" if named else "is none of"
+        raise PlacingError(f"{effect.kind}: the axis '{effect.axis}' {found} {', '.join(channels)}")
+    return named
+
+
+def _is_sensors(kind: str) -> bool:
+    return EFFECTS_BY_NAME[kind].place == "sensor"
