@@ -94,3 +94,9 @@ def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_rati
                 pulls = np.asarray(strengths[0] / strengths[0, axis])
                 found.append(Hung(natural, ratio, float(mass), explained, pulls))
     return sorted(found, key=lambda one: -one.explained)
+
+
+def without(seen: MissingMass, one: Hung) -> MissingMass:
+    """What an oscillator leaves of the missing force."""
+    pull = seen.power * one.mass * hanging(seen.frequency_hz, one.natural_hz, one.damping_ratio)
+    return MissingMass(seen.frequency_hz, seen.power, seen.cross - pull[:, None] * one.by_axis)

@@ -20,7 +20,7 @@ STEPS = 20
 """Per sample: a contact lasts a millisecond."""
 MOTOR_SHARE, CONTACT_HZ, CONTACT_RATIO = 0.3, 300.0, 0.03
 """Of the moving mass; of the motor on the contact; its damping ratio. They stand for what a file leaves out."""
-GAPS, TRIED_S, BAND_S = np.geomspace(0.03, 3.0, 13), 6.0, 0.128
+GAPS, TRIED_S, BAND_S = np.geomspace(0.02, 3.0, 14), 2.0, 0.128
 """Tried, over the way that the motor would go alone; on how much of the record; per window of a spectrum."""
 
 
@@ -75,27 +75,31 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """No waveform of impacts can be predicted; their spectrum can."""
-    kept = _loudest(evidence, axis)
-    missed = _spectrum(evidence, (evidence.response - evidence.predicted)[kept])
-    mass, stiffness, damping = _motor(evidence.model, axis, {})
-    alone = np.std(evidence.command[kept, axis]) / mass / (2 * np.pi * 10.0) ** 2
+    motor, stiffness, damping = _motor(evidence.model, axis, {})
+    rest = {"motor_mass": motor, "contact_stiffness": stiffness, "contact_damping": damping}
+    kept = _parts(evidence, axis)
+    alone = float(np.std(evidence.command[kept[-1], axis])) / motor / (2 * np.pi * 10.0) ** 2
+    floor = evidence.noise**2 / (0.5 * evidence.sample_rate_hz)
+    left = [_spectrum(evidence, (evidence.response - evidence.predicted)[part]) for part in kept]
+    linear = [_played(evidence, axis, None, part) for part in kept]
     tried = []
     for gap in (GAPS * alone).tolist():
-        values = {"gap": gap, "motor_mass": mass, "contact_stiffness": stiffness, "contact_damping": damping}
-        rattled = _spectrum(evidence, _played(evidence, axis, values, kept) - _played(evidence, axis, None, kept))
-        tried.append(
-            (float(np.mean(np.log((rattled + 1e-12 * missed.max()) / (missed + 1e-12 * missed.max())) ** 2)), gap)
-        )
-    best = [gap for _, gap in sorted(tried)[:2]]
-    rest = {"motor_mass": mass, "contact_stiffness": stiffness, "contact_damping": damping}
-    return tuple({"gap": gap, **rest} for gap in best if gap > 0)
+        off = 0.0
+        for part, missed, smooth in zip(kept, left, linear, strict=True):
+            rattled = _spectrum(evidence, _played(evidence, axis, {"gap": gap, **rest}, part) - smooth)
+            off += float(np.mean(np.log((rattled + floor) / (missed + 0.1 * floor)) ** 2))
+        tried.append((off, gap))
+    return tuple({"gap": gap, **rest} for _, gap in sorted(tried)[:2] if gap > 0)
 
 
-def _loudest(evidence: Evidence, axis: int) -> slice:
+def _parts(evidence: Evidence, axis: int) -> list[slice]:
+    """Where the axis is driven gently, and where most strongly."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
-    power = np.cumsum(np.append(0.0, (evidence.command[:, axis] ** 2) * evidence.used))
-    first = int(np.argmax(power[length:] - power[:-length]))
-    return slice(first, first + length)
+    power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
+    firsts = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))
+    inside = power[firsts + length] - power[firsts]
+    gentle = np.where(inside > 1e-3 * inside.max(), inside, np.inf)
+    return [slice(int(first), int(first) + length) for first in (firsts[np.argmin(gentle)], firsts[np.argmax(inside)])]
 
 
 def _played(evidence: Evidence, axis: int, values: Values | None, kept: slice) -> FloatArray:

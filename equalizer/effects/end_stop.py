@@ -6,12 +6,12 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.instant import X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import beside_linear, moving
+from equalizer.effects.starting_values import Beside, Moving, beside_linear, moving
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-SHARES = np.linspace(0.3, 0.98, 18)
-"""Of the farthest position, where a stop may stand."""
+SHARES, FINER = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
+"""Of the farthest position, where a stop may stand; and around the likeliest place."""
 
 
 @compiled_law
@@ -39,19 +39,29 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     of = moving(evidence, axis)
     beside, farthest = beside_linear(of), float(np.abs(of.position).max())
-    tried = []
+    found = []
     for way in (1.0, -1.0):
-        for stop in (SHARES * farthest).tolist():
-            inside, outside = (np.maximum(side * of.position - stop, 0.0) for side in (way, -way))
-            if not (inside > 0).any():
-                continue
-            laws = (-way * inside, way * outside) if (outside > 0).any() else (-way * inside,)
-            fit = beside.fit(*laws)
-            stiffness, other = float(fit.strengths[0]), float(fit.strengths[-1]) if len(laws) > 1 else 0.0
-            if stiffness > 0 and other <= 1.001 * stiffness:
-                share = min(max(other / stiffness, 0.0), 1.0)
-                tried.append((fit.explained, {"position": way * stop, "stiffness": stiffness, "opposite": share}))
-    return tuple(values for _, values in sorted(tried, key=lambda item: -item[0])[:2])
+        coarse = _best(of, beside, way, SHARES * farthest)
+        if coarse is not None:
+            fine = _best(of, beside, way, abs(coarse[1]["position"]) + FINER * farthest)
+            found.append(coarse if fine is None else fine)
+    return tuple(values for _, values in sorted(found, key=lambda item: -item[0]))
+
+
+def _best(of: Moving, beside: Beside, way: float, stops: FloatArray) -> tuple[float, Values] | None:
+    """What a stop on one side explains, with another opposite that is no stiffer, and its numbers."""
+    tried: list[tuple[float, Values]] = []
+    for stop in stops.tolist():
+        inside, outside = (np.maximum(side * of.position - stop, 0.0) for side in (way, -way))
+        if not (inside > 0).any():
+            continue
+        laws = (-way * inside, way * outside) if (outside > 0).any() else (-way * inside,)
+        fit = beside.fit(*laws)
+        stiffness, other = float(fit.strengths[0]), float(fit.strengths[-1]) if len(laws) > 1 else 0.0
+        if stiffness > 0 and other <= 1.1 * stiffness:
+            share = min(max(other / stiffness, 0.0), 1.0)
+            tried.append((fit.explained, {"position": way * stop, "stiffness": stiffness, "opposite": share}))
+    return max(tried, key=lambda item: item[0], default=None)
 
 
 EFFECT = Effect(

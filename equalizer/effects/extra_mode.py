@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from equalizer.effects.attached_oscillator import Hung, hung, missing_mass, with_oscillator
+from equalizer.effects.attached_oscillator import Hung, hung, missing_mass, with_oscillator, without
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-LOWEST_HZ, STARTS = 2.0, 3
+LOWEST_HZ, STARTS = 2.0, 2
 RATIOS = (0.01, 0.04, 0.12)
 """Damping ratios to start from."""
 FINER, COARSER = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
@@ -27,18 +27,16 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    seen = missing_mass(evidence, axis)
+    seen, starts = missing_mass(evidence, axis), []
     natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
-    found: list[Hung] = []
-    for one in hung(seen, axis, natural, RATIOS):
-        if all(abs(np.log(one.natural_hz / other.natural_hz)) > 0.15 for other in found):
-            found.append(one)
-        if len(found) == STARTS:
-            break
-    finer = [
-        hung(seen, axis, (one.natural_hz * FINER).tolist(), (one.damping_ratio * COARSER).tolist()) for one in found
-    ]
-    return tuple(_values(best[0], axis, evidence.model.inputs) for best in finer)
+    for _ in range(STARTS):
+        coarse = hung(seen, axis, natural, RATIOS)[:1]
+        for one in coarse:
+            near = hung(seen, axis, (one.natural_hz * FINER).tolist(), (one.damping_ratio * COARSER).tolist())
+            starts.append(_values(near[0], axis, evidence.model.inputs))
+            # The next is looked for in what this one leaves.
+            seen = without(seen, near[0])
+    return tuple(starts)
 
 
 def _values(one: Hung, axis: int, m: int) -> Values:

@@ -1,18 +1,25 @@
 """A bolted joint that is loose: within a gap it only rubs, beyond it is stiff."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from equalizer.effects.effect import Effect, JointForce, Parameter, Values
+from equalizer.effects.bodies import bodies_of, moved
+from equalizer.effects.command_path import Driven
+from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.instant import V_FREE, V_PER_N, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import own
+from equalizer.effects.sensor_path import low_passed
+from equalizer.effects.starting_values import SLOW, Beside
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 STEPS = 8
 """Per sample."""
+GAPS = np.geomspace(0.05, 5.0, 10)
+"""Tried, over the joint's rms travel."""
 
 
 @compiled_law
@@ -33,18 +40,19 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def joint_at(model: MechanicalModel, axis: int) -> FloatArray:
-    """(n,): how a joint near a driven axis moves: against the body that hangs on it by the strongest spring, or against
-    the ground where nothing hangs on it."""
+    """(n,): how a joint near a driven axis moves: against the heaviest body that hangs on it, or against the ground where
+    nothing does."""
     along, axes = driven_axes(model)[:, axis], driven_axes(model)
     carried = np.linalg.norm(axes, axis=1) < 1e-9
     if not carried.any():
         return along
-    pull = np.where(carried, np.abs(model.stiffness @ along), 0.0)
-    body = int(np.argmax(pull))
-    held = float(model.stiffness[body, body])
-    if pull[body] == 0 or held <= 0:
+    held = np.diagonal(model.stiffness)
+    tied = np.where(carried & (held > 0), model.stiffness @ along / np.where(held > 0, held, 1.0), 0.0)
+    weight = np.diagonal(model.mass) * tied**2
+    body = int(np.argmax(weight))
+    if weight[body] == 0:
         return along
-    follows = np.where(carried, 0.0, -model.stiffness[body] / held)
+    follows = np.where(carried, 0.0, -model.stiffness[body] / held[body])
     follows[body] = -1.0
     return np.asarray(follows)
 
@@ -58,25 +66,40 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """By the axis's own motion: nobody measured the joint's."""
-    joint = joint_at(evidence.model, axis)
-    held = own(evidence.model.stiffness, joint) / float(joint @ joint)
-    used = evidence.used > 0
-    force, travel = evidence.axis_force[used, axis], evidence.axis_position[used, axis]
-    slip, way = float(np.median(np.abs(force))), _travel_in_joint(evidence, axis, joint, float(np.std(travel)))
-    stiffness = abs(held) if held != 0 else float(np.std(force)) / max(float(np.std(travel)), 1e-12)
-    return tuple({"gap": way * share, "stiffness": 0.3 * stiffness, "slip": slip} for share in (0.5, 2.0))
+    """By the joint's travel in the model without it, and by what forces along that travel do to the response."""
+    travel, speed = _in_joint(evidence, axis)
+    used, rms = evidence.used > 0, float(np.std(travel))
+    left = ((evidence.response - evidence.predicted) / evidence.noise)[used].ravel()
+    rubbing = -np.tanh(speed / max(SLOW * float(np.std(speed)), np.finfo(float).tiny))
+    nuisances = [_answer(evidence, axis, force)[used].ravel() for force in (-travel, -speed)]
+    beside = Beside(left, np.column_stack(nuisances))
+    slipped = _answer(evidence, axis, rubbing)[used].ravel()
+    tried: list[tuple[float, Values]] = []
+    for gap in (GAPS * rms).tolist():
+        beyond = -np.sign(travel) * np.maximum(np.abs(travel) - gap / 2, 0.0)
+        fit = beside.fit(_answer(evidence, axis, beyond)[used].ravel(), slipped)
+        stiffness, slip = fit.strengths.tolist()
+        if stiffness > 0:
+            tried.append((fit.explained, {"gap": gap, "stiffness": stiffness, "slip": max(slip, 0.0)}))
+    return tuple(values for _, values in sorted(tried, key=lambda item: -item[0])[:2])
 
 
-def _travel_in_joint(evidence: Evidence, axis: int, joint: FloatArray, travel: float) -> float:
-    """What a joint gives under its body's inertia, rms."""
-    body = int(np.argmin(joint))
-    held = float(evidence.model.stiffness[body, body])
-    if joint[body] >= 0 or held <= 0:
-        return travel
-    speed = evidence.axis_velocity[evidence.used > 0, axis]
-    acceleration = float(np.std(np.gradient(speed, 1 / evidence.sample_rate_hz)))
-    return acceleration * float(evidence.model.mass[body, body]) / held
+def _in_joint(evidence: Evidence, axis: int) -> tuple[FloatArray, FloatArray]:
+    silent = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
+    bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), silent),))
+    commands = Driven(evidence.command, evidence.command)
+    looked, _ = moved(bodies, commands, (len(evidence.command), 1), 1 / evidence.sample_rate_hz)
+    ports = bodies.ports.shape[1]
+    return looked[:, ports - 1], looked[:, 2 * ports - 1]
+
+
+def _answer(evidence: Evidence, axis: int, force: FloatArray) -> FloatArray:
+    """(n, p): of the response to a force (n,) in the joint, over the noise."""
+    model = replace(evidence.model, input=joint_at(evidence.model, axis)[:, None])
+    bodies, one = bodies_of(model, ()), force[:, None]
+    looked, _ = moved(bodies, Driven(one, one), (len(force), 1), 1 / evidence.sample_rate_hz)
+    response = looked[:, 3 : 3 + model.outputs]
+    return low_passed(response, evidence.sample_rate_hz, model.sensor.bandwidth_hz) / evidence.noise
 
 
 EFFECT = Effect(

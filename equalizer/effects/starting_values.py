@@ -78,9 +78,11 @@ class Beside:
     def fit(self, *laws: FloatArray) -> Fitted:
         """laws: (n,) each, of strength 1."""
         shapes = self._without(np.column_stack(laws))
-        strengths = np.asarray(np.linalg.lstsq(shapes, self.force, rcond=1e-9)[0], dtype=np.float64)
-        rest = self.force - shapes @ strengths
-        return Fitted(strengths, 1 - float(rest @ rest) / self._power)
+        size = np.linalg.norm(shapes, axis=0)
+        shapes = shapes / np.where(size > 0, size, 1.0)
+        seen = shapes.T @ self.force
+        strengths = np.asarray(np.linalg.lstsq(shapes.T @ shapes, seen, rcond=1e-9)[0], dtype=np.float64)
+        return Fitted(strengths / np.where(size > 0, size, 1.0), float(seen @ strengths) / self._power)
 
 
 def beside_linear(of: Moving, constant: bool = True) -> Beside:

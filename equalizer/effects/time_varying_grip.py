@@ -12,7 +12,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
-_FINER = 4
+_FINER = 16
 
 
 @compiled_law
