@@ -37,6 +37,26 @@ def likeliest_reading(
     return best if misfit < (1 - LEAST_SHARE) * left(predicted) else None
 
 
+def late_at_axis(evidence: Evidence, axis: int, longest_s: float) -> float:
+    """Seconds by which the measured response to a driven axis comes after the predicted one. Of that axis' own
+    channel, where there is one for each."""
+    rate, own = evidence.sample_rate_hz, evidence.response.shape[1] == evidence.command.shape[1]
+    channels = list(channels_of(evidence, axis if own else ALL_SITES))
+    weight = evidence.used[:, None] / evidence.noise[channels]
+    measured, predicted = evidence.response[:, channels] * weight, evidence.predicted[:, channels] * weight
+    return lateness(measured, predicted, min(int(longest_s * rate), len(weight) // 2)) / rate
+
+
+def starts_for_lateness(evidence: Evidence, axis: int, fitting: float | None, longest_s: float) -> tuple[float, ...]:
+    """Seconds to start from, of what makes an axis late: as late as its response is, and what fits the missing force.
+    Re-tuned damping takes up most of a small lag, so that a fifth of a sample is always worth a try where the response
+    is not early."""
+    late, least = late_at_axis(evidence, axis, longest_s), 0.2 / evidence.sample_rate_hz
+    if late < -least:
+        return ()
+    return tuple(sorted({max(late, least), max(fitting or 0.0, least)}, reverse=True))
+
+
 def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> FloatArray:
     """(k,): how much of each of the basis' (n, k) columns the residual (n,) holds."""
     columns = basis[used > 0]

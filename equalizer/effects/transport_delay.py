@@ -6,6 +6,7 @@ from equalizer.effects.command_path import delayed, delayed_at_end
 from equalizer.effects.command_starts import likeliest_value
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
 from equalizer.effects.evidence import Evidence
+from equalizer.effects.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
@@ -20,8 +21,8 @@ def _late_at_end(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    found = likeliest_value(evidence, axis, delayed, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
-    return () if found is None else ({"delay": found},)
+    fitting = likeliest_value(evidence, axis, delayed, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
+    return tuple({"delay": late} for late in starts_for_lateness(evidence, axis, fitting, LONGEST_S))
 
 
 EFFECT = Effect(
