@@ -25,7 +25,8 @@ _LOUD = 3.0
 _BLOCK_LINES = 8
 """Neighbouring lines share their fate: so many count as one when two entries are compared."""
 _SENSOR_PENALTY = np.log(2.0)
-_PER_DIMENSION = 0.05
+_PER_DIMENSION = 0.25
+"""What each further direction must gain, or errors of the model on other axes would be forces, too."""
 _TINY = np.finfo(np.float64).tiny
 
 

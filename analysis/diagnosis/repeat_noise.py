@@ -7,10 +7,10 @@ quietest segments count, and where even they differ by more than what is heard a
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
 from analysis.diagnosis.channel_noise import ChannelNoise, SegmentNoise
+from analysis.diagnosis.detection_lines import BoolArray
 from analysis.diagnosis.periods import Periods, look_samples, look_spectra
 from analysis.diagnosis.quiet_noise import hiss_at_rest
 from analysis.diagnosis.rounding import rounded_noise, rounding_step
@@ -18,7 +18,6 @@ from equalizer.identification.noise_floor import over_neighbours, spread_over_lo
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-BoolArray = npt.NDArray[np.bool_]
 _SMOOTHED_LINES = 9
 _ALIKE = 1e-4
 """Chance that equal noise is taken for unequal."""

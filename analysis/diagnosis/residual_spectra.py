@@ -16,6 +16,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _WINDOW_S = 2.0
+_HEARD = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,10 +34,15 @@ class ResidualSpectra:
 
 
 def residual_spectra(
-    recording: Recording, prediction: Prediction, floor: NoiseFloor, used: BoolArray | None = None
+    recording: Recording,
+    prediction: Prediction,
+    floor: NoiseFloor,
+    used: BoolArray | None = None,
+    model_error: float = 0.01,
 ) -> ResidualSpectra | None:
-    """Of mean periods; of windows of two seconds where nothing is periodic. used: (n,), the samples that count.
-    None where there is no period and no window, or the noise is not known."""
+    """Of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the noise
+    is not known. used: (n,), the samples that count. model_error: share of the response on each line that the model is
+    not trusted for, counted as noise: else what re-tuning leaves on other axes passes for a second force."""
     left = [recording.response.samples - prediction.response]
     noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
@@ -60,6 +66,7 @@ def residual_spectra(
     inside = slice(int(first), int(last) + 1)
     spectra = np.stack([look_spectra(residual, one).mean(axis=0)[inside] for one in looks])
     noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], one) for one in looks])
+    noise += model_error**2 * np.stack([_answered(recording, one, len(noises) > 1)[inside] for one in looks])
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
 
 
@@ -78,6 +85,16 @@ def _windows(recording: Recording, whole: BoolArray) -> list[Periods]:
                 window = Segment(start, start + length, segment.kind, segment.amplitude, length, segment.role)
                 found.append(Periods(index, window, (start,), True))
     return found
+
+
+def _answered(recording: Recording, periods: Periods, position: bool) -> FloatArray:
+    """(lines, channels): squared magnitudes; a channel counts for a tenth of the loudest of its signal at least."""
+    signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
+    parts = []
+    for signal in signals:
+        power = np.abs(look_spectra(signal.samples, periods).mean(axis=0)) ** 2
+        parts.append(np.maximum(power, _HEARD**2 * power.max(axis=1, keepdims=True)))
+    return np.hstack(parts)
 
 
 def _noise(noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods) -> FloatArray:

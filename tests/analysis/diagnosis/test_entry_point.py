@@ -118,10 +118,12 @@ def test_a_recordings_residual_is_taken_over_the_driven_band(device):
     command, segments = bench.command(1)
     truth = Prediction(*bench.linear(command, segments))
     floor = noise_floor(recording)
-    spectra = residual_spectra(recording, truth, floor)
+    spectra = residual_spectra(recording, truth, floor, model_error=0.0)
     assert spectra.residual.shape == (6, len(spectra.frequency_hz), 4)
     assert (spectra.frequency_hz[[0, -1]] == [3, 197]).all()
     assert np.mean(np.abs(spectra.residual) ** 2 / spectra.noise) == pytest.approx(1, abs=0.05)
+    doubted = residual_spectra(recording, truth, floor)
+    assert (doubted.noise > spectra.noise).all()
     used = np.zeros(len(recording), dtype=bool)
     assert residual_spectra(recording, truth, floor, used) is None
     used[: segments[0].stop] = True
@@ -133,6 +135,8 @@ def test_what_is_not_periodic_is_taken_in_windows(device):
     recording = bench.recorded()
     command, segments = bench.command(1)
     swept = replace(recording, segments=tuple(replace(s, period=0, kind="sweep") for s in segments))
-    spectra = residual_spectra(swept, Prediction(*bench.linear(command, segments)), noise_floor(recording))
+    spectra = residual_spectra(
+        swept, Prediction(*bench.linear(command, segments)), noise_floor(recording), model_error=0.0
+    )
     assert len(spectra.residual) == 12
     assert np.mean(np.abs(spectra.residual) ** 2 / spectra.noise) == pytest.approx(1, abs=0.05)
