@@ -34,7 +34,9 @@ class Explanation:
     after: Contender
     """and with what was found; the same as re-tuned where nothing was."""
     rounds: tuple[tuple[Contender, ...], ...]
-    """The contenders for the first effect, the second, …; the best first."""
+    """The contenders for the first effect, the second, …; the best first. The last may have brought nothing."""
+    steps: tuple[Contender, ...]
+    """What stood after each effect that was added."""
 
 
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Explanation:
@@ -45,6 +47,7 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Ex
     retuned = refine(arena, fit(measure, tuning, before, known, RETUNING_ROUNDS))
     base = arena.contender(retuned)
     rounds: list[tuple[Contender, ...]] = []
+    steps: list[Contender] = []
     while len(rounds) < MOST_EFFECTS and base.standing.seen > CLEAN:
         progress(f"looking for the {('first', 'second', 'third')[len(rounds)]} effect", (1 + len(rounds)) / 4)
         contenders = _next(arena, catalogue, base.fitted)
@@ -53,7 +56,8 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Ex
             break
         rounds.append(contenders)
         base = contenders[0]
-    return Explanation(arena.contender(before), arena.contender(retuned), base, tuple(rounds))
+        steps.append(base)
+    return Explanation(arena.contender(before), arena.contender(retuned), base, tuple(rounds), tuple(steps))
 
 
 def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted) -> tuple[Contender, ...]:
@@ -66,5 +70,4 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted) -> tuple[Cont
 
 
 def _worthwhile(base: Contender, better: Contender) -> bool:
-    left, then = base.standing.chosen_by - 1, better.standing.chosen_by - 1
-    return then < (1 - WORTHWHILE) * left
+    return better.standing.chosen_by < (1 - WORTHWHILE) * base.standing.chosen_by

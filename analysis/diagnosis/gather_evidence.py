@@ -7,7 +7,6 @@ from analysis.diagnosis.missing_force import missing_force
 from analysis.diagnosis.output_error import Fitted
 from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.evidence import Evidence
-from equalizer.signals.signal import FloatArray
 
 EXPECTED = 0.1
 """Rms of a missing force, as a share of the command's."""

@@ -96,6 +96,23 @@ class Hypothesis:
                 effects.append(PlacedEffect(claim.effect, sites, values))
         return tuple(effects)
 
+    def of_claim(self, number: int) -> tuple[PlacedEffect, ...]:
+        """What one claim places."""
+        first = sum(claim.groups for claim in self.claims[:number])
+        return self.placed()[first : first + self.claims[number].groups]
+
+
+def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
+    first = sum(claim.groups for claim in whole.claims[:number])
+    last = first + whole.claims[number].groups
+    sizes = [sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in whole.claims]
+    begin = sum(sizes[:number])
+    return Hypothesis(
+        whole.claims[:number] + whole.claims[number + 1 :],
+        whole.starts[:first] + whole.starts[last:],
+        np.delete(whole.point, slice(begin, begin + sizes[number])),
+    )
+
 
 def claimed(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """values: one set per group."""

@@ -93,7 +93,7 @@ def _cost(errors: FloatArray, deviations: FloatArray) -> float:
 
 def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity) -> Fitted | None:
     errors = fitting(measure, from_.residuals)
-    own = _own_columns(measure, tuning, from_, errors)
+    own = own_columns(measure, tuning, from_, errors)
     t = len(from_.deviations)
     cross = known.columns @ own.T
     products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
@@ -113,7 +113,7 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
     return None
 
 
-def _own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
+def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
     """(numbers, samples): what the hypothesis's numbers do to the prediction."""
     model: MechanicalModel = tuning.tuned(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]

@@ -8,7 +8,6 @@ from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit,
 from analysis.diagnosis.screening import Mapper, Screened
 from analysis.diagnosis.standing import Standing, standing
 from analysis.diagnosis.tuning import Tuning
-from equalizer.signals.signal import FloatArray
 
 FITTED = 10
 """Hypotheses that get a first fit."""

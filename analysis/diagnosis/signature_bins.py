@@ -9,6 +9,8 @@ _BINS, _LAW_BINS = 30, 120
 _BLOCK_S = 0.5
 """Samples so far apart count as independent."""
 _FEWEST = 20
+_RESTING = 0.01
+"""Of the range, to either side of where a channel is most."""
 
 
 def binned(
@@ -49,7 +51,10 @@ def running_rms(
 
 def _edges(x: FloatArray, bins: int) -> FloatArray:
     low, high = np.quantile(x, [0.001, 0.999])
-    return np.unique(np.concatenate([np.quantile(x, np.linspace(0, 1, bins // 2)), np.linspace(low, high, bins // 2)]))
+    # A channel that rests for most of the time would have all its bins there.
+    busy = x[np.abs(x - np.median(x)) > _RESTING * (high - low)]
+    shares = np.quantile(busy if len(busy) else x, np.linspace(0, 1, bins // 2))
+    return np.unique(np.concatenate([shares, np.linspace(low, high, bins // 2)]))
 
 
 def _mean(values: FloatArray, blocks: npt.NDArray[np.int_]) -> tuple[float, float]:

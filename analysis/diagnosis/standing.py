@@ -8,6 +8,8 @@ from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.observed import Mask, Observed
 from equalizer.signals.signal import FloatArray
 
+_TINY = 1e-6
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standing:
@@ -24,8 +26,11 @@ class Standing:
 
     @property
     def chosen_by(self) -> float:
-        """Mean square over fit and choice together, in units of noise power: what explanations are compared by."""
-        return float(np.mean(self.fit**2) + np.mean(self.choose**2)) / 2
+        """What explanations are compared by: the mean over channels of the logarithm of the error power, 0 = noise.
+
+        The likelihood where each channel's error is as strong as it is: no channel drowns the others.
+        """
+        return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
 
 
 def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...], noise: FloatArray) -> Standing:

@@ -75,7 +75,7 @@ def moved(bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float) 
         play(
             laws, places, of, memory, _transposed((linear.advance, linear.by_command, linear.by_axis_force)), look,
             _whole((linear.motion, linear.motion_by_command, linear.motion_by_axis_force)),
-            np.ascontiguousarray(driven.mean), np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
+            np.require(driven.mean, requirements=["C", "W"]), np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
         )  # fmt: skip
     if driven.end is not driven.mean:
         # An acceleration shows the force of its very instant, not the last step's mean.

@@ -1,0 +1,152 @@
+"""What a finished search says, put into the document and what is drawn beside it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.document import Diagnosis
+from analysis.diagnosis.error_measure import FreeSimulation
+from analysis.diagnosis.error_table import channel_errors, errors_of
+from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.findings import Course, Findings, Signature
+from analysis.diagnosis.gather_evidence import gather_evidence
+from analysis.diagnosis.hypothesis import without_claim
+from analysis.diagnosis.intervals import standard_errors
+from analysis.diagnosis.mismatch_maps import maps_of, whole_mismatch
+from analysis.diagnosis.mismatch_rows import mismatch_rows
+from analysis.diagnosis.named_effects import Said, named_effects, said_of
+from analysis.diagnosis.noise_floor import NoiseFloor
+from analysis.diagnosis.observed import Mask
+from analysis.diagnosis.output_error import evaluated, sensitivity
+from analysis.diagnosis.rivalry import Arena
+from analysis.diagnosis.signature_curves import Names, signature_of
+from analysis.diagnosis.verdict import Judgement
+from equalizer.effects.effect import Values
+from equalizer.effects.placing import axis_letter, model_effects
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+
+def assembled(
+    arena: Arena,
+    found: Explanation,
+    judged: Judgement,
+    floors: tuple[NoiseFloor, ...],
+    names: Sequence[str],
+) -> Findings:
+    """found.after is what is named; the same as re-tuned where nothing is. names: of the recordings."""
+    measure, tuning = arena.measure, arena.tuning
+    assert isinstance(measure, FreeSimulation)
+    recording, fitted = measure.records[0].recording, found.after.fitted
+    said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
+    channels = channel_names(recording, len(measure.noise))
+    maps = maps_of(measure, found, floors)
+    document = Diagnosis(
+        verdict=judged.verdict,
+        mismatch=mismatch_rows(maps.cells["before"])
+        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
+        effects=named_effects(found, _errors(arena, found), said) if judged.named else (),
+        retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
+        remainder=()
+        if judged.verdict not in ("partly_explained", "unexplained")
+        else mismatch_rows(maps.cells["after"]) or whole_mismatch(measure, found.after),
+        fit=errors_of(measure, found),
+        error=measure.name,
+        next_experiment=None,
+    )
+    effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
+    return Findings(
+        diagnosis=document,
+        explanation=found,
+        given=tuning.model,
+        improved=replace(tuning.tuned(fitted.deviations), effects=effects),
+        named=placed,
+        evidence=gather_evidence(measure, tuning, found.retuned.fitted),
+        courses=_courses(measure, found, names),
+        noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
+        channel_errors=channel_errors(found, channels),
+        mismatch=maps.rows,
+        signatures=_signatures(arena, found, said),
+        black_box=None,
+        remarks=tuple(dict.fromkeys(remark for floor in floors for remark in floor.remarks)),
+        maps=maps.cells,
+        floor=floors[0],
+        tuning=tuning,
+        axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
+        split_s={
+            part: sum(int(getattr(r, part).sum()) for r in measure.records) / recording.sample_rate_hz
+            for part in ("fit", "choose", "test")
+        },
+    )
+
+
+def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
+    """The response's, then the position's."""
+    position = () if recording.position is None else recording.position.channels
+    return (*recording.response.channels, *position)[:count]
+
+
+def _errors(arena: Arena, found: Explanation) -> FloatArray:
+    fitted = found.after.fitted
+    known = sensitivity(arena.measure, arena.tuning, fitted.deviations, fitted.hypothesis, arena.map_)
+    return standard_errors(arena.measure, arena.tuning, fitted, known)[len(fitted.deviations) :]
+
+
+def _courses(measure: FreeSimulation, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
+    courses = []
+    for number, record in enumerate(measure.records):
+        count = record.measured.shape[1]
+        before, retuned, after = (
+            record.measured - one.fitted.residuals[number] * measure.unit
+            for one in (found.before, found.retuned, found.after)
+        )
+        courses.append(
+            Course(
+                name=names[number] if number < len(names) else f"recording {number + 1}",
+                sample_rate_hz=record.recording.sample_rate_hz,
+                channels=channel_names(record.recording, count),
+                units=_units(record.recording)[:count],
+                measured=record.measured,
+                before=before,
+                retuned=retuned,
+                after=after,
+                tested=_stretches(record.test),
+            )
+        )
+    return tuple(courses)
+
+
+def _units(recording: Recording) -> tuple[str, ...]:
+    signals = [one for one in (recording.response, recording.position) if one is not None]
+    return tuple(
+        one.unit if isinstance(one.unit, str) else one.unit[k] for one in signals for k in range(len(one.channels))
+    )
+
+
+def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
+
+
+def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature, ...]:
+    """Each named effect's, against the final model without it alone."""
+    measure, tuning, fitted = arena.measure, arena.tuning, found.after.fitted
+    assert isinstance(measure, FreeSimulation)
+    names = Names(
+        tuple(axis_letter(one, said.inputs) for one in said.inputs), said.outputs, said.response_unit, said.rotational
+    )
+    hold, drawn = measure.records[0].recording.hold, []
+    for number in range(len(fitted.hypothesis.claims)):
+        others = without_claim(fitted.hypothesis, number)
+        bare = gather_evidence(measure, tuning, evaluated(measure, tuning, fitted.deviations, others))
+        own = fitted.hypothesis.of_claim(number)
+        drawn.append(
+            signature_of(bare[0], max(own, key=lambda one: _strength(one.values)), others.placed(), names, hold)
+        )
+    return tuple(drawn)
+
+
+def _strength(values: Values) -> float:
+    """By the main number, which comes first."""
+    return abs(next(iter(values.values())))

@@ -1,0 +1,51 @@
+"""How sure a fit is of its numbers: covariances that hold where errors are neither white nor of the assumed strength.
+
+The sandwich of Huber (1967) and White (1980), its middle summed over stretches longer than the errors remember.
+"""
+
+import numpy as np
+
+from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.output_error import Fitted, Sensitivity, fitting, own_columns
+from analysis.diagnosis.tuning import Tuning
+from equalizer.signals.signal import FloatArray
+
+STRETCH_S = 0.5
+_NINETY_FIVE = 1.96
+
+
+def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray:
+    """(t + numbers,), of deviations and of the hypothesis's point; inf where the data say nothing."""
+    errors = fitting(measure, fitted.residuals)
+    columns = np.vstack([known.columns, own_columns(measure, tuning, fitted, errors)])
+    pulls = _stretches(measure, columns, errors)
+    middle = pulls @ pulls.T
+    t = len(fitted.deviations)
+    information = columns @ columns.T
+    # The calibration is an observation of its own, one standard deviation wide.
+    information[:t, :t] += np.eye(t)
+    middle[:t, :t] += np.eye(t)
+    scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
+
+
+def interval95(fitted: Fitted, number: int, standard_error: float) -> tuple[float, float]:
+    """Of a number of the hypothesis's point, in its own unit."""
+    of, at = fitted.hypothesis.numbers[number], float(fitted.hypothesis.point[number])
+    reach = _NINETY_FIVE * standard_error
+    low, high = of.value(at - reach), of.value(at + reach)
+    return min(low, high), max(low, high)
+
+
+def _stretches(measure: ErrorMeasure, columns: FloatArray, errors: FloatArray) -> FloatArray:
+    """(numbers, stretches): each column's pull, stretch by stretch."""
+    pulls, first = [], 0
+    for record in measure.records:
+        width = record.measured.shape[1] * max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
+        last = first + int(record.fit.sum()) * record.measured.shape[1]
+        for begin in range(first, last, width):
+            part = slice(begin, min(begin + width, last))
+            pulls.append(columns[:, part] @ errors[part])
+        first = last
+    return np.array(pulls).T.reshape(len(columns), -1)

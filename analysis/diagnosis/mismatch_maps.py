@@ -1,0 +1,56 @@
+"""Where the given, the re-tuned and the completed model disagree with what was recorded, by channel, band and level."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.document import Mismatch
+from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.mismatch_cells import MismatchCell, Prediction, mismatch_cells
+from analysis.diagnosis.noise_floor import NoiseFloor
+from analysis.diagnosis.rivalry import Contender
+
+Cells = tuple[MismatchCell, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Maps:
+    cells: Mapping[str, Cells]
+    """By "before", "retuned", "after"."""
+
+    @property
+    def rows(self) -> tuple[Mismatch, ...]:
+        """Of the model as given: all that was looked at."""
+        return tuple(
+            Mismatch(c.output, c.input, c.band_hz, c.amplitude, None, min(c.share, 1.0), min(c.adjusted_p_value, 1.0))
+            for c in self.cells["before"]
+        )
+
+
+def maps_of(measure: ErrorMeasure, found: Explanation, floors: tuple[NoiseFloor, ...]) -> Maps:
+    stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
+    return Maps({stage: _cells(measure, one, floors) for stage, one in stages.items()})
+
+
+def whole_mismatch(measure: ErrorMeasure, contender: Contender) -> tuple[Mismatch, ...]:
+    """One row for the worst channel over the whole band, where no cell can be told apart from its neighbours."""
+    record = measure.records[0].recording
+    worst = int(np.argmax(np.maximum(contender.standing.fit, contender.standing.choose)))
+    names = (*record.response.channels, *(() if record.position is None else record.position.channels))
+    signal = np.sqrt(np.nanmean(measure.records[0].measured[:, worst] ** 2))
+    left = float(contender.standing.fit[worst] * measure.noise[worst])
+    share = min(left / signal, 1.0) if signal > 0 else 1.0
+    inputs = "+".join(record.command.channels)
+    return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, 0.0),)
+
+
+def _cells(measure: ErrorMeasure, contender: Contender, floors: tuple[NoiseFloor, ...]) -> Cells:
+    cells: list[MismatchCell] = []
+    for record, residuals, floor in zip(measure.records, contender.fitted.residuals, floors, strict=True):
+        p = record.recording.response.samples.shape[1]
+        predicted = record.measured - residuals * measure.unit
+        position = predicted[:, p:] if predicted.shape[1] > p else None
+        cells += mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor)
+    return tuple(cells)

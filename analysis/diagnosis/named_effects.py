@@ -1,0 +1,144 @@
+"""The effects that a diagnosis names, as its document says them: numbers with intervals, rivals with reasons."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.document import Estimate, NamedEffect, Rival
+from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.hypothesis import Claim, Hypothesis
+from analysis.diagnosis.probability import probabilities
+from analysis.diagnosis.rivalry import Contender
+from analysis.diagnosis.same_within_errors import inseparable
+from analysis.diagnosis.verdict import share_of_mismatch
+from equalizer.effects.placing import axis_letter
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+RIVALS = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Said:
+    """Words that the numbers need."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    response_unit: str
+    rotational: bool
+
+
+def said_of(recording: Recording, model: MechanicalModel) -> Said:
+    unit = recording.response.unit
+    return Said(
+        recording.command.channels,
+        recording.response.channels,
+        unit if isinstance(unit, str) else unit[0],
+        model.rotational,
+    )
+
+
+def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
+    """errors: (numbers,), standard errors of the final hypothesis's point."""
+    whole, named, first = found.after.fitted.hypothesis, [], 0
+    for number, claim in enumerate(whole.claims):
+        size = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
+        rivals, likely = _rivals(found, number, said)
+        before = found.retuned if number == 0 else found.steps[number - 1]
+        named.append(
+            NamedEffect(
+                effect=claim.effect.name,
+                place=EFFECTS_BY_NAME[claim.effect.name].place,
+                axis=axis_of(claim, said),
+                share=share_of_mismatch(before, found.steps[number]),
+                probability=likely,
+                parameters=_estimates(whole, number, errors, slice(first, first + size), said),
+                rivals=rivals,
+            )
+        )
+        first += size
+    return tuple(named)
+
+
+def axis_of(claim: Claim, said: Said) -> str | None:
+    """None where all share it."""
+    if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
+        return None
+    sensed = EFFECTS_BY_NAME[claim.effect.name].place == "sensor"
+    channels = said.outputs if sensed else said.inputs
+    return axis_letter(channels[claim.sites[0]], channels)
+
+
+def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
+    contenders = found.rounds[number]
+    chances = probabilities(contenders)
+    best = contenders[0]
+    rivals: dict[str, Rival] = {}
+    for other, chance in list(zip(contenders, chances, strict=True))[1:]:
+        claim = other.fitted.hypothesis.claims[-1]
+        if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
+            continue
+        same = inseparable(best, other)
+        rivals[claim.effect.name] = Rival(claim.effect.name, chance, same, _why_not(best, other, same, said))
+        if len(rivals) == RIVALS:
+            break
+    return tuple(rivals.values()), chances[0]
+
+
+def _why_not(best: Contender, other: Contender, same: bool, said: Said) -> str:
+    worst, least = other.standing.seen, best.standing.seen
+    claim = other.fitted.hypothesis.claims[-1]
+    axis = axis_of(claim, said)
+    where = f" ({axis})" if axis else ""
+    if same:
+        return f"as good{where}: it leaves {worst:.2f} times the noise in the worst channel, the named one {least:.2f}"
+    return f"at its best{where} it leaves {worst:.3g} times the noise in the worst channel, the named one {least:.3g}"
+
+
+def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Said) -> dict[str, Estimate]:
+    claim = whole.claims[number]
+    at = _reported(whole, number, whole.point)
+    spread = {name: 0.0 for name in at}
+    for coordinate in range(own.start, own.stop):
+        if not np.isfinite(errors[coordinate]):
+            continue
+        moved = whole.point.copy()
+        moved[coordinate] += errors[coordinate]
+        for name, value in _reported(whole, number, moved).items():
+            spread[name] += (value - at[name]) ** 2
+    units = {
+        p.name: p.unit_in(said.rotational, said.response_unit) for p in EFFECTS_BY_NAME[claim.effect.name].parameters
+    }
+    return {
+        name: Estimate(value, units.get(name, "1"), _interval(value, 1.96 * float(np.sqrt(spread[name]))))
+        for name, value in at.items()
+        if np.isfinite(value)
+    }
+
+
+def _interval(value: float, reach: float) -> tuple[float, float] | None:
+    return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
+
+
+def _reported(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+    """The vocabulary's numbers: of the only axis, of the first, or where the effect's size is asked of the largest."""
+    groups = _groups(whole, number, point)
+    claim = whole.claims[number]
+    reported = [dict(claim.effect.report(values)) for values in groups]
+    main = EFFECTS_BY_NAME[claim.effect.name].main.name
+    if claim.effect.name in LARGEST and len(reported) > 1:
+        return max(reported, key=lambda one: abs(one[main]))
+    return reported[0]
+
+
+LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
+"""Whose numbers are those of the largest channel."""
+
+
+def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
+    placed = whole.placed(point)
+    first = sum(claim.groups for claim in whole.claims[:number])
+    return [dict(one.values) for one in placed[first : first + whole.claims[number].groups]]

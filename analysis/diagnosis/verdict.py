@@ -1,0 +1,44 @@
+"""What a finished search allows to be said: nothing is missing, parameters were off, physics is named, or is not."""
+
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Verdict
+from analysis.diagnosis.explain import CLEAN, Explanation
+from analysis.diagnosis.rivalry import Contender
+
+EXPLAINED = 1.12
+"""In the worst channel, errors of so many times the noise are as good as none: laws of real physics are never exact."""
+NEARLY = 3.0
+"""With errors up to so many times the noise, what was found is named beside a remainder;"""
+MOSTLY = 0.9
+"""with larger ones, where it explains so much of the logarithm of the mismatch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    verdict: Verdict
+    named: bool
+    """The effects of `Explanation.after` are to be named."""
+
+
+def judge(found: Explanation) -> Judgement:
+    """By what decisions may see; the test samples only confirm."""
+    if found.before.standing.seen <= CLEAN:
+        return Judgement("no_mismatch", False)
+    if found.retuned.standing.seen <= CLEAN:
+        return Judgement("parameters", False)
+    claims = found.after.fitted.hypothesis.claims
+    if not claims:
+        return Judgement("unexplained", False)
+    worst = found.after.standing.seen
+    if worst <= EXPLAINED:
+        return Judgement("explained", True)
+    if worst <= NEARLY or share_of_mismatch(found.retuned, found.after) >= MOSTLY:
+        return Judgement("partly_explained", True)
+    return Judgement("unexplained", False)
+
+
+def share_of_mismatch(without: Contender, with_it: Contender) -> float:
+    """Between 0 and 1: how far the errors came down from where they were to the noise, in logarithms of power."""
+    whole = without.standing.chosen_by
+    return min(max(1 - with_it.standing.chosen_by / whole, 0.0), 1.0) if whole > 0 else 0.0
