@@ -55,10 +55,9 @@ def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Lo
 def _by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
     clock = other.clock
     reference = first.base.samples(first.line(clock.align_to))
+    own = other.base.samples(other.line(clock.align))
     try:
-        found = offset_by_correlation(
-            reference, other.base.samples(other.line(clock.align)), clock.offset_s, clock.align_within_s
-        )
+        found = offset_by_correlation(reference, own, clock.offset_s, clock.align_within_s)
     except ValueError as error:
         kind = "" if isinstance(error, NoOffsetError) else "correlation is not possible: "
         raise ImportProblemError(f"clock '{clock.name}' cannot be aligned: {kind}{error}") from error

@@ -1,5 +1,9 @@
 """What a foreign file holds: arrays by name, whatever its kind."""
 
+import csv
+import struct
+import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +23,12 @@ Array = npt.NDArray[Any]
 KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
 TABLES = (".csv", ".txt", ".tsv", ".dat")
 
+_DAMAGED = (
+    OSError, ValueError, TypeError, KeyError, IndexError, RuntimeError, EOFError, MemoryError, OverflowError, csv.Error,
+    zipfile.BadZipFile, zlib.error, struct.error,
+)  # fmt: skip
+"""What numpy, scipy, h5py and pandas raise for files that are damaged or not what their name says."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrays:
@@ -32,7 +42,7 @@ class Arrays:
         return self.path.name
 
 
-def read_arrays(path: Path, csv: CsvMap) -> Arrays:
+def read_arrays(path: Path, table: CsvMap) -> Arrays:
     """Raises CannotReadError, ImportRefusedError."""
     try:
         with path.open("rb"):
@@ -40,9 +50,8 @@ def read_arrays(path: Path, csv: CsvMap) -> Arrays:
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:
-        found = _read(path, csv)
-    except (OSError, ValueError, TypeError, KeyError, RuntimeError, NotImplementedError, EOFError) as problem:
-        # What numpy, scipy, h5py and pandas raise for files that are damaged or not what their name says.
+        found = _read(path, table)
+    except _DAMAGED as problem:
         raise ImportRefusedError(
             path.name, str(problem), "Check the file; nothing else can be read from it."
         ) from problem
@@ -51,7 +60,7 @@ def read_arrays(path: Path, csv: CsvMap) -> Arrays:
     return Arrays(path, {name: np.squeeze(array) for name, array in found.items()})
 
 
-def _read(path: Path, csv: CsvMap) -> dict[str, Array]:
+def _read(path: Path, table: CsvMap) -> dict[str, Array]:
     match path.suffix.lower():
         case ".npz" | ".npy":
             return read_npz_arrays(path)
@@ -60,5 +69,5 @@ def _read(path: Path, csv: CsvMap) -> dict[str, Array]:
         case ".h5" | ".hdf5":
             return read_hdf5_arrays(path, transposed=False)
         case suffix if suffix in TABLES:
-            return read_csv_arrays(path, csv)
+            return read_csv_arrays(path, table)
     raise ValueError(f"its kind is not known here; known are {KINDS}")

@@ -18,7 +18,7 @@ Lookup = Callable[[str], Value]
 """The value of a name. Raises ImportProblemError for one that is not there."""
 
 LONGEST = 2000
-DEEPEST = 40
+DEEPEST = 200
 LARGEST = 200_000_000
 
 _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -107,7 +107,7 @@ class _Evaluation:
                 return self.lookup(name)
             case ast.Constant(value=str() as word):
                 return word
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and abs(number) < 1e300:
                 return np.float64(number)
         raise self._refused(node)
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from equalizer.signals.units import UnknownUnitError, parse_unit, quantity_of
 from study.importing.arrays import TABLES, Arrays
+from study.importing.header_units import unit_in
 from study.importing.import_map import ChannelMap, ClockMap, ImportMap, SignalRole
 
-_NAMED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*")
 _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 _COMMANDS = ("force", "torque")
 _RESPONSES = ("acceleration", "velocity", "angular velocity")
@@ -40,12 +40,6 @@ def header_map(arrays: Arrays) -> ImportMap | None:
         for column, role in zip(rest, roles, strict=True)
     )
     return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,))
-
-
-def unit_in(header: str) -> tuple[str, str]:
-    """Name and unit of a column's header; the unit is empty where it says none."""
-    match = _NAMED.fullmatch(header)
-    return (match["name"].strip(), match["unit"].strip()) if match else (header, "")
 
 
 def _column(header: str) -> _Column | None:

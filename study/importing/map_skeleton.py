@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from study.importing.arrays import Arrays
-from study.importing.header_map import unit_in
+from study.importing.header_units import unit_in
 
 _LEAST_SAMPLES = 16
 _CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}

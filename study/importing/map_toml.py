@@ -84,6 +84,7 @@ def _contradictions(found: ImportMap) -> Iterator[str]:
         if channel.clock and channel.clock not in clocks:
             yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clocks)}"
     yield from _roles(found)
+    yield from _holds(found)
     yield from _clock_contradictions(found)
     if found.part and any(clock.file for clock in found.clock):
         yield "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other"
@@ -101,6 +102,17 @@ def _roles(found: ImportMap) -> Iterator[str]:
     for needed in ("command", "response"):
         if needed not in roles:
             yield f"there is no channel with the role '{needed}'; a recording needs both command and response"
+
+
+def _holds(found: ImportMap) -> Iterator[str]:
+    """It matters how a command moves between samples, so the two places that say it must agree."""
+    for channel in found.channel:
+        says = {"held": "zero-order"}.get(channel.resample, channel.resample)
+        if channel.role == "command" and says and (says == "zero-order") != (found.hold == "zero-order"):
+            yield (
+                f"command '{channel.name}' is resampled {channel.resample}, but the recording's hold is {found.hold}; "
+                "a command either stays between its samples (held, zero-order) or it does not"
+            )
 
 
 def _clock_contradictions(found: ImportMap) -> Iterator[str]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from study.importing.arrays import Arrays
 from study.importing.expression import evaluate
 from study.importing.functions import Clock, Value
+from study.importing.header_units import unit_in
 from study.importing.map_errors import ImportProblemError, suggestion
 
 _SHOWN = 24
@@ -86,12 +87,14 @@ class Namespace:
 
 
 def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str = "") -> Namespace:
-    """Names that begin with the prefix are known without it too. Raises ImportProblemError where none begins so."""
+    """Names that begin with the prefix are known without it too, and `fx [N]` as `fx`. Raises ImportProblemError where
+    none begins so."""
     short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
+    plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not short:
         listed = Namespace(arrays.by_name, {}, arrays.name).listed()
         raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {listed}")
-    return Namespace({**arrays.by_name, **short}, definitions, arrays.name)
+    return Namespace({**plain, **arrays.by_name, **short}, definitions, arrays.name)
 
 
 def _shape(array: npt.NDArray[Any]) -> str:

@@ -109,6 +109,10 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
     if part.stop_s:
         end_s = min(end_s, begin_s + part.stop_s - (1 - SAME_INSTANT) / rate_hz)
     begin_s += np.ceil(part.start_s * rate_hz - SAME_INSTANT) / rate_hz
+    # On the samples of a clock that has this rate, so that its channels stay as they are.
+    for logger in [logger for logger in loggers if logger.base.rate_hz == rate_hz][:1]:
+        origin_s = float(logger.base.times_s(1)[0]) + logger.base.offset_s
+        begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - SAME_INSTANT) / rate_hz
     count = int(np.floor((end_s - begin_s) * rate_hz + SAME_INSTANT)) + 1
     if count < 2:
         raise ImportProblemError(
@@ -118,9 +122,8 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
 
 
 def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:
-    same = abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
     first = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
-    if same and abs(first - round(first)) < SAME_INSTANT:
+    if _same_rate(samples, grid) and abs(first - round(first)) < SAME_INSTANT:
         column = samples.values[round(first) : round(first) + grid.count]
     elif channel.resample == "":
         raise ImportProblemError(
@@ -132,6 +135,10 @@ def _on_grid(channel: ChannelMap, samples: Samples, grid: Grid, say: Callable[[s
     if missing := int(np.isnan(column).sum()):
         say(f"{channel.name}: {missing} of {len(column)} samples are missing.")
     return column
+
+
+def _same_rate(samples: Samples, grid: Grid) -> bool:
+    return abs(samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
 
 
 def _moved(channel: ChannelMap, method: Method, samples: Samples, grid: Grid, say: Callable[[str], None]) -> FloatArray:

@@ -14,17 +14,19 @@ Array = npt.NDArray[Any]
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:
     """Arrays of Python objects are left out: reading them would run code out of the file. A single `.npy` is `data`."""
-    loaded = np.load(path, allow_pickle=False)
-    if isinstance(loaded, np.ndarray):
-        return {"data": loaded}
+    with path.open("rb") as file:
+        loaded = np.load(file, allow_pickle=False)
+        return {"data": loaded} if isinstance(loaded, np.ndarray) else _members(loaded)
+
+
+def _members(archive: Any) -> dict[str, Array]:
     found: dict[str, Array] = {}
-    with loaded:
-        for name in loaded.files:
-            try:
-                found[name] = loaded[name]
-            except ValueError as problem:
-                if "pickle" not in str(problem):
-                    raise
+    for name in archive.files:
+        try:
+            found[name] = archive[name]
+        except ValueError as problem:
+            if "allow_pickle" not in str(problem):
+                raise
     return found
 
 

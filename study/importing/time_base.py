@@ -16,6 +16,8 @@ IntArray = npt.NDArray[np.int64]
 
 UNEVEN = 0.02
 """Stamps are uniform where none is further from its place than this share of a step."""
+LEFT_OUT = 0.02
+"""A uniform logger leaves out rows at no more than this share of its steps: more, and its stamps were rounded."""
 _PLAIN_DIGITS = (4, 5, 6)
 
 
@@ -110,6 +112,7 @@ def _uniform(stamps_s: Value) -> tuple[float, IntArray | None]:
         for rate_hz in (*(float(f"{about_hz:.{digits}g}") for digits in _PLAIN_DIGITS), about_hz):
             places = np.round(since_s * rate_hz).astype(np.int64)
             uneven = np.max(np.abs(since_s * rate_hz - places))
-            if uneven <= UNEVEN and (np.diff(places) >= 1).all() and 2 * len(places) > places[-1]:
+            steps = np.diff(places)
+            if uneven <= UNEVEN and (steps >= 1).all() and np.mean(steps > 1) <= LEFT_OUT:
                 return rate_hz, places
     return 0.0, None

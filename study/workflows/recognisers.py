@@ -8,6 +8,7 @@ from equalizer.tracking.trajectory import TRAJECTORY
 from protocols.loading import ProtocolError, load_protocol
 from protocols.recording_protocol import RecordingProtocol
 from protocols.schema import ADAPTERS, protocol_schema
+from study.importing.map_toml import is_map, parse_map
 from study.store import identified_model_file, recording_layout
 from study.store.csv_rows import header_problem
 from study.store.diagnosis_file import read_diagnosis
@@ -64,6 +65,14 @@ def recognise_mechanical_model(content: FileContent) -> str | None:
         f"mechanical model '{found.name}', {_count(found.coordinates, 'coordinate')}, {_count(found.inputs, 'input')}, "
         f"{_count(found.outputs, 'output')} ({found.quantity}), {effects}"
     )
+
+
+def recognise_import_map(content: FileContent) -> str | None:
+    if content.toml is None or not is_map(content.toml):
+        return None
+    found = parse_map(content.text or "", content.path)
+    channels = [*found.channel, *found.computed]
+    return f"import map for {found.device}: {_count(len(channels), 'channel')}, {_count(len(found.clock), 'clock')}"
 
 
 _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}
@@ -140,6 +149,7 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_trajectory,
     recognise_trials,
     recognise_thresholds,
+    recognise_import_map,
     recognise_protocol,
 )
 """Asked in this order; the first answer counts."""

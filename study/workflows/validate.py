@@ -12,8 +12,9 @@ from study.workflows.recognisers import RECOGNISERS, Recogniser
 from study.workflows.session_recognisers import SESSION_RECOGNISERS
 
 KNOWN = (
-    "known are recordings and identified models (HDF5), mechanical models and protocols (TOML), trajectories, forces, "
-    "trials and thresholds (CSV), diagnoses and other JSON documents with format and version, and session folders"
+    "known are recordings and identified models (HDF5), mechanical models, protocols and import maps (TOML), "
+    "trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and version, and "
+    "session folders"
 )
 
 
@@ -77,4 +78,7 @@ def _toml_problem(content: FileContent) -> str:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         return f"this is not TOML: {error}"
     keys = ", ".join(content.toml or ())
-    return f"its keys ({keys}) are neither those of a mechanical model ([model] ...) nor of a protocol (kind = ...)"
+    return (
+        f"its keys ({keys}) are neither those of a mechanical model ([model] ...) nor of a protocol (kind = ...) nor "
+        "of an import map ([[channel]] ...)"
+    )
