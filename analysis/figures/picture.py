@@ -17,9 +17,11 @@ class Picture:
     figure: Figure
     folded: bool = False
     """Shown in a report only when asked for."""
+    alternative: str = ""
+    """What is to be seen, for those who cannot see it; the title alone where empty."""
 
 
 @lru_cache(maxsize=256)
 def picture_svg(picture: Picture) -> str:
     """As `inline_svg`. Drawn once, because the page and the file beside it want the same."""
-    return inline_svg(picture.figure, picture.name, picture.title)
+    return inline_svg(picture.figure, picture.name, picture.title, picture.alternative)

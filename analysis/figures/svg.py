@@ -7,8 +7,9 @@ import matplotlib
 from matplotlib.figure import Figure
 
 
-def inline_svg(figure: Figure, name: str, title: str) -> str:
-    """The <svg> element alone, with a title for those who cannot see it. The same figure gives the same text.
+def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
+    """The <svg> element alone, with a title and a description for those who cannot see it. The same figure gives the
+    same text.
 
     name: letters, digits, hyphens; put before every id, so that two figures in a page do not share any.
     """
@@ -23,8 +24,11 @@ def inline_svg(figure: Figure, name: str, title: str) -> str:
     svg = re.sub(r'\bid="', f'id="{name}-', svg)
     svg = svg.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
     opening, rest = svg.split(">", 1)
+    named = f"{name}-title {name}-description" if description else f"{name}-title"
+    described = f'<desc id="{name}-description">{_escaped(description)}</desc>' if description else ""
     return (
-        f'{opening} role="img" aria-labelledby="{name}-title"><title id="{name}-title">{_escaped(title)}</title>{rest}'
+        f'{opening} role="img" aria-labelledby="{named}"><title id="{name}-title">{_escaped(title)}</title>'
+        f"{described}{rest}"
     )
 
 

@@ -1,0 +1,70 @@
+"""What is left over on held-out data, over frequency, beside the noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from analysis.diagnosis.remainder_spectrum import RemainderSpectrum
+from analysis.diagnosis.unit_wording import written
+from analysis.figures.diagnosis_style import AFTER, RETUNED
+from analysis.figures.picture import Picture
+from analysis.figures.style import GREY, new_figure, plain_axes, say_nothing_to_draw
+
+_COLUMNS = 3
+_SIGNAL = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
+_NOISE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
+
+
+def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
+    return Picture(
+        name="remainder",
+        title="What is left over on held-out data",
+        caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, all but noise "
+        "is explained; where it lies above, something is not.",
+        figure=draw_remainder(spectra),
+        alternative=" ".join(_in_words(one) for one in spectra),
+    )
+
+
+def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
+    if not spectra:
+        return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+    columns = min(_COLUMNS, len(spectra))
+    rows = -(-len(spectra) // columns)
+    figure = new_figure(8.8 if columns > 1 else 6.4, 0.9 + 2.1 * rows)
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for axes in grid.ravel()[len(spectra) :]:
+        axes.set_visible(False)
+    for axes, one in zip(grid.ravel(), spectra, strict=False):
+        _draw_panel(axes, one)
+    figure.supxlabel("Frequency (Hz)", fontsize=9.5)
+    handles = [_SIGNAL, RETUNED.handle, AFTER.handle, _NOISE]
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, fontsize=9, frameon=False)
+    return figure
+
+
+def _draw_panel(axes: Axes, one: RemainderSpectrum) -> None:
+    plain_axes(axes)
+    axes.loglog(one.frequency_hz, one.measured, color=GREY, linewidth=0.9)
+    if np.isfinite(one.noise).any():
+        axes.loglog(one.frequency_hz, one.noise, color=GREY, linewidth=4, alpha=0.4)
+    for stage, values in ((RETUNED, one.retuned), (AFTER, one.after)):
+        axes.loglog(one.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    axes.set_title(f"{one.channel} ({written(one.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.tick_params(labelsize=8)
+
+
+def _in_words(one: RemainderSpectrum) -> str:
+    over = one.after / one.noise
+    if not np.isfinite(over).any():
+        return f"{one.channel}: the noise is not known."
+    worst = int(np.nanargmax(over))
+    return f"{one.channel}: at most {over[worst]:.2g} times the noise, at {one.frequency_hz[worst]:.3g} Hz."

@@ -1,0 +1,129 @@
+"""What else was tried in a named effect's place, and how much error each leaves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.hypothesis import Claim
+from analysis.diagnosis.rivalry import Contender
+from analysis.diagnosis.standing import Standing
+from analysis.figures.diagnosis_style import AFTER, RETUNED, ratio_ticks
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_nothing_to_draw
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.signals.signal import FloatArray
+
+MOST_RIVALS = 8
+_ORDINALS = ("first", "second", "third", "fourth", "fifth")
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """One explanation with its errors: mean over channels (geometric) of error / noise, 1 = noise alone."""
+
+    words: str
+    seen: float
+    """On the data that were fitted to and chosen by."""
+    test: float
+    """On held-out data."""
+
+
+def tried_explanations(round_: Sequence[Contender], axes: Sequence[str]) -> tuple[Tried, ...]:
+    """The best of each hypothesis, the best first."""
+    best: dict[object, Tried] = {}
+    for one in round_:
+        key = one.fitted.hypothesis.key
+        tried = _tried(
+            ", ".join(_claim_words(claim, axes) for claim in one.fitted.hypothesis.claims[-1:]), one.standing
+        )
+        if key not in best or tried.seen < best[key].seen:
+            best[key] = tried
+    return tuple(sorted(best.values(), key=lambda one: one.seen)[:MOST_RIVALS])
+
+
+def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
+    """One per effect that was looked for."""
+    retuned = _tried("re-tuned, no physics", explanation.retuned.standing)
+    pictures = []
+    for number, round_ in enumerate(explanation.rounds, start=1):
+        tried, held = tried_explanations(round_, axes), number <= len(explanation.steps)
+        if tried:
+            pictures.append(
+                Picture(
+                    name=f"rivals-{number}",
+                    title=f"What was tried for the {_ORDINALS[number - 1]} effect"
+                    + ("" if held else "; none earned its place"),
+                    caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
+                    "together with what had been found before. Filled: the data that were fitted to and chosen by; "
+                    "open: held-out data, which decided nothing. Dashed: the re-tuned model alone.",
+                    figure=draw_rivals(tried, retuned, held),
+                    folded=not held,
+                    alternative=" ".join(f"{one.words}: {one.seen:.3g}, held-out {one.test:.3g}." for one in tried),
+                )
+            )
+    return tuple(pictures)
+
+
+def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Figure:
+    """The best on top, marked where it is held to be true."""
+    if not tried:
+        return say_nothing_to_draw(new_figure(7.4, 1.4), "Nothing was tried.")
+    figure = new_figure(7.6, 1.05 + 0.29 * len(tried))
+    axes = figure.add_subplot()
+    plain_axes(axes)
+    for row, one in enumerate(tried):
+        colour = AFTER.colour if row == 0 and held else GREY
+        axes.plot([one.seen, one.test], [row, row], color=colour, linewidth=1.2, zorder=2)
+        axes.plot(one.seen, row, "o", color=colour, markersize=6.5, zorder=3)
+        axes.plot(one.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
+    axes.axvline(retuned.seen, color=RETUNED.colour, linestyle=RETUNED.dash, linewidth=RETUNED.width, zorder=1)
+    axes.axvline(1, color=BLACK, linewidth=1.0, zorder=1)
+    _mark(axes, 1.0, "noise", "right")
+    _mark(axes, retuned.seen, "re-tuned", "left")
+    axes.set_yticks(range(len(tried)), [one.words for one in tried])
+    if held:
+        axes.get_yticklabels()[0].set_fontweight("bold")
+    axes.set_ylim(len(tried) - 0.5, -0.5)
+    axes.grid(False, axis="y")
+    values = np.array([*(one.seen for one in tried), *(one.test for one in tried), retuned.seen])
+    _scale(axes, values[np.isfinite(values)])
+    axes.set_xlabel("Error / noise", fontsize=9.5)
+    return figure
+
+
+def _mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> None:
+    axes.annotate(
+        words, (at, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
+        textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,
+    )  # fmt: skip
+
+
+def _scale(axes: Axes, values: FloatArray) -> None:
+    low, high = min(0.9, 0.9 * float(values.min(initial=1.0))), 1.15 * float(values.max(initial=1.0))
+    axes.set_xscale("log" if high > 4 else "linear")
+    axes.set_xlim(low, max(high, 1.5))
+    if high > 4:
+        ratio_ticks(axes.xaxis, low, high)
+
+
+def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
+    noun = noun_of(claim.effect.name)
+    if claim.spread != "one" or EFFECTS_BY_NAME[claim.effect.name].place == "hand":
+        return f"{noun}, {'all alike' if claim.spread == 'all' else 'each its own'}" if len(claim.sites) > 1 else noun
+    site = claim.sites[0]
+    return f"{noun}, {axes[site] if site < len(axes) else site + 1}" if len(axes) > 1 else noun
+
+
+def _tried(words: str, standing: Standing) -> Tried:
+    seen = np.concatenate([standing.fit, standing.choose])
+    return Tried(words, _mean(seen), _mean(standing.test))
+
+
+def _mean(values: FloatArray) -> float:
+    return float(np.exp(np.mean(np.log(np.maximum(values, 1e-6)))))

@@ -1,0 +1,88 @@
+"""What shows a named effect: what is missing without it, against what it hangs on, with the fitted law on it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.findings import Signature
+from analysis.diagnosis.unit_wording import scale_of
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes, say_nothing_to_draw
+from equalizer.signals.signal import FloatArray
+
+_ROUNDED = " A missing force is known only as fast as noise lets it be, so that corners look rounder than they are."
+
+
+def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
+    return tuple(
+        Picture(
+            name=f"signature-{number}",
+            title=f"What shows {noun_of(one.effect)}{f' ({one.axis})' if one.axis else ''}",
+            caption="Dots: what the model, with all else that was found, fails to explain without this effect, mean "
+            "per bin; bars: two standard errors. Line: the fitted law, simulated and averaged alike."
+            + (_ROUNDED if one.of.startswith("missing") else ""),
+            figure=draw_signature(one),
+            alternative=_in_words(one),
+        )
+        for number, one in enumerate(signatures, start=1)
+    )
+
+
+def draw_signature(signature: Signature) -> Figure:
+    figure = new_figure(6.4, 3.7)
+    if not len(signature.measured_at):
+        return say_nothing_to_draw(figure, "Too few samples show this effect to draw it.")
+    axes = figure.add_subplot()
+    plain_axes(axes)
+    along, x_factor = _label(signature.along, signature.measured_at)
+    of, y_factor = _label(signature.of, np.concatenate([signature.measured, signature.law]))
+    spectrum = signature.along.startswith("frequency")
+    axes.errorbar(
+        x_factor * signature.measured_at, y_factor * signature.measured, yerr=2 * y_factor * signature.spread,
+        fmt="o", color=BLACK, markersize=3.8, elinewidth=1.0, capsize=1.8, alpha=0.85, label="missing without it",
+        zorder=3,
+    )  # fmt: skip
+    axes.plot(
+        x_factor * signature.law_at, y_factor * signature.law, color=BLUE, linewidth=2.0, label="fitted law", zorder=2
+    )
+    if spectrum:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=0.5 * y_factor * float(signature.measured.min()))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    else:
+        axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
+        if signature.measured_at.min() < 0 < signature.measured_at.max():
+            axes.axvline(0, color=GREY, linewidth=0.8, zorder=1)
+    axes.set_xlabel(along)
+    axes.set_ylabel(of)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper right", ncols=2, fontsize=9, frameon=False)
+    return figure
+
+
+def _label(said: str, values: FloatArray) -> tuple[str, float]:
+    """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
+    words, bracket, rest = said.rpartition(" (")
+    if not bracket or "/√" in rest or rest.startswith("Hz"):
+        return said[:1].upper() + said[1:], 1.0
+    scale = scale_of(rest.removesuffix(")"), float(np.max(np.abs(values))))
+    return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
+
+
+def _in_words(signature: Signature) -> str:
+    if not len(signature.measured_at) or not len(signature.law_at):
+        return ""
+    order = np.argsort(signature.law_at)
+    law = np.interp(signature.measured_at, signature.law_at[order], signature.law[order])
+    size = float(np.sqrt(np.mean(signature.measured**2)))
+    apart = float(np.sqrt(np.mean((signature.measured - law) ** 2)))
+    share = f"{100 * apart / size:.2g} %" if size else "nothing"
+    return (
+        f"{signature.of[:1].upper()}{signature.of[1:]} against {signature.along}: from {signature.measured[0]:.3g} at "
+        f"{signature.measured_at[0]:.3g} to {signature.measured[-1]:.3g} at {signature.measured_at[-1]:.3g}. The "
+        f"fitted law differs from the dots by {share} of their size, rms."
+    )
