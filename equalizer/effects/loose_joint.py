@@ -1,6 +1,6 @@
 """A bolted joint that is loose: within a gap it only rubs, beyond it is stiff."""
 
-from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -11,15 +11,18 @@ from equalizer.effects.evidence import Evidence
 from equalizer.effects.instant import V_FREE, V_PER_N, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.sensor_path import low_passed
-from equalizer.effects.starting_values import SLOW, Beside
+from equalizer.effects.starting_values import own
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 STEPS = 8
 """Per sample."""
-GAPS = np.geomspace(0.05, 5.0, 10)
-"""Tried, over the joint's rms travel."""
+GAPS, STIFFNESSES, SLIPS = (0.3, 1.0, 3.0, 10.0), (0.05, 0.2, 0.8), (0.01, 0.1, 0.6)
+"""Tried: over the rms travel of the joint in the model; over its own stiffness; over the product of the two."""
+TRIED_S, SETTLING = 4.0, 4
+"""On how much of the record, of which one in so many is left out, because it did not begin at rest."""
+_FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
 
 @compiled_law
@@ -40,8 +43,8 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def joint_at(model: MechanicalModel, axis: int) -> FloatArray:
-    """(n,): how a joint near a driven axis moves: against the heaviest body that hangs on it, or against the ground where
-    nothing does."""
+    """(n,): how a joint near a driven axis moves: against the heaviest body that hangs on it, or against the ground
+    where nothing does."""
     along, axes = driven_axes(model)[:, axis], driven_axes(model)
     carried = np.linalg.norm(axes, axis=1) < 1e-9
     if not carried.any():
@@ -66,40 +69,35 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """By the joint's travel in the model without it, and by what forces along that travel do to the response."""
-    travel, speed = _in_joint(evidence, axis)
-    used, rms = evidence.used > 0, float(np.std(travel))
-    left = ((evidence.response - evidence.predicted) / evidence.noise)[used].ravel()
-    rubbing = -np.tanh(speed / max(SLOW * float(np.std(speed)), np.finfo(float).tiny))
-    nuisances = [_answer(evidence, axis, force)[used].ravel() for force in (-travel, -speed)]
-    beside = Beside(left, np.column_stack(nuisances))
-    slipped = _answer(evidence, axis, rubbing)[used].ravel()
+    """The best of a coarse net, by what it leaves of a part of the record."""
+    part, joint = _part(evidence, axis), joint_at(evidence.model, axis)
+    travel = float(np.std(_played(evidence, axis, _FAST, part)[1]))
+    held = max(abs(own(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
+    measured = evidence.response[part]
     tried: list[tuple[float, Values]] = []
-    for gap in (GAPS * rms).tolist():
-        beyond = -np.sign(travel) * np.maximum(np.abs(travel) - gap / 2, 0.0)
-        fit = beside.fit(_answer(evidence, axis, beyond)[used].ravel(), slipped)
-        stiffness, slip = fit.strengths.tolist()
-        if stiffness > 0:
-            tried.append((fit.explained, {"gap": gap, "stiffness": stiffness, "slip": max(slip, 0.0)}))
-    return tuple(values for _, values in sorted(tried, key=lambda item: -item[0])[:2])
+    for gap, stiffness, slip in product(GAPS, STIFFNESSES, SLIPS):
+        values = {"gap": gap * travel, "stiffness": stiffness * held, "slip": slip * held * travel}
+        off = (_played(evidence, axis, values, part)[0] - measured) / evidence.noise
+        tried.append((float(np.mean(off[len(off) // SETTLING :] ** 2)), values))
+    return tuple(values for _, values in sorted(tried, key=lambda item: item[0])[:2])
 
 
-def _in_joint(evidence: Evidence, axis: int) -> tuple[FloatArray, FloatArray]:
-    silent = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
-    bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), silent),))
-    commands = Driven(evidence.command, evidence.command)
-    looked, _ = moved(bodies, commands, (len(evidence.command), 1), 1 / evidence.sample_rate_hz)
+def _part(evidence: Evidence, axis: int) -> slice:
+    """Where the axis is driven most strongly."""
+    length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
+    power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
+    first = int(np.argmax(power[length:] - power[:-length]))
+    return slice(first, first + length)
+
+
+def _played(evidence: Evidence, axis: int, values: Values, part: slice) -> tuple[FloatArray, FloatArray]:
+    """The response (n, p), and the joint's travel (n,)."""
+    bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), values),))
+    commands, rate_hz = evidence.command[part], evidence.sample_rate_hz
+    looked, _ = moved(bodies, Driven(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
     ports = bodies.ports.shape[1]
-    return looked[:, ports - 1], looked[:, 2 * ports - 1]
-
-
-def _answer(evidence: Evidence, axis: int, force: FloatArray) -> FloatArray:
-    """(n, p): of the response to a force (n,) in the joint, over the noise."""
-    model = replace(evidence.model, input=joint_at(evidence.model, axis)[:, None])
-    bodies, one = bodies_of(model, ()), force[:, None]
-    looked, _ = moved(bodies, Driven(one, one), (len(force), 1), 1 / evidence.sample_rate_hz)
-    response = looked[:, 3 : 3 + model.outputs]
-    return low_passed(response, evidence.sample_rate_hz, model.sensor.bandwidth_hz) / evidence.noise
+    response = looked[:, 3 * ports : 3 * ports + evidence.model.outputs]
+    return low_passed(response, rate_hz, evidence.model.sensor.bandwidth_hz), looked[:, ports - 1]
 
 
 EFFECT = Effect(
