@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from study.errors import WrongUseError
+from study.importing.map_library import find_map, read_map, shipped_maps
+from study.store.file_errors import UnusableFileError
+
+OWN = """
+device = "rig"
+files = ["run*.npz"]
+separate = true
+[[clock]]
+rate_hz = 100
+[[channel]]
+role = "command"
+name = "fx"
+value = "u"
+unit = "N"
+[[channel]]
+role = "response"
+name = "ax"
+value = "y"
+unit = "m/s^2"
+"""
+
+
+@pytest.mark.parametrize("name", shipped_maps())
+def test_every_shipped_map_is_sound_and_says_what_it_is_of(name):
+    found = read_map(name)
+    assert found.map.title
+    assert found.map.files != ("*",)
+    assert found.map.segment
+
+
+def test_a_map_that_is_not_there_is_wrong_use_with_those_that_are():
+    with pytest.raises(WrongUseError) as refused:
+        read_map("silverbocks")
+    assert "'silverbocks' is neither a file nor a map that comes with hapteq; did you mean 'silverbox'" in str(
+        refused.value
+    )
+
+
+def test_a_map_in_the_folder_goes_before_ours(tmp_path):
+    for name in ("run1.npz", "run2.npz", "other.npz"):
+        np.savez(tmp_path / name, u=np.zeros(9), y=np.zeros(9))
+    (tmp_path / "own.toml").write_text(OWN)
+    (tmp_path / "nothing_of_the_kind.toml").write_text("[tool]\n")
+    found = find_map(tmp_path)
+    assert [(entry.name, [path.name for path in entry.files]) for entry in found] == [
+        ("own_run1", ["run1.npz"]), ("own_run2", ["run2.npz"]),
+    ]  # fmt: skip
+
+
+def test_a_map_in_the_folder_that_is_wrong_is_said_and_not_passed_over(tmp_path):
+    (tmp_path / "own.toml").write_text(OWN.replace("unit", "uint"))
+    with pytest.raises(UnusableFileError, match="did you mean unit"):
+        find_map(tmp_path)
+
+
+def test_a_file_of_the_same_name_with_other_arrays_is_not_ours(tmp_path):
+    for name in ("estimation.npz", "validation.npz"):
+        np.savez(tmp_path / name, u=np.zeros(9))
+    assert find_map(tmp_path) == ()
+
+
+def test_half_of_a_recording_is_not_found(tmp_path):
+    np.savez(
+        tmp_path / "estimation.npz", t_s=np.arange(9.0), u_V=0.0, y_m=0.0, y_ref_m=0.0, gain_N_per_V=1.0, kp=1, kv=1
+    )
+    assert find_map(tmp_path) == ()
