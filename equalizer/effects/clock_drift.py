@@ -12,7 +12,7 @@ WINDOW_S, LEAST_WINDOWS = 2.0, 4
 LONGEST_S = 0.1
 """By which a window may be off."""
 LARGEST_PPM = 2e4
-LEAST_SIGMA = 3.0
+LEAST_SIGMA = 5.0
 
 
 def _read(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:

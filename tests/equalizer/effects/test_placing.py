@@ -1,0 +1,81 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.placing import PlacingError, axis_letter, model_effects, placed_effects
+from equalizer.effects.simulator import simulate_mechanism
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import ModelEffect
+from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
+
+INPUTS, OUTPUTS = ("fx", "fy", "fz"), ("ax", "ay", "az")
+
+
+def written(kind: str, axis: str | None, optional: bool) -> ModelEffect:
+    parts = [part for part in EFFECTS_BY_NAME[kind].parameters if optional or not part.optional]
+    return ModelEffect(kind, axis, {part.name: 0.1 + 0.01 * number for number, part in enumerate(parts)})
+
+
+def placed(model, *effects: ModelEffect):
+    return placed_effects(replace(model, effects=effects), INPUTS, OUTPUTS)
+
+
+def test_the_catalogue_plays_every_name_of_the_vocabulary():
+    assert [effect.name for effect in CATALOGUE] == [name.name for name in EFFECT_NAMES]
+
+
+@pytest.mark.parametrize("optional", [False, True])
+@pytest.mark.parametrize("kind", [name.name for name in EFFECT_NAMES])
+def test_every_effect_of_a_file_can_be_played(bench, kind, optional):
+    model = bench.three_axes()
+    (one,) = placed(model, written(kind, None, optional))
+    assert one.sites == (0, 1, 2)
+    played = simulate_mechanism(model, 0.1 * bench.commands(3)[:500], 1000.0, [one])
+    assert np.isfinite(played.response).all()
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+def test_what_was_fitted_is_written_and_read_back_the_same(bench, effect):
+    values = {p.name: 0.1 + 0.01 * number for number, p in enumerate(effect.parameters)}
+    one = effect.sites[0] == "one"
+    fitted = type(placed(bench.three_axes(), written("force_gain", "x", False))[0])(
+        effect, (1,) if one else (0, 1, 2), values
+    )
+    model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
+    assert [one.axis for one in model.effects] == (["y"] if one else [None])
+    (again,) = placed_effects(parse_mechanical_model(mechanical_model_toml(model)), INPUTS, OUTPUTS)
+    assert again.effect is effect
+    assert again.sites == fitted.sites
+    assert {name: again.values[name] for name in values} == pytest.approx(values)
+
+
+@pytest.mark.parametrize("axis", ["y", "fy"])
+def test_an_axis_is_named_by_its_letter_or_its_channel(bench, axis):
+    assert placed(bench.three_axes(), written("coulomb_friction", axis, False))[0].sites == (1,)
+
+
+def test_a_sensors_axis_is_a_channel_of_the_response(bench):
+    assert placed(bench.three_axes(), written("sensor_gain", "az", False))[0].sites == (2,)
+    with pytest.raises(PlacingError, match="sensor_gain: the axis 'fz' is none of ax, ay, az"):
+        placed(bench.three_axes(), written("sensor_gain", "fz", False))
+
+
+def test_a_letter_that_two_channels_end_with_is_refused(bench):
+    model = replace(bench.three_axes(), effects=(written("coulomb_friction", "x", False),))
+    with pytest.raises(PlacingError, match="the axis 'x' is on several of fx, tx"):
+        placed_effects(model, ("fx", "tx"), OUTPUTS)
+
+
+def test_an_effect_beyond_the_channels_cannot_be_written(bench):
+    (one,) = placed(bench.three_axes(), written("coulomb_friction", "z", False))
+    with pytest.raises(PlacingError, match="coulomb_friction is placed at number 3, but there are 2"):
+        model_effects((one,), INPUTS[:2], OUTPUTS)
+
+
+@pytest.mark.parametrize(
+    ("channels", "letter"), [(("fx", "fy"), "y"), (("f1", "f2"), "f2"), (("left x", "right x"), "right x")]
+)
+def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter):
+    assert axis_letter(channels[1], channels) == letter
