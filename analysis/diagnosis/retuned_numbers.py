@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from analysis.diagnosis.output_error import BOUND
 from analysis.diagnosis.tuning import Tuning
 from analysis.diagnosis.unit_wording import value_text
@@ -31,20 +29,30 @@ class MovedNumber:
     @property
     def text(self) -> str:
         """ "damping fx +0.35 N s/m (2.1 standard deviations)"."""
+        return f"{self.name} {self.size} ({abs(self.deviations):.2g} standard deviations)"
+
+    @property
+    def size(self) -> str:
+        """The change, with its sign."""
         sign = "+" if self.change >= 0 else ""
         size = f"{100 * self.change:.2g} %" if self.unit == "1" else value_text(self.change, self.unit)
-        return f"{self.name} {sign}{size.replace('-', '−')} ({abs(self.deviations):.2g} standard deviations)"
+        return f"{sign}{size}".replace("-", "−")
+
+
+def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+    """deviations: (parameters,)"""
+    return tuple(
+        MovedNumber(name, float(change), unit, float(deviation))
+        for name, change, unit, deviation in zip(
+            tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
+        )
+    )
 
 
 def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
     """Those that moved by a standard deviation or more, the furthest first. deviations: (parameters,)"""
-    changes = tuning.values(deviations)
-    order = np.argsort(-np.abs(deviations))
-    return tuple(
-        MovedNumber(tuning.names[k], float(changes[k]), tuning.units[k], float(deviations[k]))
-        for k in order
-        if abs(deviations[k]) >= MOVED
-    )
+    moved = [one for one in all_numbers(tuning, deviations) if abs(one.deviations) >= MOVED]
+    return tuple(sorted(moved, key=lambda one: -abs(one.deviations)))
 
 
 def retuned_sentence(moved: Sequence[MovedNumber]) -> str:

@@ -65,7 +65,7 @@ def error_text(error: float | None) -> str:
 def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
     """Why each was passed over; those that the data cannot tell from it come in `inseparable_sentence`."""
     return tuple(
-        f"{capital(noun_of(rival.effect))} (probability {_probability(rival.probability)}): {_ended(rival.why_not)}"
+        f"{capital(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): {ended(rival.why_not)}"
         for rival in effect.rivals
         if not rival.inseparable
     )
@@ -78,7 +78,7 @@ def inseparable_sentence(effect: NamedEffect) -> str:
         return ""
     both = "both are" if len(others) == 1 else "all of them are"
     odds = ", ".join(
-        f"{noun_of(name)} {_probability(probability)}"
+        f"{noun_of(name)} {probability_text(probability)}"
         for name, probability in (
             (effect.effect, effect.probability), *((one.effect, one.probability) for one in others)
         )
@@ -115,7 +115,7 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
     if wanted is None:
         return ""
     splits = f"would tell {listed([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
-    return f"The recording that {splits}: {wanted.command}. {capital(_ended(wanted.why))}"
+    return f"The recording that {splits}: {wanted.command}. {capital(ended(wanted.why))}"
 
 
 def black_box_sentence(box: BlackBox | None) -> str:
@@ -123,11 +123,22 @@ def black_box_sentence(box: BlackBox | None) -> str:
         return ""
     fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
     errors = f"{error_text(box.test)} of the signal on the held-out data; the physics leaves {error_text(box.physics)}"
-    if box.test * _ALIKE < box.physics:
+    if black_box_beats(box):
         return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
     if box.physics * _ALIKE < box.test:
         return f"{fitted} {errors}. The physics predicts better."
     return f"{fitted} {errors}: no better."
+
+
+def black_box_beats(box: BlackBox) -> bool:
+    return box.test * _ALIKE < box.physics
+
+
+def share_sentence(effect: NamedEffect) -> str:
+    return (
+        f"It accounts for {100 * effect.share:.3g} % of the mismatch that re-tuning leaves; "
+        f"the probability that this is its name is {probability_text(effect.probability)}."
+    )
 
 
 def confirmation_sentence(fit: Errors, test: Errors) -> str:
@@ -205,9 +216,9 @@ def _noise(errors: Errors, error: float) -> str:
     return f"; noise alone would leave {error_text(errors.noise)} ({error / errors.noise:.3g} times the noise)"
 
 
-def _probability(probability: float) -> str:
+def probability_text(probability: float) -> str:
     return value_text(probability, "1") if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
 
 
-def _ended(sentence: str) -> str:
+def ended(sentence: str) -> str:
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."

@@ -128,7 +128,7 @@ def _short(value: float) -> str:
     if value < 1:
         return "1"
     if value >= 999.5:
-        return f"{min(value / 1e3, 99):.0f}k"
+        return f"{value / 1e3:.1f}k" if value < 9950 else f"{min(value / 1e3, 999):.0f}k"
     return f"{value:.1f}".removesuffix(".0") if value < 9.95 else f"{value:.0f}"
 
 

@@ -1,0 +1,81 @@
+"""How a diagnosis was made, in words, with its own numbers."""
+
+from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.mismatch_cells import LEVEL, Margin
+from analysis.diagnosis.output_error import BOUND
+from analysis.wording import listed
+
+_FREE = (
+    "The model was played from rest by the recorded commands alone, and its answer compared with what was measured, "
+    "sample by sample (free simulation)."
+)
+_FORCE = (
+    "Played freely, a model of this device drifts away. Instead, the force that it needs for the measured motion was "
+    "compared with the force that was commanded (predicted force)."
+)
+_HOW = {
+    "repeats": "from what differs between repeats of the same excitation",
+    "rest": "from what is heard while nothing is driven",
+    "quiet band": "from the frequencies above all that was driven",
+}
+_ROLES = (
+    ("fit", "were fitted to"),
+    ("choose", "served to choose between explanations"),
+    ("test", "were sealed and only looked at in the end"),
+)
+
+
+def method_paragraphs(found: Findings) -> tuple[str, ...]:
+    """Error, split, noise, re-tuning and choice, map."""
+    return (_error(found), *_split(found), *_noise(found), *_choice(found), _map())
+
+
+def _error(found: Findings) -> str:
+    measure = found.diagnosis.error
+    if measure == "free simulation":
+        how = _FREE
+    elif measure == "predicted force":
+        how = _FORCE
+    else:
+        how = (
+            "Played freely, a model of this device drifts away. Instead, it was played over "
+            f"{measure}, each begun from the measured state, and compared sample by sample."
+        )
+    return (
+        f"{how} Errors in per cent are root-mean-square over the channels, each divided by its own rms; errors in "
+        "units of the noise are root-mean-square of one channel, divided by the rms of what does not repeat in it."
+    )
+
+
+def _split(found: Findings) -> tuple[str, ...]:
+    parts = [f"{found.split_s[part]:.3g} s {did}" for part, did in _ROLES if found.split_s.get(part)]
+    return (f"Of the recorded time, {listed(parts)}.",) if parts else ()
+
+
+def _noise(found: Findings) -> tuple[str, ...]:
+    if found.floor is None:
+        return ()
+    how = _HOW.get(found.floor.how)
+    said = f"The noise was measured {how}." if how else "The noise of this recording could not be measured."
+    return (" ".join([said, *found.floor.remarks]),)
+
+
+def _choice(found: Findings) -> tuple[str, ...]:
+    if not found.diagnosis.mismatch:
+        return ()
+    return (
+        "First the model's own numbers were re-tuned, each held by the stated standard deviation of its calibration "
+        f"and moved by at most {BOUND:g} of them. Then every effect of the catalogue was tried wherever it could be, "
+        "with starting values from what was still unexplained; the likeliest were fitted together with the model's "
+        "numbers, and the best was kept where it earned its place on data that it was not fitted to. The same was done "
+        "for a further effect, at most three. A share of 0.2 % of each channel's signal counts as noise, because no "
+        "model is better than that.",
+    )
+
+
+def _map() -> str:
+    return (
+        f"In the map, a mismatch of {100 * Margin().share:g} % of the signal, or as much as recordings in which "
+        "nothing is missing have, counts as none. Significant is what is larger beyond noise, with false discoveries held at "
+        f"{100 * LEVEL:g} % by closed testing: channel, then band, then level."
+    )

@@ -1,0 +1,169 @@
+"""The page about one diagnosis: what the model lacks, how one sees it, how much better it predicts with it."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.diagnosis.document import NamedEffect
+from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.retuned_numbers import doubtful_sentences, retuned_sentence
+from analysis.diagnosis.wording import (
+    black_box_beats,
+    black_box_sentence,
+    capital,
+    confirmation_sentence,
+    effect_sentence,
+    effect_title,
+    inseparable_sentence,
+    moved_of,
+    next_experiment_sentence,
+    remainder_sentence,
+    rival_sentences,
+    share_sentence,
+    signature_texts,
+    verdict_sentence,
+)
+from analysis.figures.picture import Picture
+from analysis.reports.diagnosis_method import method_paragraphs
+from analysis.reports.diagnosis_tables import (
+    channel_table,
+    error_table,
+    mismatch_table,
+    parameter_table,
+    retuned_table,
+    rival_table,
+)
+from analysis.reports.page import Page, Section, Table, render_page
+
+
+def render_diagnosis_report(
+    found: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated_utc: str
+) -> str:
+    """HTML. pictures: of `analysis.figures.diagnosis_pictures`, for the same findings."""
+    diagnosis = found.diagnosis
+    moved = moved_of(found) if diagnosis.verdict == "parameters" else ()
+    sections = [
+        *_answer(found),
+        _where(found, pictures),
+        *(_effect(found, number, pictures) for number in range(len(diagnosis.effects))),
+        *_tried(pictures),
+        _errors(found, pictures),
+        _remainder(found, pictures),
+        _own_numbers(found),
+        *_one_sentence("A black box beside it", black_box_sentence(found.black_box)),
+        *_one_sentence("The next recording", next_experiment_sentence(diagnosis)),
+        *([Section("Remarks", points=found.remarks)] if found.remarks else []),
+        Section("How this was done", paragraphs=method_paragraphs(found)),
+    ]
+    return render_page(
+        Page(
+            title=f"Diagnosis of {found.given.name}",
+            summary=verdict_sentence(diagnosis, moved, _single(found)),
+            banner=_banner(found),
+            sections=tuple(sections),
+            generated_utc=generated_utc,
+            provenance=provenance,
+        )
+    )
+
+
+def _banner(found: Findings) -> str:
+    """What speaks against the answer."""
+    named = bool(found.diagnosis.effects)
+    doubts = [confirmation_sentence(found.diagnosis.fit.fit, found.diagnosis.fit.test)] if named else []
+    if named and found.black_box is not None and black_box_beats(found.black_box):
+        doubts.append(black_box_sentence(found.black_box))
+    return " ".join(doubt for doubt in doubts if doubt)
+
+
+def _answer(found: Findings) -> list[Section]:
+    """Where physics was named: one sentence each, and what they leave open."""
+    effects, signatures = found.diagnosis.effects, signature_texts(found)
+    if not effects:
+        return []
+    points = [
+        " ".join(filter(None, (_said(found, one, signatures), inseparable_sentence(one)))) for one in effects
+    ]  # fmt: skip
+    after = [remainder_sentence(found.diagnosis), next_experiment_sentence(found.diagnosis)]
+    return [Section("What the model lacks", points=(*points, *filter(None, after)))]
+
+
+def _where(found: Findings, pictures: Sequence[Picture]) -> Section:
+    said = () if found.maps else ("There is no map: the noise of this recording is not known.",)
+    listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch)
+    return Section(
+        "Where model and device disagree", paragraphs=said, pictures=_named(pictures, "mismatch-map"), tables=(listed,)
+    )
+
+
+def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Section:
+    effect = found.diagnosis.effects[number]
+    placed = next((one.effect for one in found.named if one.effect.name == effect.effect), None)
+    paragraphs = [_said(found, effect, signature_texts(found)), share_sentence(effect)]
+    if placed is not None:
+        paragraphs += [f"Equation: {placed.equation}.", f"Source: {placed.source}."]
+    rivals = rival_sentences(effect)
+    if not rivals and not inseparable_sentence(effect):
+        paragraphs.append("No rival came near.")
+    return Section(
+        capital(effect_title(effect, _single(found))),
+        paragraphs=(*paragraphs, *filter(None, (inseparable_sentence(effect),))),
+        pictures=_signature(found, effect, pictures),
+        tables=(parameter_table(effect), *((rival_table(effect),) if effect.rivals else ())),
+    )
+
+
+def _signature(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
+    """Of the effect at its own axis, where it stands at several."""
+    mine = [number for number, one in enumerate(found.signatures, start=1) if one.effect == effect.effect]
+    there = [number for number in mine if found.signatures[number - 1].axis == effect.axis]
+    names = {f"signature-{number}" for number in (there or mine)}
+    return tuple(picture for picture in pictures if picture.name in names)
+
+
+def _tried(pictures: Sequence[Picture]) -> list[Section]:
+    shown = _named(pictures, "rivals")
+    return [Section("What else was tried", pictures=shown)] if shown else []
+
+
+def _errors(found: Findings, pictures: Sequence[Picture]) -> Section:
+    tables: list[Table] = [error_table(found)]
+    tables += [table for part in ("test", "fit") if (table := channel_table(found, part)) is not None]
+    return Section("How well it predicts", pictures=_named(pictures, "held-out"), tables=tuple(tables))
+
+
+def _remainder(found: Findings, pictures: Sequence[Picture]) -> Section:
+    left = found.diagnosis.remainder
+    tables = (mismatch_table("What is left", left),) if left else ()
+    return Section(
+        "What is still unexplained",
+        paragraphs=(remainder_sentence(found.diagnosis),),
+        pictures=_named(pictures, "remainder"),
+        tables=tables,
+    )
+
+
+def _own_numbers(found: Findings) -> Section:
+    moved = moved_of(found)
+    said = retuned_sentence(moved) or "None had to move by more than the standard deviation of its calibration."
+    table = retuned_table(found)
+    return Section(
+        "The model's own numbers",
+        paragraphs=(said,),
+        points=doubtful_sentences(moved),
+        tables=(table,) if table is not None else (),
+    )
+
+
+def _one_sentence(heading: str, sentence: str) -> list[Section]:
+    return [Section(heading, paragraphs=(sentence,))] if sentence else []
+
+
+def _said(found: Findings, effect: NamedEffect, signatures: Mapping[str, str]) -> str:
+    return effect_sentence(effect, signatures.get(effect.effect, ""), _single(found))
+
+
+def _single(found: Findings) -> bool:
+    return found.given.inputs == 1
+
+
+def _named(pictures: Sequence[Picture], kind: str) -> tuple[Picture, ...]:
+    return tuple(picture for picture in pictures if picture.name == kind or picture.name.startswith(f"{kind}-"))

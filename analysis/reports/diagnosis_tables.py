@@ -1,0 +1,118 @@
+"""The tables of a diagnosis."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
+from analysis.diagnosis.effect_words import estimate_text, noun_of
+from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.retuned_numbers import all_numbers
+from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.wording import capital, ended, error_text, probability_text
+from analysis.reports.page import Table
+from analysis.wording import NONE, p_value
+
+_STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
+_MOST_PLACES = 12
+_PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "held-out data"}
+
+
+def parameter_table(effect: NamedEffect) -> Table:
+    rows = tuple(
+        (name.replace("_", " "), estimate_text(Estimate(one.value, one.unit)), _interval(one))
+        for name, one in effect.parameters.items()
+    )
+    return Table("Its numbers", ("Number", "Value", "95 % interval"), rows)
+
+
+def rival_table(effect: NamedEffect) -> Table:
+    rows = [(capital(noun_of(effect.effect)), probability_text(effect.probability), "named", "")]
+    rows += [
+        (
+            capital(noun_of(rival.effect)),
+            probability_text(rival.probability),
+            "cannot be told apart" if rival.inseparable else "passed over",
+            ended(rival.why_not),
+        )
+        for rival in sorted(effect.rivals, key=lambda one: (not one.inseparable, -one.probability))
+    ]
+    return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rows))
+
+
+def error_table(found: Findings) -> Table:
+    """Of both records, over all channels."""
+    rows = tuple(
+        (f"On {_PARTS[part]}", *(_error(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
+        for part, errors in (("fit", found.diagnosis.fit.fit), ("test", found.diagnosis.fit.test))
+    )
+    header = ("Error, share of the signal", *(words for _, words in _STAGES), "Noise alone")
+    return Table("Errors over all channels, root-mean-square", header, rows)
+
+
+def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
+    """In each channel's unit, with the multiple of the noise; None where no course tells the channels."""
+    if not found.courses:
+        return None
+    names, units = found.courses[0].channels, found.courses[0].units
+    stands = {stage: getattr(getattr(found.explanation, stage).standing, part) for stage, _ in _STAGES}
+    rows = []
+    for k, (name, unit) in enumerate(zip(names, units, strict=True)):
+        noise = found.noise_rms.get(name)
+        if noise is None:
+            continue
+        ratios = [
+            float(found.channel_errors.get(stage, {}).get(name, values[k]) if part == "test" else values[k])
+            for stage, values in stands.items()
+        ]
+        rows.append((name, *(f"{value_text(ratio * noise, unit)} ({ratio:.3g}×)" for ratio in ratios),
+                     value_text(noise, unit)))  # fmt: skip
+    header = ("Channel", *(f"{words} (× noise)" for _, words in _STAGES), "Noise")
+    return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
+
+
+def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
+    """The largest, folded."""
+    worst = sorted(places, key=lambda one: one.share, reverse=True)[:_MOST_PLACES]
+    rows = tuple(
+        (
+            one.output,
+            one.input,
+            f"{one.band_hz[0]:g} to {one.band_hz[1]:g} Hz",
+            NONE if one.amplitude is None else f"{one.amplitude:g}",
+            one.state or NONE,
+            f"{100 * one.share:.2g} %",
+            p_value(one.p_value),
+        )
+        for one in worst
+    )
+    more = len(places) - len(worst)
+    notes = (f"And {more} smaller {'place' if more == 1 else 'places'}.",) if more > 0 else ()
+    header = ("Channel", "Driven by", "Band", "Level", "State", "Share of the signal there", "p")
+    return Table(caption, header, rows, notes, folded=True)
+
+
+def retuned_table(found: Findings) -> Table | None:
+    """All of them, folded."""
+    if found.tuning is None:
+        return None
+    alone = all_numbers(found.tuning, found.explanation.retuned.fitted.deviations)
+    final = all_numbers(found.tuning, found.explanation.after.fitted.deviations)
+    rows = tuple(
+        (before.name, before.size, f"{before.deviations:+.2f}", after.size, f"{after.deviations:+.2f}")
+        for before, after in zip(alone, final, strict=True)
+    )
+    header = ("Number", "Re-tuned", "Standard deviations", "With what was found", "Standard deviations")
+    return Table("Every number that was left open, by how much it moved", header, rows, folded=True)
+
+
+def _error(errors: Errors, stage: str) -> str:
+    value: float | None = getattr(errors, stage)
+    return error_text(value)
+
+
+def _interval(estimate: Estimate) -> str:
+    if estimate.ci95 is None:
+        return NONE
+    text = value_text(estimate.value, estimate.unit, estimate.ci95)
+    low, high = text[text.index("[") + 1 : -1].split(", ")
+    return f"{low} to {high}"
