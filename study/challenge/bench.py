@@ -1,0 +1,89 @@
+"""The bare bench: three driven axes at a handle on a soft ground, with three oscillators attached to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+OFFSET_KG, OFFSET_STIFFNESS = 0.012, 0.03
+"""How far the off-diagonals reach: kg, and as a part of the mean stiffness."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Oscillators:
+    """Masses on springs, each moving along a direction that is fixed to the handle."""
+
+    frequency_hz: FloatArray
+    """(k,), with the handle held"""
+    mass_kg: FloatArray
+    """(k,)"""
+    damping_ratio: FloatArray
+    """(k,)"""
+    direction: FloatArray
+    """(k, 3), unit vectors"""
+
+    def and_one(
+        self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
+    ) -> "Oscillators":
+        return Oscillators(
+            np.append(self.frequency_hz, frequency_hz),
+            np.append(self.mass_kg, mass_kg),
+            np.append(self.damping_ratio, damping_ratio),
+            np.vstack([self.direction, direction]),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bench:
+    mass: FloatArray
+    """(3, 3), kg, at the handle"""
+    damping: FloatArray
+    """(3, 3), N s/m, to the ground"""
+    stiffness: FloatArray
+    """(3, 3), N/m, to the ground"""
+    oscillators: Oscillators
+
+    def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mass, damping and stiffness of handle and oscillators, (3 + k, 3 + k) each."""
+        parts = self.oscillators
+        spring = parts.mass_kg * (2 * np.pi * parts.frequency_hz) ** 2
+        damper = 2 * parts.damping_ratio * np.sqrt(spring * parts.mass_kg)
+        mass = np.zeros((3 + len(spring),) * 2)
+        mass[:3, :3] = self.mass
+        mass[3:, 3:] = np.diag(parts.mass_kg)
+        return mass, _joined(self.damping, damper, parts.direction), _joined(self.stiffness, spring, parts.direction)
+
+
+def draw_bench(random: np.random.Generator) -> Bench:
+    """A bench of the family that the labelled cases come from: rigid below 10 Hz, modes near 11, 95 and 175 Hz."""
+    mean_kg = random.uniform(0.17, 0.29)
+    mass = np.diag(mean_kg * random.uniform(0.92, 1.08, 3)) + _symmetric(random, OFFSET_KG)
+    stiffness_mean = random.uniform(90.0, 210.0)
+    stiffness = np.diag(stiffness_mean * random.uniform(0.6, 1.5, 3)) + _symmetric(
+        random, OFFSET_STIFFNESS * stiffness_mean
+    )
+    direction = random.normal(size=(3, 3))
+    oscillators = Oscillators(
+        random.uniform((9.5, 77.0, 135.0), (13.2, 110.0, 208.0)),
+        mean_kg * random.uniform((0.12, 0.08, 0.06), (0.21, 0.18, 0.14)),
+        random.uniform((0.06, 0.022, 0.016), (0.135, 0.047, 0.037)),
+        direction / np.linalg.norm(direction, axis=1, keepdims=True),
+    )
+    return Bench(mass, np.diag(random.uniform(2.6, 6.5, 3)), stiffness, oscillators)
+
+
+def _symmetric(random: np.random.Generator, reach: float) -> FloatArray:
+    upper = np.triu(random.uniform(-reach, reach, (3, 3)), 1)
+    both: FloatArray = upper + upper.T
+    return both
+
+
+def _joined(ground: FloatArray, each: FloatArray, direction: FloatArray) -> FloatArray:
+    size = 3 + len(each)
+    joined = np.zeros((size, size))
+    joined[:3, :3] = ground + direction.T @ np.diag(each) @ direction
+    joined[:3, 3:] = -direction.T * each
+    joined[3:, :3] = joined[:3, 3:].T
+    joined[3:, 3:] = np.diag(each)
+    return joined
