@@ -19,7 +19,7 @@ from study.challenge.sensor_kernel import one_pole
 
 MODES_TOLERANCE = 0.005
 WIDE = Tolerance(0.05, 3.0, 100.0, MODES_TOLERANCE)
-ROUNDS = 6
+ROUNDS, SLOPES_ANEW = 6, 2
 DECIMALS = 8
 """Significant digits of the matrices in the file."""
 
@@ -47,11 +47,12 @@ def retuned(bench: Bench, response: FloatArray, plan: DrivePlan) -> tuple[Bench,
     def predicted(at: FloatArray) -> FloatArray:
         return np.vstack([_linear_response(shifted(bench, at), command) for command in commands]) / NOISE_MPS2
 
-    for _ in range(ROUNDS):
+    slopes = np.zeros((wanted.size, 9))
+    for turn in range(ROUNDS):
         here = predicted(shift)
-        slopes = np.column_stack(
-            [(predicted(shift + h * unit) - here).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)]
-        )
+        if turn < SLOPES_ANEW:
+            each = [(predicted(shift + h * unit) - here).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)]
+            slopes = np.column_stack(each)
         change = np.linalg.lstsq(slopes, (wanted - here).ravel(), rcond=None)[0]
         shift = _within(shift + change, bench)
         if np.abs(change / steps).max() < 0.05:
