@@ -11,7 +11,6 @@ from pydantic.dataclasses import dataclass
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-Text = Annotated[str, Field(max_length=2000)]
 Resampling = Literal["", "held", "band-limited", "linear"]
 SignalRole = Literal["command", "response", "position", "excitation", "helper"]
 Kind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest"]
@@ -22,7 +21,7 @@ class CsvMap:
     """How tables are written, where it cannot be seen from the file itself."""
 
     skip_lines: Annotated[int, Field(ge=0, description="Lines before the header. Default 0.")] = 0
-    delimiter: Annotated[Text, Field(description="Between fields. Default: what the header shows.")] = ""
+    delimiter: Annotated[str, Field(description="Between fields. Default: what the header shows.")] = ""
     decimal: Annotated[Literal[".", ","], Field(description='Decimal sign. Default ".".')] = "."
     names: Annotated[
         tuple[str, ...], Field(description="Names of the columns of a table without a header. Default: none.")
@@ -33,33 +32,31 @@ class CsvMap:
 class ClockMap:
     """One logger's time. The first clock is the reference; the others are aligned to it."""
 
-    name: Annotated[Text, Field(description='Channels refer to it. Default "clock".')] = "clock"
+    name: Annotated[str, Field(description='Channels refer to it. Default "clock".')] = "clock"
     file: Annotated[
-        Text, Field(description="Which of the files it is in, as a pattern, where several files make one recording.")
+        str, Field(description="Which of the files it is in, as a pattern, where several files make one recording.")
     ] = ""
-    time: Annotated[Text, Field(description="Expression that gives the time stamps.")] = ""
-    time_unit: Annotated[Text, Field(description="Unit of the stamps; needed with `time`.")] = ""
+    time: Annotated[str, Field(description="Expression that gives the time stamps.")] = ""
+    time_unit: Annotated[str, Field(description="Unit of the stamps; needed with `time`.")] = ""
     rate_hz: Annotated[float, Field(ge=0, description="Rate of a clock without stamps.")] = 0.0
-    rate: Annotated[Text, Field(description="The same as an expression, in hertz, for a rate that is in the file.")] = (
-        ""
-    )
+    rate: Annotated[str, Field(description="The same as an expression, in hertz, for a rate that is in the file.")] = ""
     gap_s: Annotated[
         float,
         Field(ge=0, description="Stamps further apart are a gap. Default: three times the median step."),
     ] = 0.0
     offset_s: Annotated[float, Field(description="Added to its time to give that of the first clock. Default 0.")] = 0.0
     trigger: Annotated[
-        Text, Field(description="Expression on this clock whose first passage through `trigger_level` is the trigger.")
+        str, Field(description="Expression on this clock whose first passage through `trigger_level` is the trigger.")
     ] = ""
     trigger_level: Annotated[float, Field(description="See `trigger`. Default 0.")] = 0.0
     reference_trigger: Annotated[
-        Text, Field(description="Expression on the first clock that shows the same trigger.")
+        str, Field(description="Expression on the first clock that shows the same trigger.")
     ] = ""
     reference_level: Annotated[float, Field(description="See `reference_trigger`. Default 0.")] = 0.0
     align: Annotated[
-        Text, Field(description="Expression on this clock that shows the same motion as `align_to`: cross-correlated.")
+        str, Field(description="Expression on this clock that shows the same motion as `align_to`: cross-correlated.")
     ] = ""
-    align_to: Annotated[Text, Field(description="Expression on the first clock.")] = ""
+    align_to: Annotated[str, Field(description="Expression on the first clock.")] = ""
     align_within_s: Annotated[
         float, Field(gt=0, description="Largest offset that is searched, beyond `offset_s`. Default 1.")
     ] = 1.0
@@ -73,12 +70,12 @@ class ChannelMap:
         SignalRole, Field(description="What it is; a `helper` is for computed channels only and is not written.")
     ]
     name: Annotated[str, Field(min_length=1, max_length=64, description="Of the channel in the recording.")]
-    value: Annotated[Text, Field(description="Name of an array, or an expression over arrays.")]
-    unit: Annotated[Text, Field(description="Of `value`; converted to SI. `1` for a plain number.")] = ""
+    value: Annotated[str, Field(description="Name of an array, or an expression over arrays.")]
+    unit: Annotated[str, Field(description="Of `value`; converted to SI. `1` for a plain number.")] = ""
     quantity: Annotated[
-        Text, Field(description='"force", "acceleration", ... Default: the usual word for the unit.')
+        str, Field(description='"force", "acceleration", ... Default: the usual word for the unit.')
     ] = ""
-    clock: Annotated[Text, Field(description="Its clock, by name. Default: the first.")] = ""
+    clock: Annotated[str, Field(description="Its clock, by name. Default: the first.")] = ""
     resample: Annotated[
         Resampling,
         Field(
@@ -94,18 +91,18 @@ class ComputedMap:
 
     role: Annotated[SignalRole, Field(description="As for a channel.")]
     name: Annotated[str, Field(min_length=1, max_length=64, description="Of the channel in the recording.")]
-    value: Annotated[Text, Field(description="Expression over channels, by name; `clock_s` is the reference time.")]
-    unit: Annotated[Text, Field(description="Of `value`.")] = ""
-    quantity: Annotated[Text, Field(description="As for a channel.")] = ""
+    value: Annotated[str, Field(description="Expression over channels, by name; `clock_s` is the reference time.")]
+    unit: Annotated[str, Field(description="Of `value`.")] = ""
+    quantity: Annotated[str, Field(description="As for a channel.")] = ""
 
 
 @dataclass(frozen=True, config=STRICT)
 class PartMap:
     """A stretch of the recording, from one file. Without any, every file is one part, in the order given."""
 
-    file: Annotated[Text, Field(description='Pattern; each file that fits is one part, in order. Default "*".')] = "*"
+    file: Annotated[str, Field(description='Pattern; each file that fits is one part, in order. Default "*".')] = "*"
     prefix: Annotated[
-        Text, Field(description="Arrays of this part begin so; expressions leave it away. Default: none.")
+        str, Field(description="Arrays of this part begin so; expressions leave it away. Default: none.")
     ] = ""
     start_s: Annotated[float, Field(ge=0, description="Where to begin, after the first sample. Default 0.")] = 0.0
     stop_s: Annotated[float, Field(ge=0, description="Where to end, after the first sample. Default 0: the end.")] = 0.0
@@ -119,8 +116,8 @@ class SegmentMap:
     """What samples are, counted on the recording's grid within each part that fits."""
 
     kind: Annotated[Kind, Field(description="Of the excitation.")]
-    file: Annotated[Text, Field(description='Parts from files that fit this pattern. Default "*".')] = "*"
-    prefix: Annotated[Text, Field(description='Parts whose prefix fits this pattern. Default "*".')] = "*"
+    file: Annotated[str, Field(description='Parts from files that fit this pattern. Default "*".')] = "*"
+    prefix: Annotated[str, Field(description='Parts whose prefix fits this pattern. Default "*".')] = "*"
     start: Annotated[int, Field(description="First sample. Default 0. Negative: counted from the end.")] = 0
     stop: Annotated[int, Field(description="The sample after the last. Default 0: the end; negative: from it.")] = 0
     start_s: Annotated[float, Field(ge=0, description="In place of `start`.")] = 0.0
@@ -144,7 +141,7 @@ class ImportMap:
 
     channel: Annotated[tuple[ChannelMap, ...], Field(min_length=1, description="Channels, one [[channel]] each.")]
     device: Annotated[str, Field(min_length=1, max_length=200, description="What was recorded.")]
-    title: Annotated[Text, Field(description="What the recording is. Default: empty.")] = ""
+    title: Annotated[str, Field(description="What the recording is. Default: empty.")] = ""
     files: Annotated[
         tuple[str, ...],
         Field(min_length=1, description='Patterns of the file names that it is for, in order. Default ["*"].'),

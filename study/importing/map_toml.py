@@ -16,7 +16,8 @@ from study.store.file_errors import UnusableFileError
 KIND = "import map"
 
 _ADAPTER: TypeAdapter[ImportMap] = TypeAdapter(ImportMap)
-_SCHEMA: Node = _ADAPTER.json_schema()
+MAP_SCHEMA: Node = _ADAPTER.json_schema()
+"""JSON Schema of a map: docs/importing.md is made from it."""
 
 
 def parse_map(text: str, source: Path) -> ImportMap:
@@ -42,7 +43,7 @@ def is_map(values: dict[str, Any]) -> bool:
 def _problems(errors: Sequence[Any]) -> Iterator[str]:
     for error in errors:
         place: Place = error["loc"]
-        key = key_path(_SCHEMA, place)
+        key = key_path(MAP_SCHEMA, place)
         if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
             yield _unknown(key, place)
         elif error["type"] == "missing":
@@ -52,8 +53,8 @@ def _problems(errors: Sequence[Any]) -> Iterator[str]:
 
 
 def _unknown(key: str, place: Place) -> str:
-    table = node_at(_SCHEMA, place[:-1])
-    known = keys_of(_SCHEMA, table) if table else ()
+    table = node_at(MAP_SCHEMA, place[:-1])
+    known = keys_of(MAP_SCHEMA, table) if table else ()
     meant = nearest_key(str(place[-1]), known)
     return f"{key} is no key of a map" + (f"; did you mean {meant}" if meant else f"; keys here are {', '.join(known)}")
 
@@ -63,13 +64,18 @@ def _given(value: Any) -> str:
 
 
 def _allowed(place: Place) -> str:
-    node = node_at(_SCHEMA, place)
+    node = node_at(MAP_SCHEMA, place)
     if node is None:
         return "a number or a text"
-    whole = resolved(_SCHEMA, node)
+    return allowed_in_map(node, str(place[-1]))
+
+
+def allowed_in_map(node: Node, key: str) -> str:
+    """In words, what the value of a key may be."""
+    whole = resolved(MAP_SCHEMA, node)
     if whole.get("type") == "object" and "properties" not in whole:
         return "a table"
-    return allowed(_SCHEMA, node, str(place[-1]))
+    return allowed(MAP_SCHEMA, node, key)
 
 
 def _contradictions(found: ImportMap) -> Iterator[str]:

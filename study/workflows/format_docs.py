@@ -1,4 +1,4 @@
-"""docs/formats.md and docs/schemas/*.json, made from the code that reads and writes the files.
+"""docs/formats.md, docs/importing.md and docs/schemas/*.json, made from the code that reads and writes the files.
 
 `python -m study.workflows.format_docs docs` writes them again; a test says when that is due.
 """
@@ -27,6 +27,7 @@ from study.store.csv_rows import columns, in_words
 from study.store.layout import Entry
 from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.store.text_file import write_text
+from study.workflows.importing_docs import importing_markdown
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,7 @@ def formats_markdown() -> str:
 def documents() -> dict[str, str]:
     """Every generated file: its path under docs, and its text."""
     schemas = {f"schemas/{schema.file}": json.dumps(schema.make(), indent=2) + "\n" for schema in SCHEMAS}
-    return {"formats.md": formats_markdown(), **schemas}
+    return {"formats.md": formats_markdown(), "importing.md": importing_markdown(), **schemas}
 
 
 def write_documents(folder: Path) -> None:

@@ -96,6 +96,13 @@ def test_a_table_is_known_by_its_header_whatever_its_name(tmp_path):
     assert sound(tmp_path / "c.csv") == "table of 0 thresholds"
 
 
+def test_an_import_map_is_described(tmp_path):
+    channel = '[[channel]]\nrole = "{}"\nname = "x"\nvalue = "x"\nunit = "N"\n'
+    text = 'title = "t"\ndevice = "rig"\n[[clock]]\nrate_hz = 100\n' + channel.format("command")
+    (tmp_path / "m.toml").write_text(text + channel.format("response"))
+    assert sound(tmp_path / "m.toml") == "import map for rig: 2 channels, 1 clock"
+
+
 def test_a_diagnosis_is_described(tmp_path):
     errors = {"before": 0.1, "retuned": 0.1, "after": 0.1, "noise": None}
     payload = {
