@@ -9,7 +9,7 @@ from equalizer.effects.bodies import bodies_of, moved
 from equalizer.effects.command_path import Driven
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import STEP_S, X_FREE, X_PER_N, X
+from equalizer.effects.instant import F_END, STEP_S, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import own
 from equalizer.plant.linear_simulation import driven_axes
@@ -36,7 +36,10 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         push /= 1 + at[X_PER_N] * (0.5 * stiffness + rate)
         if end - at[X_PER_N] * push < 0:
             push = 0.5 * stiffness * start
-        return float(-way * max(push, 0.0))
+        push = max(push, 0.0)
+        end -= at[X_PER_N] * push
+        at[F_END] = -way * max(stiffness * end + rate * (end - start), 0.0) if end > 0 else 0.0
+        return float(-way * push)
     return 0.0
 
 

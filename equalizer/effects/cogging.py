@@ -4,7 +4,7 @@ import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import Beside, Moving, beside_linear, moving
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -23,6 +23,7 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     start, force = np.sin(of[1] * at[X] + of[2]), 0.0
     for _ in range(4):
         force = 0.5 * of[0] * (start + np.sin(of[1] * (at[X_FREE] + at[X_PER_N] * force) + of[2]))
+    at[F_END] = of[0] * np.sin(of[1] * (at[X_FREE] + at[X_PER_N] * force) + of[2])
     return float(force)
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import V_FREE, V_PER_N
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import beside_linear, sliding
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -13,9 +13,7 @@ from equalizer.signals.signal import FloatArray
 
 @compiled_law
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The force that stops the axis by the end of the step, if friction is strong enough for it."""
-    stopping = -at[V_FREE] / at[V_PER_N]
-    return float(min(max(stopping, -of[0]), of[0]))
+    return rubbing(of[0], of[0], at)
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

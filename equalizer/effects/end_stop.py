@@ -4,7 +4,7 @@ import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import Beside, Moving, beside_linear, moving
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -18,7 +18,7 @@ SHARES, FINER = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean of the force at the step's start and end; a stop pushes back only, and how far one is in it at the end
     depends on the force."""
-    force = 0.0
+    force = last = 0.0
     for side in range(2):
         way = of[2 + side]
         stiffness = of[1] if side == 0 else of[1] * of[4]
@@ -28,6 +28,8 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         if end - at[X_PER_N] * push < 0:
             push = 0.5 * stiffness * start
         force -= way * max(push, 0.0)
+        last -= way * stiffness * max(end - at[X_PER_N] * push, 0.0)
+    at[F_END] = last
     return float(force)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import beside_linear, moving
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -20,6 +20,7 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         end = at[X_FREE] + at[X_PER_N] * force
         off = force + half * (start + end**3)
         force -= off / (1 + 3 * half * at[X_PER_N] * end * end)
+    at[F_END] = -of[0] * (at[X_FREE] + at[X_PER_N] * force) ** 3
     return float(force)
 
 

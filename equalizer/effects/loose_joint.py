@@ -6,9 +6,10 @@ import numpy as np
 
 from equalizer.effects.bodies import bodies_of, moved
 from equalizer.effects.command_path import Driven
+from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import V_FREE, V_PER_N, X_FREE, X_PER_N, X
+from equalizer.effects.instant import F_END, V_FREE, V_PER_N, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.sensor_path import low_passed
 from equalizer.effects.starting_values import own
@@ -29,7 +30,7 @@ _FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The spring beyond the gap, between its force at the step's start and end; then what friction can stop."""
     half, stiffness, slip = 0.5 * of[0], of[1], of[2]
-    spring = 0.0
+    spring = last = 0.0
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start > 0 or end > 0:
@@ -37,9 +38,12 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             if end - at[X_PER_N] * push < 0:
                 push = 0.5 * stiffness * start
             spring = -way * max(push, 0.0)
+            last = -way * stiffness * max(end + way * at[X_PER_N] * spring, 0.0)
             break
-    stopping = -(at[V_FREE] + at[V_PER_N] * spring) / at[V_PER_N]
-    return float(spring + min(max(stopping, -slip), slip))
+    at[V_FREE] += at[V_PER_N] * spring
+    slipped = rubbing(slip, slip, at)
+    at[F_END] += last
+    return float(spring + slipped)
 
 
 def joint_at(model: MechanicalModel, axis: int) -> FloatArray:

@@ -12,7 +12,20 @@ import numpy.typing as npt
 from numba import njit, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from equalizer.effects.instant import A_FREE, A_PER_N, LENGTH, STEP_S, TIME_S, V_FREE, V_PER_N, X_FREE, X_PER_N, V, X
+from equalizer.effects.instant import (
+    A_FREE,
+    A_PER_N,
+    F_END,
+    LENGTH,
+    STEP_S,
+    TIME_S,
+    V_FREE,
+    V_PER_N,
+    X_FREE,
+    X_PER_N,
+    V,
+    X,
+)
 from equalizer.signals.signal import FloatArray
 
 LAWS = 6
@@ -67,23 +80,25 @@ with warnings.catch_warnings():
         return total
 
     @njit(
-        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _THREE, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _VECTOR, _VECTOR),
+        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _THREE, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _VECTOR),
         cache=True, nogil=True, error_model="numpy",
     )  # fmt: skip
     def _push(  # noqa: PLR0913 - a kernel takes flat arrays
         laws: Any, places: Integers, of: FloatArray, memory: FloatArray, motion: Three, state: FloatArray,
         u: FloatArray, free: FloatArray, by_force: FloatArray, force: FloatArray, at: FloatArray,
     ) -> None:  # fmt: skip
-        """Finds the forces (ports,) of one step and lets them act on `free`, the state at its end without them."""
-        ports = force.shape[0]
+        """Finds the forces (2, ports) over one step and at its end, and lets them act on `free`, the state at its end
+        without them."""
+        ports = force.shape[1]
         before, items = memory.copy(), places.shape[0]
-        own = np.zeros(items)
+        own, own_end = np.zeros(items), np.zeros(items)
         force[:] = 0.0
         for sweep in range(SWEEPS if items > 1 else 1):
             for item in range(items):
                 port, kept, end = places[item, 1], places[item, 4], places[item, 5]
                 if sweep > 0:
-                    force[port] -= own[item]
+                    force[0, port] -= own[item]
+                    force[1, port] -= own_end[item]
                     for i in range(free.shape[0]):
                         free[i] -= by_force[port, i] * own[item]
                     memory[kept:end] = before[kept:end]
@@ -92,11 +107,14 @@ with warnings.catch_warnings():
                 at[X_PER_N] = _row(motion[0], port, by_force[port])
                 at[V_PER_N] = _row(motion[0], ports + port, by_force[port])
                 row = 2 * ports + port
-                at[A_FREE] = _row(motion[0], row, state) + _row(motion[1], row, u) + _row(motion[2], row, force)
+                at[A_FREE] = _row(motion[0], row, state) + _row(motion[1], row, u) + _row(motion[2], row, force[0])
                 at[A_PER_N] = motion[2][row, port]
+                at[F_END] = np.nan
                 added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], memory[kept:end], at)
                 own[item] = added
-                force[port] += added
+                own_end[item] = added if np.isnan(at[F_END]) else at[F_END]
+                force[0, port] += added
+                force[1, port] += own_end[item]
                 for i in range(free.shape[0]):
                     free[i] += by_force[port, i] * added
 
@@ -114,16 +132,16 @@ with warnings.catch_warnings():
         looked, forces = out
         n, ports, size = looked.shape[0], forces.shape[1], state.shape[0]
         fine = command.shape[0] == n * steps and steps > 1
-        free, before, force = np.empty(size), np.zeros(command.shape[1]), np.zeros(ports)
+        free, before, force = np.empty(size), np.zeros(command.shape[1]), np.zeros((2, ports))
         at, seen = np.zeros(LENGTH), np.empty(looked.shape[1])
         at[STEP_S] = step_s
         for k in range(n):
             seen[:] = 0.0
             _add(seen, look[0], state)
             _add(seen, look[1], before)
-            _add(seen, look[2], force)
+            _add(seen, look[2], force[1])
             looked[k] = seen
-            forces[k] = force
+            forces[k] = force[1]
             for step in range(steps):
                 u = command[k * steps + step] if fine else command[k]
                 free[:] = 0.0

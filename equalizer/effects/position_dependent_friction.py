@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import V_FREE, V_PER_N, X_FREE, X
+from equalizer.effects.instant import X_FREE, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import beside_linear, sliding
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -13,11 +14,10 @@ from equalizer.signals.signal import FloatArray
 
 @compiled_law
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """What stops the axis, up to the friction at the step's mean position."""
+    """With the friction at the step's mean position."""
     mean = 0.5 * (at[X] + at[X_FREE])
     level = max(of[0] * (1 + of[1] * mean + of[2] * mean * mean), 0.0)
-    stopping = -at[V_FREE] / at[V_PER_N]
-    return float(min(max(stopping, -level), level))
+    return rubbing(level, level, at)
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

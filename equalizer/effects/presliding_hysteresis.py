@@ -5,7 +5,7 @@ import numpy as np
 from equalizer.effects.bristle_kernel import bent
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import X_FREE, X_PER_N, X
+from equalizer.effects.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import beside_linear, best_of, moving
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -40,6 +40,7 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     full = longest * np.sign(travel)
     bend = full + (start - full) * np.exp(-abs(travel) / longest)
     memory[0] = bend
+    at[F_END] = -stiffness * bend
     return float(-stiffness * ((1 - late) * start + late * bend))
 
 

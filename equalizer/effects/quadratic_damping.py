@@ -4,7 +4,7 @@ import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import V_FREE, V_PER_N, V
+from equalizer.effects.instant import F_END, V_FREE, V_PER_N, V
 from equalizer.effects.mechanism_kernel import compiled_law
 from equalizer.effects.starting_values import beside_linear, moving
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -17,6 +17,7 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     reach = 0.5 * of[0] * at[V_PER_N]
     aim = at[V_FREE] - reach * at[V] * abs(at[V])
     end = 2 * aim / (1 + np.sqrt(1 + 4 * reach * abs(aim)))
+    at[F_END] = -of[0] * end * abs(end)
     return float(-0.5 * of[0] * (at[V] * abs(at[V]) + end * abs(end)))
 
 

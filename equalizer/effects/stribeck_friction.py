@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.instant import V_FREE, V_PER_N, V
@@ -18,12 +19,11 @@ _MORE = 1.2
 
 @compiled_law
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """What stops the axis, up to the friction at the step's mean velocity, which itself depends on the force."""
-    stopping = -at[V_FREE] / at[V_PER_N]
+    """With the friction at the step's mean velocity, which itself depends on the force."""
     mean, force = at[V], 0.0
     for _ in range(3):
         level = of[0] + (of[1] - of[0]) * np.exp(-((mean / of[2]) ** 2))
-        force = min(max(stopping, -level), level)
+        force = rubbing(level, level, at)
         mean = 0.5 * (at[V] + at[V_FREE] + at[V_PER_N] * force)
     return float(force)
 
