@@ -104,6 +104,7 @@ class HapteqApp(App[None]):
             case Finished():
                 self._end_sitting(outcomes.finished(said), said)
             case Failed() if self._sitting is None:
+                self._archive.end_diagnosing()
                 self._panel(outcomes.failed(said, at_home=True), said.path)
             case Failed():
                 self._end_sitting(outcomes.failed(said, at_home=False), said)
@@ -231,6 +232,9 @@ class HapteqApp(App[None]):
     @on(home_messages.WithdrawWanted)
     def _archive_wanted(self, wanted: ArchiveWanted) -> None:
         self._engine.send(command_for(wanted))
+
+    async def on_diagnose_wanted(self, wanted: home_messages.DiagnoseWanted) -> None:
+        await self._archive.diagnose(wanted)
 
     def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
         self._watching.open(wanted.path, lambda request: self._engine.send(AskBeside(wanted.path, request)))

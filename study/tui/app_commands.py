@@ -14,6 +14,7 @@ TWINS = {
     "resume": "hapteq resume SESSION",
     "decide('resume')": "hapteq resume SESSION",
     "analyze": "hapteq analyze SESSION",
+    "diagnose": "hapteq diagnose REC.h5 --model MODEL.toml --out DIR",
     "withdraw": "hapteq withdraw SESSION",
     "watch": "hapteq watch SESSION",
     "past": "hapteq sessions",

@@ -9,11 +9,31 @@ from textual.app import App
 
 from study.session.archive_views import DiagnosisView, SessionView
 from study.tui.app_start import AppStart
-from study.tui.home_messages import AnalyzeWanted, DiagnosisWanted, SessionWanted, WithdrawWanted
-from study.tui.link.from_engine import Diagnosis, FromEngine, Home, Preparing, Session, Trouble, Withdrawn
-from study.tui.link.to_engine import Analyze, Command, ShowDiagnosis, ShowHome, ShowSession, ToEngine, Withdraw
+from study.tui.home_messages import AnalyzeWanted, DiagnoseWanted, DiagnosisWanted, SessionWanted, WithdrawWanted
+from study.tui.link.from_engine import (
+    Diagnosis,
+    FromEngine,
+    Home,
+    Preparing,
+    Session,
+    Trouble,
+    Withdrawn,
+    Working,
+)
+from study.tui.link.to_engine import (
+    Analyze,
+    Command,
+    Diagnose,
+    LetGo,
+    ShowDiagnosis,
+    ShowHome,
+    ShowSession,
+    ToEngine,
+    Withdraw,
+)
 
 if TYPE_CHECKING:
+    from study.tui.screens.diagnosing import DiagnosingScreen
     from study.tui.screens.home import HomeScreen
     from study.tui.screens.session import SessionScreen
 
@@ -42,6 +62,7 @@ class ArchiveScreens:
         self._home: HomeScreen | None = None
         self._session: SessionScreen | None = None
         self._session_path = ""
+        self._diagnosing: DiagnosingScreen | None = None
 
     async def home(self) -> None:
         """The start screen at once, and its list when it is read."""
@@ -65,13 +86,35 @@ class ArchiveScreens:
                 self._home.show(view)
             case Session(view=view):
                 await self._show_session(view)
+            case Working(what=what, share=share) if self._diagnosing is not None:
+                self._diagnosing.show(what, share)
             case Diagnosis(view=view):
+                self.end_diagnosing()
                 await self._show_diagnosis(view)
             case Withdrawn(sessions=sessions):
                 self._app.notify(f"Everything of the participant was erased: {', '.join(sessions)}.", markup=False)
                 await self.home()
             case Trouble(sentence=sentence) | Preparing(sentence=sentence):
                 self._app.notify(sentence, markup=False)
+
+    async def diagnose(self, wanted: DiagnoseWanted) -> None:
+        """The engine works through one at a time; so does this screen, which is taken off when it is over."""
+        from study.tui.screens.diagnosing import DiagnosingScreen
+
+        def stopped(somebody: bool | None) -> None:
+            self._diagnosing = None
+            if somebody:
+                self._send(LetGo())
+
+        self._send(Diagnose(wanted.sources, wanted.model, wanted.out))
+        self._diagnosing = DiagnosingScreen("Getting ready.")
+        await self._app.push_screen(self._diagnosing, stopped)
+
+    def end_diagnosing(self) -> None:
+        """It is over, one way or another; whatever was opened over its screen goes too."""
+        diagnosing, self._diagnosing = self._diagnosing, None
+        while diagnosing is not None and diagnosing in self._app.screen_stack:
+            self._app.pop_screen()
 
     async def _show_session(self, view: SessionView) -> None:
         from study.tui.screens.session import SessionScreen

@@ -62,5 +62,17 @@ class DiagnosisWanted(Message):
 
 
 @dataclass(eq=False)
+class DiagnoseWanted(Message):
+    """Compare recordings with a model."""
+
+    sources: tuple[str, ...]
+    """Files, or one session's folder."""
+    model: str
+    """Empty: none is given."""
+    out: str
+    """Folder for the results; empty: a new one near what is diagnosed."""
+
+
+@dataclass(eq=False)
 class HomeWanted(Message):
     """Back to the start screen, with its list read anew."""

@@ -1,12 +1,12 @@
 """From recordings and a model to a folder that says what physics the model lacks."""
 
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-
 from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.screening import Mapper
@@ -18,10 +18,15 @@ from study.store.new_folder import new_folder, require_new_folder
 from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, read_input
 from study.workflows.worker_threads import worker_threads
 from study.workflows.write_diagnosis import write_diagnosis_into
-from study.workflows.write_twin import TWIN_NAME, twin_model
+from study.workflows.write_twin import TwinPlan, write_twin
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
 """Shares of the work at which the recordings are read, a model is fitted where none was given, and all is computed."""
+
+TWIN_SAID = (
+    "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
+    "recordings with nobody at the handle, as `hapteq twin` writes it."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +96,18 @@ def _model(plan: DiagnosePlan, found: DiagnosisInput, on_progress: Progress) -> 
     if plan.model is not None:
         return given_model(plan.model, found), ()
     if found.simulated:
-        return twin_model(), (f"No model was given: the session was compared with {TWIN_NAME}.",)
+        return _twin(_within(on_progress, READ, FITTED)), (TWIN_SAID,)
     on_progress("fitting a linear model, as none was given", READ)
     within = _within(on_progress, READ, FITTED)
     return fitted_model(found, lambda share: within("fitting a linear model, as none was given", share))
+
+
+def _twin(on_progress: Progress) -> MechanicalModel:
+    what = "identifying the simulated device's twin"
+    on_progress(what, 0.0)
+    with tempfile.TemporaryDirectory() as folder:
+        plan = TwinPlan(Path(folder) / "twin.toml")
+        return write_twin(plan, lambda share: on_progress(what, share)).model
 
 
 def _within(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:

@@ -2,19 +2,20 @@
 
 from pathlib import Path
 
-from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Mismatch, NamedEffect, Rival, Verdict
+from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.wording import (
+    effect_sentence,
+    inseparable_sentence,
+    remainder_sentence,
+    rival_sentences,
+    verdict_sentence,
+)
 from analysis.wording import NONE, listed
 from study.session.archive_views import DiagnosisView
 from study.session.printable import printable
 from study.store.diagnosis_file import read_diagnosis
 
-VERDICTS: dict[Verdict, str] = {
-    "no_mismatch": "Model and device agree: what is left is no larger than repeats allow.",
-    "parameters": "The model's own parameters explain the mismatch: re-tuned within their tolerances, it fits.",
-    "explained": "The mismatch is explained by physics that the model lacks, named below.",
-    "partly_explained": "The mismatch is explained in part: physics that the model lacks is named, and more remains.",
-    "unexplained": "There is a mismatch, and nothing in the catalogue of effects earns its place.",
-}
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
 FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")
 
@@ -25,9 +26,9 @@ def diagnosis_view(path: Path) -> DiagnosisView:
     report = path.parent / "report.html"
     view = DiagnosisView(
         path=str(path),
-        verdict=VERDICTS[diagnosis.verdict],
-        sentences=tuple(_effect(effect) for effect in diagnosis.effects),
-        rivals=tuple(_rival(effect, rival) for effect in diagnosis.effects for rival in effect.rivals),
+        verdict=verdict_sentence(diagnosis),
+        sentences=tuple(sentence for effect in diagnosis.effects for sentence in _effect(effect)),
+        rivals=tuple(sentence for effect in diagnosis.effects for sentence in rival_sentences(effect)),
         mismatch=_mismatches(diagnosis.mismatch),
         fit=(FIT_HEADER, _errors("fit", diagnosis.fit.fit), _errors("test", diagnosis.fit.test)),
         remainder=_mismatches(diagnosis.remainder),
@@ -38,25 +39,12 @@ def diagnosis_view(path: Path) -> DiagnosisView:
     return printable(view)
 
 
-def _effect(effect: NamedEffect) -> str:
-    parameters = listed([_estimate(name, estimate) for name, estimate in effect.parameters.items()])
-    return (
-        f"{_plain(effect.effect)[:1].upper()}{_plain(effect.effect)[1:]} in the {effect.place}"
-        f"{f', axis {effect.axis}' if effect.axis else ''}: {parameters}. It explains {_percent(effect.share)} of the "
-        f"mismatch left after re-tuning (probability {_probability(effect.probability)})."
+def _effect(effect: NamedEffect) -> tuple[str, ...]:
+    said = (
+        f"{effect_sentence(effect)} It explains {_percent(effect.share)} of the mismatch left after re-tuning "
+        f"(probability {_probability(effect.probability)})."
     )
-
-
-def _estimate(name: str, estimate: Estimate) -> str:
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    interval = f" (95 %: {estimate.ci95[0]:.3g} to {estimate.ci95[1]:.3g})" if estimate.ci95 else " (no interval)"
-    return f"{_plain(name)} {estimate.value:.3g}{unit}{interval}"
-
-
-def _rival(effect: NamedEffect, rival: Rival) -> str:
-    tie = f" These data cannot tell it from {_plain(effect.effect)}." if rival.inseparable else ""
-    why = rival.why_not.strip()
-    return f"{_plain(rival.effect)} (probability {_probability(rival.probability)}): {why or 'no reason is given'}{tie}"
+    return tuple(filter(None, (said, inseparable_sentence(effect))))
 
 
 def _mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:
@@ -84,19 +72,15 @@ def _next(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     if following is None:
         return ""
-    splits = f" It tells {listed([_plain(name) for name in following.splits])} apart." if following.splits else ""
+    splits = f" It tells {listed([noun_of(name) for name in following.splits])} apart." if following.splits else ""
     return f"{following.command}\n{following.why}{splits}"
 
 
 def _notes(diagnosis: Diagnosis) -> tuple[str, ...]:
+    retuned = (f"Re-tuned: {listed(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
+    left = (remainder_sentence(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
     measured = f"Errors are normalised root-mean-square over the channels, measured by {diagnosis.error}."
-    if not diagnosis.retuned:
-        return (measured,)
-    return (measured, f"Re-tuned: {listed(list(diagnosis.retuned))}.")
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")
+    return (measured, *retuned, *left)
 
 
 def _percent(share: float) -> str:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from analysis.reports.diagnosis_report import diagnosis_pictures, render_diagnosis_report
-
 from analysis.diagnosis.findings import Findings
+from analysis.figures.diagnosis_pictures import diagnosis_pictures
+from analysis.reports.diagnosis_report import render_diagnosis_report
 from study.devices.clock import RealClock
 from study.store.diagnosis_file import write_diagnosis
 from study.store.mechanical_model_file import write_mechanical_model

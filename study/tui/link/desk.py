@@ -21,6 +21,7 @@ from study.tui.link.from_engine import (
     Session,
     Trouble,
     Withdrawn,
+    Working,
 )
 from study.tui.link.remote_display import RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
@@ -29,6 +30,7 @@ from study.tui.link.to_engine import (
     AskBeside,
     Begin,
     Command,
+    Diagnose,
     Resume,
     SessionOrder,
     ShowDiagnosis,
@@ -45,7 +47,6 @@ from study.workflows.list_protocols import protocol_line
 from study.workflows.list_sessions import home_view
 from study.workflows.plan_sitting import plan_sitting
 from study.workflows.session_results import write_results
-from study.workflows.view_diagnosis import diagnosis_view
 from study.workflows.view_session import session_view
 from study.workflows.withdraw_participant import plan_withdrawal, withdraw
 from study.workflows.written_analysis import WrittenAnalysis
@@ -68,12 +69,8 @@ class Desk:
         if self._link.taken_is_let_go:
             raise KeyboardInterrupt
         match command:
-            case ShowHome():
-                self._link.send(Home(_offered(command)))
-            case ShowSession(path=path):
-                self._link.send(Session(session_view(Path(path))))
-            case ShowDiagnosis(path=path):
-                self._link.send(Diagnosis(diagnosis_view(Path(path))))
+            case ShowHome() | ShowSession() | ShowDiagnosis():
+                self._link.send(_looked_up(command))
             case Begin(order=order):
                 self._begin(order)
             case Resume():
@@ -84,6 +81,8 @@ class Desk:
                 self._link.send(Session(session_view(Path(session))))
             case Withdraw(session=session):
                 self._withdraw(SessionFolder(Path(session)))
+            case Diagnose():
+                self._diagnose(command)
             case AskBeside(session=session, request=request):
                 ask_session(SessionFolder(Path(session)), request, self._clock)
 
@@ -135,6 +134,34 @@ class Desk:
         plan = plan_withdrawal(folder)
         withdraw(folder.path.parent, plan, self._clock.utc())
         self._link.send(Withdrawn(plan.sessions))
+
+    def _diagnose(self, wanted: Diagnose) -> None:
+        from study.workflows.diagnose_at_screen import diagnose_at_screen, free_out
+        from study.workflows.diagnose_recordings import DiagnosePlan
+
+        self._link.send(Working("getting ready", 0.0))
+        sources = tuple(Path(source) for source in wanted.sources)
+        out = Path(wanted.out) if wanted.out else free_out(sources[0])
+        plan = DiagnosePlan(sources, out, Path(wanted.model) if wanted.model else None)
+        written = diagnose_at_screen(plan, lambda what, share: self._link.send(Working(what, share)))
+        self._link.send(_diagnosis(written))
+
+
+def _looked_up(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:
+    match command:
+        case ShowHome():
+            return Home(_offered(command))
+        case ShowSession(path=path):
+            return Session(session_view(Path(path)))
+        case ShowDiagnosis(path=path):
+            return _diagnosis(Path(path))
+
+
+def _diagnosis(path: Path) -> Diagnosis:
+    # Compilers and solvers are loaded when somebody asks for what needs them.
+    from study.workflows.view_diagnosis import diagnosis_view
+
+    return Diagnosis(diagnosis_view(path))
 
 
 def _offered(wanted: ShowHome) -> HomeView:

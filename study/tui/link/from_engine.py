@@ -84,6 +84,14 @@ class Preparing:
 
 
 @dataclass(frozen=True, slots=True)
+class Working:
+    """What is being done of something long, and the share of it that is done."""
+
+    what: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
 class Opened:
     """The session's log has its first line, and is locked."""
 
@@ -151,6 +159,7 @@ FromEngine = (
     | Session
     | Diagnosis
     | Preparing
+    | Working
     | Opened
     | Finished
     | Withdrawn

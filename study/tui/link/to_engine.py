@@ -68,6 +68,18 @@ class Withdraw:
 
 
 @dataclass(frozen=True, slots=True)
+class Diagnose:
+    """Compare recordings with a model, write the results and show them. `LetGo` stops it."""
+
+    sources: tuple[str, ...]
+    """Files, or one session's folder."""
+    model: str
+    """Empty: none is given."""
+    out: str
+    """Empty: a new folder near what is diagnosed."""
+
+
+@dataclass(frozen=True, slots=True)
 class AskBeside:
     """Ask a session that runs in another program."""
 
@@ -100,7 +112,7 @@ class Reply:
     value: Any
 
 
-Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | AskBeside
+Command = ShowHome | ShowSession | ShowDiagnosis | Begin | Resume | Analyze | Withdraw | Diagnose | AskBeside
 """What the engine works through, one after the other."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply

@@ -12,6 +12,7 @@ from textual.widgets import Footer, Input, Static
 from study.session.archive_views import HomeView
 from study.tui.home_messages import HomeWanted
 from study.tui.screens.browse import BrowseScreen
+from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.standing_words import describe
 from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
@@ -72,7 +73,8 @@ accelerations asks for a model of the device too: one that lies with the data (`
 | ✕ withdrawn | the participant withdrew; the data were erased |
 | ! unreadable | its log cannot be used; opening it says why |
 
-**F4** opens a diagnosis or a session from anywhere. **F6** looks again. **Tab** goes from field to field.
+**F4** opens a diagnosis or a session from anywhere. **F8** diagnoses recordings: what does a model of the device lack?
+**F6** looks again. **Tab** goes from field to field.
 
 In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SESSION`, `hapteq resume SESSION`.
 """
@@ -102,6 +104,7 @@ class HomeScreen(Screen[None]):
         Binding("f2", "new", "New"),
         Binding("f3", "past", "Sessions"),
         Binding("f4", "browse", "File"),
+        Binding("f8", "diagnose", "Diagnose"),
         Binding("f6", "look_again", "Refresh", show=False),
     ]
 
@@ -166,6 +169,9 @@ class HomeScreen(Screen[None]):
 
     def action_browse(self) -> None:
         self.app.push_screen(BrowseScreen(self._home.data if self._home else "."))
+
+    def action_diagnose(self) -> None:
+        self.app.push_screen(DiagnoseForm())
 
     def action_look_again(self) -> None:
         self.query_one("#detail", Static).update(LOOKING)

@@ -14,6 +14,7 @@ from textual.widgets import Footer, Static, TabbedContent, TabPane
 
 from study.session.archive_views import SessionView
 from study.tui.home_messages import AnalyzeWanted, HomeWanted, ResumeWanted, WatchWanted, WithdrawWanted
+from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt
 from study.tui.staircase_drawing import LEGEND
 from study.tui.standing_words import STYLES, describe, standing_words
@@ -35,7 +36,8 @@ HELP = """\
 * **5 Report**: where report and figures lie. **o** opens the report in the browser.
 
 **r** resumes an unfinished session. **a** writes tables, figures and report anew. **w** watches a running one.
-**x** withdraws the participant: all data of this code are erased, after you typed the code. **Esc** goes back.
+**d** diagnoses the device by this session's trials. **x** withdraws the participant: all data of this code are erased,
+after you typed the code. **Esc** goes back.
 
 In a terminal: `hapteq show SESSION`, `hapteq resume SESSION`, `hapteq analyze SESSION`, `hapteq withdraw SESSION`.
 """
@@ -59,6 +61,7 @@ class SessionScreen(Screen[None]):
         Binding("w", "watch", "Watch"),
         Binding("a", "analyze", "Analyze"),
         Binding("o", "open_report", "Open report"),
+        Binding("d", "diagnose", "Diagnose"),
         Binding("x", "withdraw", "Withdraw"),
         *(Binding(str(n), f"page('{tab}')", tab, show=False) for n, tab in enumerate(TABS, start=1)),
     ]
@@ -128,6 +131,9 @@ class SessionScreen(Screen[None]):
         self.notify("Analyzing. The report is refreshed when it is done.")
         self.post_message(AnalyzeWanted(self._view.line.path))
 
+    def action_diagnose(self) -> None:
+        self.app.push_screen(DiagnoseForm(self._view.line.path))
+
     def action_open_report(self) -> None:
         self.app.open_url(file_url(self._view.report))
 
@@ -146,7 +152,7 @@ class SessionScreen(Screen[None]):
                 return line.standing == "unfinished"
             case "watch":
                 return line.standing == "running"
-            case "analyze":
+            case "analyze" | "diagnose":
                 return line.standing in ("finished", "unfinished") and line.answers > 0
             case "open_report":
                 return bool(self._view.report)

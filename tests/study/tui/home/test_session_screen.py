@@ -91,7 +91,10 @@ def test_a_newer_view_stays_on_its_page(on_screen, session):
         await sight.press("5")
         assert "No report was written yet." in sight.text
         sight.app.screen.show(session)
-        await sight.pilot.pause(0.1)
+        for _ in range(40):
+            await sight.pilot.pause(0.05)
+            if "Open report" in sight.text:
+                break
         assert "report.html" in sight.text
         assert sight.app.screen.query_one(TabbedContent).active == "report"
         assert "Open report" in sight.text

@@ -1,0 +1,108 @@
+"""What shall be diagnosed: recordings or a session, and the model that they are compared with."""
+
+import shlex
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Footer, Input, Label, Static
+
+from study.tui.home_messages import DiagnoseWanted
+from study.tui.screens.help import HelpScreen
+from study.tui.take_off import take_off
+
+HELP = """\
+# Diagnose
+
+Where does a recording differ from a model of the device, and what physics does the model lack?
+
+* **Recordings**: one file of `hapteq record` or `hapteq import`, or several of one device, set apart by spaces (quote a
+  name that holds some); or the folder of a session, whose trials are taken.
+* **Model**: a mechanical model, MODEL.toml. Left empty, a linear one is fitted to the recordings first; a session on
+  the simulated device is compared with its twin.
+* **Results**: a folder that is not there yet. Left empty, one beside the recording, or in the session's folder.
+
+**F5** begins. It takes a minute or so for two minutes of recording. **Esc** goes back.
+
+In a terminal: `hapteq diagnose REC.h5 --model MODEL.toml --out DIR`.
+"""
+FIELDS = (
+    ("sources", "Recordings", "REC.h5, several, or a session's folder"),
+    ("model", "Model", "MODEL.toml; empty: none is given"),
+    ("out", "Results", "a new folder; empty: beside the recording"),
+)
+
+
+class DiagnoseForm(ModalScreen[None]):
+    HELP = HELP
+    CSS = """
+    DiagnoseForm { align: center middle; }
+    DiagnoseForm > Vertical {
+        width: 76; max-width: 95%; height: auto; border: round $primary; padding: 1 2; background: $surface;
+    }
+    DiagnoseForm .field { height: auto; }
+    DiagnoseForm Label { width: 13; }
+    DiagnoseForm Input { width: 1fr; }
+    DiagnoseForm #said { height: 2; margin-top: 1; color: $text-error; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f5", "begin", "Diagnose", priority=True),
+        Binding("escape", "leave", "Back", key_display="Esc"),
+        Binding("f1", "help", "Help"),  # the application's own keys do not reach through a modal screen
+    ]
+
+    def __init__(self, source: str = "") -> None:
+        super().__init__()
+        self._source = source
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = "Diagnose: what does a model lack?"
+            for name, title, hint in FIELDS:
+                with Horizontal(classes="field"):
+                    yield Label(title)
+                    first = shlex.quote(self._source) if name == "sources" and self._source else ""
+                    yield Input(first, placeholder=hint, compact=True, id=name)
+            yield Static("", id="said", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#model" if self._source else "#sources", Input).focus()
+
+    @on(Input.Submitted)
+    def action_begin(self) -> None:
+        try:
+            sources = tuple(str(Path(word).expanduser()) for word in shlex.split(self._typed("sources")))
+        except ValueError:
+            self._say("A quotation mark is open.", "sources")
+            return
+        model, out = (
+            str(Path(typed).expanduser()) if (typed := self._typed(name)) else "" for name in ("model", "out")
+        )
+        missing = next((path for path in sources if not Path(path).exists()), None)
+        if not sources:
+            self._say("Name a recording, or the folder of a session.", "sources")
+        elif missing is not None:
+            self._say(f"There is nothing at {missing}.", "sources")
+        elif model and not Path(model).is_file():
+            self._say(f"There is no file {model}.", "model")
+        elif self.is_active:
+            self.app.post_message(DiagnoseWanted(sources, model, out))
+            take_off(self, None)
+
+    def action_help(self) -> None:
+        self.app.push_screen(HelpScreen(HELP))
+
+    def action_leave(self) -> None:
+        take_off(self, None)
+
+    def _typed(self, name: str) -> str:
+        return self.query_one(f"#{name}", Input).value.strip()
+
+    def _say(self, text: str, field: str) -> None:
+        self.query_one("#said", Static).update(text)
+        self.query_one(f"#{field}", Input).focus()

@@ -1,0 +1,68 @@
+"""While a diagnosis is computed: what is being done, how much of it is, and the way out."""
+
+import time
+from collections.abc import Callable
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.screen import Screen
+from textual.widgets import Footer, ProgressBar, Static
+
+from study.tui.screens.preparing import TICK_S, elapsed
+from study.tui.take_off import take_off
+
+HELP = """\
+# Diagnosing
+
+The recordings are compared with the model; its own numbers are re-tuned; each effect of the catalogue that the data
+suggest is fitted, and compared with its rivals on data that no fit has seen.
+
+**Esc** stops it. Nothing is written before the end, so nothing half done is left.
+"""
+
+
+class DiagnosingScreen(Screen[bool]):
+    """Returns true where somebody stopped it."""
+
+    HELP = HELP
+    CSS = """
+    DiagnosingScreen { align: center middle; }
+    DiagnosingScreen > Vertical {
+        width: 70; max-width: 95%; height: auto; border: round $primary; padding: 1 2; background: $surface;
+    }
+    DiagnosingScreen ProgressBar { margin-top: 1; }
+    DiagnosingScreen Bar { width: 1fr; }
+    DiagnosingScreen ProgressBar { width: 1fr; }
+    DiagnosingScreen #elapsed { margin-top: 1; color: $foreground 65%; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "stop", "Stop", key_display="Esc")]
+
+    def __init__(self, what: str, now_s: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._what = what
+        self._now_s = now_s
+        self._began_s = now_s()
+
+    def compose(self) -> ComposeResult:
+        with Vertical() as box:
+            box.border_title = "Diagnosing"
+            yield Static(self._what, id="what", markup=False)
+            yield ProgressBar(total=1.0, show_eta=False)
+            yield Static(elapsed(0.0), id="elapsed", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.set_interval(TICK_S, self._tick)
+
+    def show(self, what: str, share: float) -> None:
+        if self.query("#what"):
+            self.query_one("#what", Static).update(f"{what[:1].upper()}{what[1:]}.")
+            self.query_one(ProgressBar).update(progress=share)
+
+    def action_stop(self) -> None:
+        take_off(self, True)
+
+    def _tick(self) -> None:
+        self.query_one("#elapsed", Static).update(elapsed(self._now_s() - self._began_s))
