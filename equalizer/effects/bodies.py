@@ -69,13 +69,14 @@ def moved(bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float) 
     look = _transposed(_looked_at(linear))
     looked, added = np.empty((size[0], look[0].shape[1])), np.empty((size[0], bodies.ports.shape[1]))
     laws, places, of, memory = _items(bodies)
+    mean = np.require(driven.mean, requirements=["C", "W"])
     with warnings.catch_warnings():
         # numba calls functions that are passed as values an experimental feature.
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         play(
             laws, places, of, memory, _transposed((linear.advance, linear.by_command, linear.by_axis_force)), look,
             _whole((linear.motion, linear.motion_by_command, linear.motion_by_axis_force)),
-            np.require(driven.mean, requirements=["C", "W"]), np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
+            mean, np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
         )  # fmt: skip
     if driven.end is not driven.mean:
         # An acceleration shows the force of its very instant, not the last step's mean.

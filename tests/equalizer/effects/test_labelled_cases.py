@@ -1,0 +1,51 @@
+"""The labelled cases' actuators, sensors and clocks, which others simulated: with the effect that each case names,
+its own starting value and the model's numbers inside their tolerance, what is left is the noise."""
+
+import json
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.candidates import candidates
+from analysis.diagnosis.error_measure import FreeSimulation
+from analysis.diagnosis.gather_evidence import gather_evidence
+from analysis.diagnosis.hypothesis import NOTHING
+from analysis.diagnosis.observed import observed
+from analysis.diagnosis.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.tuning import tuning_of
+from equalizer.effects.catalogue import EFFECTS
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.recording_file import read_recording
+
+NOISE = np.array([0.042, 0.042, 0.083, *[np.hypot(4e-6, 10e-6 / np.sqrt(12))] * 3])
+"""As the cases' notes say: the accelerometer's, and the position's with its rounding."""
+WITHIN = 0.02
+"""Of the main parameter: the case's own integration is not ours."""
+
+
+@pytest.mark.parametrize("case", ["open-05", "open-06", "open-07", "open-08"])
+def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, case):
+    recording = read_recording(shared / "cases" / f"{case}.h5")
+    model = read_mechanical_model(shared / "cases" / f"{case}.toml")
+    (truth,) = json.loads((shared / "cases" / f"{case}.truth.json").read_text())
+    effect = EFFECTS[truth["effect"]]
+    record = observed(recording, model.outputs)
+    measure = FreeSimulation((record,), NOISE, NOISE)
+    tuning = tuning_of(model, recording.command.channels)
+    nominal = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    known = sensitivity(measure, tuning, nominal.deviations, NOTHING)
+    retuned = fit(measure, tuning, nominal, known, 2)
+    spread = "one" if truth["axis"] else "all"
+    suggested = candidates([effect], gather_evidence(measure, tuning, retuned)[0])
+    hypothesis = next(one for one in suggested if one.claims[0].spread == spread)
+    # From the calibration on: the re-tuned numbers have already bent themselves to what the effect does.
+    found = evaluated(measure, tuning, nominal.deviations, hypothesis)
+    for _ in range(2):
+        found = fit(measure, tuning, found, known, 5)
+        known = sensitivity(measure, tuning, found.deviations, found.hypothesis)
+    left = np.sqrt(np.mean(found.residuals[0][record.test] ** 2, axis=0))
+    assert np.all(left < 1.08)
+    (placed,) = found.hypothesis.placed()
+    ((name, value),) = truth["values"].items()
+    assert effect.report(placed.values)[name] == pytest.approx(value, rel=WITHIN)
+    assert placed.sites == (("xyz".index(truth["axis"]),) if truth["axis"] else (0, 1, 2))
