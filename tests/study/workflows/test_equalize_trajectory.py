@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import Signal
@@ -265,6 +266,21 @@ def test_named_friction_is_compensated_and_what_is_linear_is_not(plan, tmp_path)
     assert summary(done)["compensated"] == ["coulomb_friction"]
     assert "it is linear" in summary(done)["not_compensated"]["added_mass"]
     assert "Compensated: coulomb_friction." in summary_lines(done)
+
+
+def test_whatever_a_diagnosis_names_is_accepted_and_compensated_or_said(plan, tmp_path):
+    named = tuple(
+        ModelEffect(
+            effect.name,
+            "z" if effect.name == "sensor_lag" else None,
+            {part.name: 0.7 if part.name == "gain" else 0.01 for part in effect.parameters},
+        )
+        for effect in EFFECT_NAMES
+    )
+    write_mechanical_model(tmp_path / "improved.toml", mechanism(*named))
+    told = summary(equalize_trajectory(replace(plan, physics=tmp_path / "improved.toml")))
+    assert {*told["compensated"], *told["not_compensated"]} == {effect.name for effect in EFFECT_NAMES}
+    assert all(told["not_compensated"].values())
 
 
 def test_the_cap_holds_for_the_sum_and_the_share_that_fits_is_said(plan, tmp_path):
