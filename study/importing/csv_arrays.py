@@ -15,6 +15,11 @@ from study.store.text_file import read_text
 _DELIMITERS = (",", ";", "\t", "|")
 _COMMENTS = ("#", "%")
 _EMPTY = ("", "nan", "na", "n/a", "null", "-", "none")
+_AS_NUMBERS: dict[str, Any] = {
+    "dtype": np.float64,
+    "na_values": [*_EMPTY, *(word.upper() for word in _EMPTY), "NaN", "None", "Null"],
+}
+_AS_WORDS: dict[str, Any] = {"dtype": str}
 
 
 def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]:
@@ -30,8 +35,14 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]
         raise ValueError("it has a header, but no rows below it")
     if doubled := sorted({name for name in header if header.count(name) > 1}):
         raise ValueError(f"its header names '{doubled[0]}' twice; give the columns names of their own in [csv] names")
-    table = _table(body, header, delimiter)
-    return {name: _numbers(table[name], name, body, settings) for name in header}
+    _require_equal_rows(body, header, delimiter)
+    text = "\n".join(line for _, line in body)
+    try:
+        numbers = _read(text, header, delimiter, settings, _AS_NUMBERS)
+    except ValueError:
+        words = _read(text, header, delimiter, settings, _AS_WORDS)  # slower, and it tells which field is wrong
+        return {name: _numbers(words[name], name, body, settings) for name in header}
+    return {name: numbers[name].to_numpy() for name in header}
 
 
 def _lines(text: str, settings: CsvMap) -> tuple[list[tuple[int, str]], str]:
@@ -85,16 +96,25 @@ def _is_number(field: str, settings: CsvMap) -> bool:
     return True
 
 
-def _table(body: list[tuple[int, str]], header: list[str], delimiter: str) -> pd.DataFrame:
+def _require_equal_rows(body: list[tuple[int, str]], header: list[str], delimiter: str) -> None:
     for number, line in body:
         count = len(_fields(line, delimiter)) if '"' in line or delimiter == " " else line.count(delimiter) + 1
         if count != len(header):
             raise ValueError(f"line {number} has {count} fields, but there are {len(header)} columns")
-    text = io.StringIO("\n".join(line for _, line in body))
-    separator = r"\s+" if delimiter == " " else delimiter
-    return pd.read_csv(
-        text, sep=separator, names=header, dtype=str, keep_default_na=False, skipinitialspace=True, index_col=False
+
+
+def _read(text: str, header: list[str], delimiter: str, settings: CsvMap, how: dict[str, Any]) -> pd.DataFrame:
+    table: pd.DataFrame = pd.read_csv(
+        io.StringIO(text),
+        sep=r"\s+" if delimiter == " " else delimiter,
+        names=header,
+        decimal=settings.decimal,
+        skipinitialspace=True,
+        index_col=False,
+        keep_default_na=False,
+        **how,
     )
+    return table
 
 
 def _numbers(

@@ -30,7 +30,7 @@ def parse_map(text: str, source: Path) -> ImportMap:
         found = _ADAPTER.validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
         raise UnusableFileError(source, KIND, tuple(_problems(error.errors()))) from error
-    if problems := tuple(_contradictions(found)):
+    if problems := (*_contradictions(found), *_segment_contradictions(found), *_meta(found)):
         raise UnusableFileError(source, KIND, problems)
     return found
 
@@ -66,7 +66,8 @@ def _given(value: Any) -> str:
 def _allowed(place: Place) -> str:
     node = node_at(MAP_SCHEMA, place)
     if node is None:
-        return "a number or a text"
+        parent = resolved(MAP_SCHEMA, node_at(MAP_SCHEMA, place[:-1]) or {})
+        return "a number" if parent.get("additionalProperties", {}).get("type") == "number" else "text in quotes"
     return allowed_in_map(node, str(place[-1]))
 
 
@@ -94,6 +95,9 @@ def _contradictions(found: ImportMap) -> Iterator[str]:
     yield from _clock_contradictions(found)
     if found.part and any(clock.file for clock in found.clock):
         yield "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other"
+
+
+def _segment_contradictions(found: ImportMap) -> Iterator[str]:
     for number, segment in enumerate(found.segment, start=1):
         if set(segment.split) - {"fit", "test", ""}:
             yield f"segment[{number}].split names {', '.join(segment.split)}; roles are fit, test, or empty"
@@ -101,6 +105,13 @@ def _contradictions(found: ImportMap) -> Iterator[str]:
             yield f"segment[{number}].split must have shares that make 1, and no `role` beside it"
         if (segment.start and segment.start_s) or (segment.stop and segment.stop_s):
             yield f"segment[{number}] says the same in samples and in seconds; one of them"
+
+
+def _meta(found: ImportMap) -> Iterator[str]:
+    try:
+        json.dumps(found.meta, allow_nan=False)
+    except ValueError:
+        yield "meta holds a number that is not finite; leave it out, or write it as text"
 
 
 def _roles(found: ImportMap) -> Iterator[str]:

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from study.errors import WrongUseError
 from study.importing.arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map
-from study.importing.import_map import CsvMap
+from study.importing.import_map import CsvMap, ImportMap
 from study.importing.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
 from study.importing.map_library import NO_DATA, MapFile, find_map, read_map
 from study.importing.map_skeleton import map_skeleton
@@ -76,7 +77,8 @@ class Foreign:
 def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None) -> Foreign:
     """As `import_recording`, into memory. Raises StudyError."""
     if map_name is not None:
-        return _by_map(read_map(map_name), _inside(files), on_progress)
+        source = read_map(map_name)
+        return _by_map(source, _inside(files, source.map), on_progress)
     if len(files) == 1 and files[0].is_dir():
         return _by_found_map(files[0], on_progress)
     if all(is_hdf5(path) and format_of(path) == FORMAT for path in files):
@@ -84,12 +86,17 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
     return _by_header(files, on_progress)
 
 
-def _inside(files: Sequence[Path]) -> tuple[Path, ...]:
-    """Files, folders opened. Maps and notes beside the data are no data."""
+def _inside(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
+    """Files, and of a folder those that the map is for. Maps and notes beside the data are no data."""
     found: list[Path] = []
     for path in files:
         beside = sorted(path.iterdir()) if path.is_dir() else ()
-        found += [file for file in beside if file.is_file() and file.suffix not in NO_DATA] if beside else [path]
+        fitting = [file for file in beside if any(fnmatchcase(file.name, pattern) for pattern in wanted.files)]
+        found += [file for file in fitting if file.is_file() and file.suffix not in NO_DATA] if beside else [path]
+    if not found:
+        raise ImportRefusedError(
+            files[0].name, f"none of its files is one of {', '.join(wanted.files)}", "Give the files, or another map."
+        )
     return tuple(found)
 
 

@@ -35,6 +35,12 @@ def test_the_wheel_carries_the_shipped_protocols_and_the_report_template(wheel):
     assert any(name.startswith("analysis/reports/") and name.endswith((".html", ".jinja", ".j2")) for name in names)
 
 
+def test_the_wheel_carries_the_maps_for_imports(wheel):
+    from study.importing.map_library import shipped_maps
+
+    assert {f"study/importing/maps/{name}.toml" for name in shipped_maps()} <= set(zipfile.ZipFile(wheel).namelist())
+
+
 @needs_command
 def test_the_command_works_beside_a_strangers_analysis(tmp_path):
     (tmp_path / "analysis.py").write_text("raise SystemExit('the stranger ran')\n")

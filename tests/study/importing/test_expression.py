@@ -1,5 +1,9 @@
+from contextlib import suppress
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from study.importing.expression import evaluate, names_in
 from study.importing.functions import FUNCTIONS
@@ -89,6 +93,13 @@ def test_whatever_else_is_refused_by_name(text, sentence):
     with pytest.raises(ImportProblemError) as refused:
         value(text)
     assert sentence in str(refused.value)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(alphabet="u0129.+-*/%()[]:,<>= '\"_xtabelmnsigrpf", max_size=24))
+def test_no_text_does_anything_but_give_numbers_or_be_refused(text):
+    with suppress(ImportProblemError):
+        assert np.asarray(value(text)).dtype.kind in "fib"
 
 
 def test_huge_powers_take_no_time():

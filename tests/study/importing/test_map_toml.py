@@ -55,6 +55,12 @@ def test_a_map_is_known_by_its_channels():
         ('role = "command"', 'role = "input"', 'channel[1].role is "input"; it must be "command", "response"'),
         ("rate_hz = 1000", 'rate_hz = "fast"', 'clock[1].rate_hz is "fast"; it must be a number from 0, in hertz'),
         ('device = "rig"', 'device = "rig"\nlet = 3', "let is 3; it must be a table"),
+        ('device = "rig"', 'device = "rig"\nlet = { a = 3 }', "let.a is 3; it must be text in quotes"),
+        (
+            'device = "rig"',
+            'device = "rig"\nmeta = { a = nan }',
+            "meta holds a number that is not finite; leave it out",
+        ),
         ('device = "rig"', "device = ", "it is not TOML"),
         ('name = "ax"', 'name = "ax"\nclock = "daq"', "channel 'ax' is on the clock 'daq', but there are clock"),
         ("rate_hz = 1000", "", "clock 'clock' has no rate: give its rate_hz, its rate as an expression, or its time"),

@@ -65,6 +65,17 @@ def test_a_folder_with_a_map_of_its_own(tmp_path):
     assert (done.map, len(done.recording)) == ("m", 200)
 
 
+def test_of_a_folder_a_named_map_takes_its_own_files(tmp_path):
+    savemat(tmp_path / "a.mat", {"data": {"u": T, "y": T, "fs": 1000.0}})
+    savemat(tmp_path / "b.mat", {"data": {"u": T, "y": T, "fs": 1000.0}})
+    (tmp_path / "m.toml").write_text('files = ["b*"]\n' + MAP)
+    done = import_recording(ImportPlan((tmp_path,), str(tmp_path / "m.toml"), tmp_path / "r.h5"))
+    assert [part["file"] for part in done.recording.meta["parts"]] == ["b.mat"]
+    (tmp_path / "m.toml").write_text('files = ["c*"]\n' + MAP)
+    with pytest.raises(ImportRefusedError, match=r"None of its files is one of c\*"):
+        import_recording(ImportPlan((tmp_path,), str(tmp_path / "m.toml"), tmp_path / "s.h5"))
+
+
 def test_a_folder_that_no_map_is_for_is_wrong_use(tmp_path):
     (tmp_path / "a.csv").write_text("x\n1\n")
     with pytest.raises(WrongUseError, match="No map is for the files of the folder"):
