@@ -4,6 +4,7 @@ A trial's recording holds the middle of a vibration that was on before. A simula
 trial a full cycle of its own command is played, over and over and fading in, with nothing to compare with.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -101,7 +102,7 @@ def _key(trial: _Trial) -> tuple[float, int]:
 
 
 def _rung(level_n: float) -> int:
-    return round(20 * np.log10(max(level_n, 1e-6)) / LEVEL_STEP_DB)
+    return round(20 * math.log10(max(level_n, 1e-6)) / LEVEL_STEP_DB)
 
 
 def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:

@@ -1,0 +1,135 @@
+"""A session's trials as recordings: by frequency, levels grouped, with a lead to settle in, and only what is whole."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+from study.devices.clock import VirtualClock
+from study.errors import StudyError, WrongUseError
+from study.store.recording_file import read_recording, write_recording
+from study.workflows.conduct_session import conduct_new
+from study.workflows.open_session import SessionPlan
+from study.workflows.session_as_recordings import LEAD_S, MOST_S, session_recordings
+from study.workflows.simulated_participant import simulated_participant
+
+RATE_HZ = 1000
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory, small_text):
+    from protocols.loading import load_protocol
+
+    data = tmp_path_factory.mktemp("data")
+    plan = SessionPlan(
+        protocol=load_protocol(small_text, "small.toml"), protocol_text=small_text, protocol_locked=False,
+        subject="P01", observer="ideal", seed=3, data=data, participant_number=0,
+    )  # fmt: skip
+    return conduct_new(plan, "simulated", simulated_participant("ideal", 3, VirtualClock())).folder.path
+
+
+def test_there_is_one_recording_per_frequency_with_every_trial_in_it(session):
+    found = session_recordings(session, seed=1)
+    assert found.simulated
+    assert [name.split(", ")[1] for name in found.names] == ["5 Hz", "25 Hz", "35 Hz"]
+    trials = len(list((session / "recordings").glob("*.h5")))
+    assert sum(len(one.segments) for one in found.recordings) == trials == len(found.parents) - 1
+    assert found.parents[0].name == "events.jsonl"
+
+
+def test_before_each_trial_its_own_command_goes_on_with_nothing_to_compare(session):
+    one = session_recordings(session, seed=1).recordings[0]
+    lead = round(LEAD_S * RATE_HZ)
+    first = one.segments[0]
+    assert first.start == lead and first.kind == "sine"
+    assert np.isnan(one.response.samples[:lead]).all() and np.isnan(one.position.samples[:lead]).all()
+    assert np.isfinite(one.command.samples).all()
+    assert (one.command.samples[0] == 0).all()
+    period = first.period
+    np.testing.assert_array_equal(one.command.samples[lead - 1], one.command.samples[lead + period - 1])
+
+
+def test_levels_are_grouped_and_one_trial_in_four_is_a_test(session):
+    for one in session_recordings(session, seed=1).recordings:
+        levels = {segment.amplitude for segment in one.segments}
+        for level in levels:
+            roles = [segment.role for segment in one.segments if segment.amplitude == level]
+            assert roles.count("test") == len(roles) // 4
+        steps = np.diff(sorted(20 * np.log10(list(levels))))
+        assert (steps > 1.0).all()
+
+
+def test_another_seed_keeps_other_trials_for_the_test(session):
+    roles = [
+        [segment.role for one in session_recordings(session, seed).recordings for segment in one.segments]
+        for seed in (1, 1, 2)
+    ]
+    assert roles[0] == roles[1] != roles[2]
+
+
+def test_only_what_is_there_is_claimed(session):
+    said = session_recordings(session, seed=1).remarks
+    assert "a hand on the handle" in said[0]
+    assert "What shows only there cannot be found here." in said[0]
+    assert len(said) == 2
+
+
+def test_trials_with_gaps_or_flags_are_left_out_and_it_is_said(session, tmp_path):
+    copy = copied(session, tmp_path)
+    first, second, *_ = sorted((copy / "recordings").glob("*.h5"))
+    one = read_recording(first)
+    gap = one.response.samples.copy()
+    gap[10] = np.nan
+    write_recording(first, replace(one, response=replace(one.response, samples=gap)), overwrite=True)
+    other = read_recording(second)
+    write_recording(second, replace(other, meta={**other.meta, "flags": ["missed ticks"]}), overwrite=True)
+    whole, less = (session_recordings(folder, 1) for folder in (session, copy))
+    count = [sum(len(one.segments) for one in found.recordings) for found in (whole, less)]
+    assert count[0] - count[1] == 2
+    assert any(remark.startswith("2 trials were left out") for remark in less.remarks)
+
+
+def test_a_long_session_is_thinned_alike_at_all_levels(session, tmp_path):
+    copy = copied(session, tmp_path)
+    for path in (copy / "recordings").glob("*.h5"):
+        path.unlink()
+    for number in range(60):
+        level = (0.5, 2.0)[number % 2]
+        write_recording(copy / "recordings" / f"run-01_trial-{number:03d}_attempt-0.h5", trial(level, seconds=4))
+    found = session_recordings(copy, 1)
+    segments = found.recordings[0].segments
+    assert sum(segment.stop - segment.start for segment in segments) <= (MOST_S + 8) * RATE_HZ
+    counts = [sum(s.amplitude == pytest.approx(level) for s in segments) for level in (0.5, 2.0)]
+    assert counts[0] == counts[1] > 10
+    assert found.remarks[0].startswith("30 of the 60 trials")
+
+
+def test_a_session_without_a_whole_trial_is_refused(session, tmp_path):
+    copy = copied(session, tmp_path)
+    for path in (copy / "recordings").glob("*.h5"):
+        path.unlink()
+    with pytest.raises(StudyError, match="has 0 recordings of trials, and none is whole") as refused:
+        session_recordings(copy, 1)
+    assert refused.value.title == "This session holds nothing to diagnose"
+
+
+def test_a_folder_that_is_no_session_is_refused(tmp_path):
+    with pytest.raises(WrongUseError, match="neither a session folder nor"):
+        session_recordings(tmp_path, 1)
+
+
+def copied(session, tmp_path):
+    import shutil
+
+    return shutil.copytree(session, tmp_path / session.name)
+
+
+def trial(level, seconds) -> Recording:
+    t = np.arange(seconds * RATE_HZ)[:, None] / RATE_HZ
+    wave = level * np.sin(2 * np.pi * 25 * t) * np.array([[1.0, 0.0, 0.0]])
+    force = Signal(wave, RATE_HZ, "force", "N", ("fx", "fy", "fz"))
+    felt = Signal(4 * wave, RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))
+    meta = {"frequency_hz": 25.0, "level_n": level, "flags": []}
+    return Recording("bench", force, felt, segments=(Segment(0, len(t), "sine", level, 40, ""),), meta=meta)
