@@ -98,6 +98,12 @@ def rubbing() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def diagnosed() -> ModuleType:
+    """`tests/diagnosed.py`, a diagnosis from real fits. Imported late: it compiles."""
+    return _module_at(Path(__file__).parent / "diagnosed.py")
+
+
+@pytest.fixture(scope="session")
 def module_at() -> Callable[[Path], ModuleType]:
     """Loads a module of a test folder, which is no package."""
     return _module_at

@@ -58,8 +58,11 @@ def device(axes: int) -> MechanicalModel:
     )  # fmt: skip
 
 
-def recorded(axes: int, friction_n: float = FRICTION_N, seed: int = 3) -> Recording:
-    """Each axis at three levels, then a test at the middle one; friction at the first axis."""
+RUBBING = (PlacedEffect(DRY, (0,), {"level": FRICTION_N}),)
+
+
+def recorded(axes: int, effects=RUBBING, seed: int = 3) -> Recording:
+    """Each axis at three levels, then a test at the middle one; friction at the first axis unless told otherwise."""
     rng = np.random.default_rng(seed)
     commands, segments, at = [], [], 0
     plan = [(axis, level, "fit") for axis in range(axes) for level in LEVELS_N]
@@ -71,8 +74,7 @@ def recorded(axes: int, friction_n: float = FRICTION_N, seed: int = 3) -> Record
         segments.append(Segment(at, at + LOOKS * PERIOD, "multisine", level, PERIOD, role))
         at += len(wave)
     command = np.vstack(commands)
-    rubbing = (PlacedEffect(DRY, (0,), {"level": friction_n}),) if friction_n else ()
-    played = simulate_mechanism(device(axes), command, RATE_HZ, rubbing)
+    played = simulate_mechanism(device(axes), command, RATE_HZ, effects)
     names = "xyz"[:axes]
 
     def signal(samples, quantity, unit, letter="", noise=0.0):

@@ -34,6 +34,12 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
         static="{} at rest",
         speed="a transition over {}",
     ),
+    "position_dependent_friction": _words(
+        "dry friction that depends on the position",
+        level="{} at the centre",
+        slope_per_m="growing by {}",
+        bend_per_m2="bent by {}",
+    ),
     "presliding_hysteresis": _words(
         "dry friction with elastic presliding", level=_BARE, stiffness="a stiffness of {} before it slides"
     ),
@@ -44,6 +50,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "constant_force": _words("a constant force"),
     "cogging": _words("a force ripple along the travel (cogging)", amplitude=_BARE, pitch="repeating every {}"),
     "backlash": _words("play (backlash)", gap="a gap of {}"),
+    "loose_joint": _words("a loose joint", gap="a gap of {}", stiffness="a stiffness of {}", slip="slipping at {}"),
     "end_stop": _words("an end stop", position="met at {}", stiffness="a stiffness of {}"),
     "pose_dependent_inertia": _words("inertia that changes with the position", per_m=_BARE),
     "extra_mode": _words(
@@ -54,6 +61,7 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
         "a hand that holds on", mass=_BARE, damping=_BARE, stiffness=_BARE
     ),
     "time_varying_grip": _words("a grip that varies in time", "depth", rate_hz="at {}", depth="by {}"),
+    "body_on_actuator": _words("a body that hangs on the drive", mass=_BARE, damping=_BARE, stiffness=_BARE),
     "force_saturation": _words("force saturation", limit="at {}"),
     "force_deadband": _words("a dead band of the force", width="± {}"),
     "slew_limit": _words("a limited rate of change of the force", rate="at most {}"),

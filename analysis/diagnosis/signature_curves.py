@@ -9,14 +9,16 @@ import numpy as np
 from scipy.signal import welch
 
 from analysis.diagnosis.findings import Signature
+from analysis.diagnosis.gather_evidence import EXPECTED
+from analysis.diagnosis.missing_force import missing_force
 from analysis.diagnosis.signature_bins import binned, binned_law, running_rms
-from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect
+from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulator import Played, simulate_mechanism
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
-Along = Literal["velocity", "position", "command", "reading", "time", "growth", "frequency"]
+Along = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
 
 ALONG: Mapping[str, Along] = {
     "coulomb_friction": "velocity",
@@ -24,7 +26,9 @@ ALONG: Mapping[str, Along] = {
     "stribeck_friction": "velocity",
     "viscous_damping": "velocity",
     "quadratic_damping": "velocity",
+    "position_dependent_friction": "velocity",
     "presliding_hysteresis": "velocity",
+    "added_mass": "acceleration",
     "hardening_stiffness": "position",
     "asymmetric_stiffness": "position",
     "constant_force": "position",
@@ -63,7 +67,7 @@ def signature_of(
 ) -> Signature:
     """evidence: of the final model with all its effects but this one; others: those."""
     acts, along = placed.effect.acts, ALONG.get(placed.effect.name, "frequency")
-    if along in ("velocity", "position") and not isinstance(acts, (OnCommand, OnResponse)):
+    if along in ("velocity", "position", "acceleration") and not isinstance(acts, (OnCommand, OnResponse)):
         return _of_motion(evidence, placed, along, names, hold)
     if along == "command" and isinstance(acts, OnCommand):
         return _of_command(evidence, placed, names)
@@ -78,17 +82,42 @@ def signature_of(
 def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
     axis = _strongest(placed.sites, evidence.axis_force)
     played = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
-    moves = (evidence.axis_velocity, played.axis_velocity) if along == "velocity" else (
-        evidence.axis_position, played.axis_position
-    )  # fmt: skip
-    unit = {"velocity": "rad/s", "position": "rad"} if names.rotational else {"velocity": "m/s", "position": "m"}
-    used = evidence.used > 0
-    at, mean, spread = binned(moves[0][:, axis], evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = binned_law(moves[1][used, axis], played.axis_force[used, axis])
+    force = played.axis_force
+    if isinstance(placed.effect.acts, Structure):
+        force = _equivalent_force(evidence, played, hold)
+    used, unit = evidence.used > 0, "rad" if names.rotational else "m"
+    unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[along]
+    seen, law_seen = (
+        _course(position[:, axis], velocity[:, axis], along, evidence.sample_rate_hz)
+        for position, velocity in (
+            (evidence.axis_position, evidence.axis_velocity),
+            (played.axis_position, played.axis_velocity),
+        )
+    )
+    at, mean, spread = binned(seen, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = binned_law(law_seen[used], force[used, axis])
     return Signature(
-        placed.effect.name, names.axes[axis], f"{along} of {names.axes[axis]} ({unit[along]})",
+        placed.effect.name, names.axes[axis], f"{along} of {names.axes[axis]} ({unit})",
         f"missing force ({_force_unit(names)})", at, mean, spread, law_at, law,
     )  # fmt: skip
+
+
+def _course(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: float) -> FloatArray:
+    if along == "acceleration":
+        return np.asarray(np.gradient(velocity) * rate_hz)
+    return velocity if along == "velocity" else position
+
+
+def _equivalent_force(evidence: Evidence, played: Played, hold: Hold) -> FloatArray:
+    """The force on the model without it that would do what another structure does: found as the missing one is."""
+    without = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
+    change, unit = [played.response - without.response], [evidence.noise]
+    if evidence.position_noise is not None:
+        change.append(played.position - without.position)
+        unit.append(evidence.position_noise)
+    expected = EXPECTED * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
+    noise = np.concatenate(unit)
+    return missing_force(evidence.model, np.hstack(change) / noise, noise, evidence.sample_rate_hz, expected).force
 
 
 def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:

@@ -37,8 +37,8 @@ def scale_of(unit: str, magnitude: float) -> Scale:
 
 
 def written(unit: str) -> str:
-    """ "m/s^2" as "m/s²"; a plain number has none."""
-    shown = "" if unit == "1" else unit
+    """ "m/s^2" as "m/s²", "1/m" as "per m"; a plain number has none."""
+    shown = "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else unit
     for ascii_, raised in _RAISED.items():
         shown = shown.replace(ascii_, raised)
     return _SYMBOLS.get(shown, shown)
@@ -65,14 +65,12 @@ def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
 
 
 def _decimals(value: float, interval: tuple[float, float] | None) -> int:
-    """So many that the interval's half is written with one digit, or two where the first is a one."""
+    """So many that the interval's half is written with one digit."""
     size = np.floor(np.log10(abs(value))) if value else 0.0
     if interval is None or not interval[1] > interval[0]:
         return int(max(0, _DIGITS - 1 - size))
     half = (interval[1] - interval[0]) / 2
     wanted = -int(np.floor(np.log10(half * 1.0001)))
-    if half * 10**wanted < 1.3:
-        wanted += 1
     return int(np.clip(wanted, 0, max(0, _MOST_DIGITS - 1 - size)))
 
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words
 from analysis.diagnosis.findings import BlackBox, Findings
-from analysis.diagnosis.retuned_numbers import MovedNumber, moved_numbers, retuned_sentence
-from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.plausibility import implausible_sentences
+from analysis.diagnosis.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
 from analysis.wording import listed, p_text
 
 _PLACES_NAMED = 3
@@ -60,6 +60,11 @@ def error_text(error: float | None) -> str:
     if error is None:
         return "unknown"
     return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
+
+
+def times_text(ratio: float) -> str:
+    """ "1.04 times"."""
+    return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
 
 
 def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
@@ -154,8 +159,8 @@ def confirmation_sentence(fit: Errors, test: Errors) -> str:
     there, here = test.after / test.noise, fit.after / fit.noise
     if there > _CONFIRMED * max(here, 1.0):
         return (
-            f"The held-out data confirm this only in part: {there:.3g} times the noise is left there, "
-            f"{here:.3g} times on what was fitted."
+            f"The held-out data confirm this only in part: {times_text(there)} the noise is left there, "
+            f"{times_text(here)} the noise on what was fitted."
         )
     return ""
 
@@ -172,7 +177,8 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
         lines.append(confirmation_sentence(diagnosis.fit.fit, diagnosis.fit.test))
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
         lines += [retuned_sentence(moved), remainder_sentence(diagnosis), black_box_sentence(found.black_box)]
-    lines += [next_experiment_sentence(diagnosis), *found.remarks]
+    lines += [next_experiment_sentence(diagnosis), *doubtful_sentences(moved), *implausible_sentences(found)]
+    lines += found.remarks
     return tuple(line for line in lines if line)
 
 
@@ -213,11 +219,11 @@ def _one_error(said: str, error: float | None, errors: Errors) -> str:
 def _noise(errors: Errors, error: float) -> str:
     if not errors.noise:
         return "; what noise alone would leave is not known"
-    return f"; noise alone would leave {error_text(errors.noise)} ({error / errors.noise:.3g} times the noise)"
+    return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
 
 
 def probability_text(probability: float) -> str:
-    return value_text(probability, "1") if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
+    return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
 
 
 def ended(sentence: str) -> str:

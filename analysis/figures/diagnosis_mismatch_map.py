@@ -43,7 +43,7 @@ def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
             title=f"Where model and device disagree, driven by {input_}",
             caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and the "
             "margin of equivalence, at a false discovery rate of 1 %. Rows: measured channels; columns: octaves, by "
-            "their lower edge." + _grouped_words(maps, input_),
+            "their lower edge; grey: not driven there." + _grouped_words(maps, input_),
             figure=draw_mismatch_map(maps, input_, unit),
             folded=number > 1,
             alternative=_in_words(maps, input_),

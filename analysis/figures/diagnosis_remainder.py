@@ -35,7 +35,7 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
         return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     columns = min(_COLUMNS, len(spectra))
     rows = -(-len(spectra) // columns)
-    figure = new_figure(8.8 if columns > 1 else 6.4, 0.9 + 2.1 * rows)
+    figure = new_figure(8.8, 0.9 + (2.1 if columns > 1 else 2.6) * rows)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axes in grid.ravel()[len(spectra) :]:
         axes.set_visible(False)

@@ -74,7 +74,7 @@ def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Fi
     """The best on top, marked where it is held to be true."""
     if not tried:
         return say_nothing_to_draw(new_figure(7.4, 1.4), "Nothing was tried.")
-    figure = new_figure(7.6, 1.05 + 0.29 * len(tried))
+    figure = new_figure(8.8, 1.05 + 0.3 * len(tried))
     axes = figure.add_subplot()
     plain_axes(axes)
     for row, one in enumerate(tried):

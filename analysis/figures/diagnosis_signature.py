@@ -32,7 +32,7 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
 
 
 def draw_signature(signature: Signature) -> Figure:
-    figure = new_figure(6.4, 3.7)
+    figure = new_figure(8.8, 4.0)
     if not len(signature.measured_at):
         return say_nothing_to_draw(figure, "Too few samples show this effect to draw it.")
     axes = figure.add_subplot()

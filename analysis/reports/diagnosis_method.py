@@ -2,6 +2,7 @@
 
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.mismatch_cells import LEVEL, Margin
+from analysis.diagnosis.observed import FLOOR
 from analysis.diagnosis.output_error import BOUND
 from analysis.wording import listed
 
@@ -68,14 +69,14 @@ def _choice(found: Findings) -> tuple[str, ...]:
         f"and moved by at most {BOUND:g} of them. Then every effect of the catalogue was tried wherever it could be, "
         "with starting values from what was still unexplained; the likeliest were fitted together with the model's "
         "numbers, and the best was kept where it earned its place on data that it was not fitted to. The same was done "
-        "for a further effect, at most three. A share of 0.2 % of each channel's signal counts as noise, because no "
-        "model is better than that.",
+        f"for a further effect, at most three. A share of {100 * FLOOR:g} % of each channel's signal counts as noise, "
+        "because no model is better than that.",
     )
 
 
 def _map() -> str:
     return (
         f"In the map, a mismatch of {100 * Margin().share:g} % of the signal, or as much as recordings in which "
-        "nothing is missing have, counts as none. Significant is what is larger beyond noise, with false discoveries held at "
-        f"{100 * LEVEL:g} % by closed testing: channel, then band, then level."
+        "nothing is missing have, counts as none. Significant is what is larger beyond noise, with false discoveries "
+        f"held at {100 * LEVEL:g} % by closed testing: channel, then band, then level."
     )

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.plausibility import implausible_sentences
 from analysis.diagnosis.retuned_numbers import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.wording import (
     black_box_beats,
@@ -50,7 +51,7 @@ def render_diagnosis_report(
         _own_numbers(found),
         *_one_sentence("A black box beside it", black_box_sentence(found.black_box)),
         *_one_sentence("The next recording", next_experiment_sentence(diagnosis)),
-        *([Section("Remarks", points=found.remarks)] if found.remarks else []),
+        *_remarks(found),
         Section("How this was done", paragraphs=method_paragraphs(found)),
     ]
     return render_page(
@@ -151,6 +152,11 @@ def _own_numbers(found: Findings) -> Section:
         points=doubtful_sentences(moved),
         tables=(table,) if table is not None else (),
     )
+
+
+def _remarks(found: Findings) -> list[Section]:
+    points = (*implausible_sentences(found), *found.remarks)
+    return [Section("Remarks", points=points)] if points else []
 
 
 def _one_sentence(heading: str, sentence: str) -> list[Section]:

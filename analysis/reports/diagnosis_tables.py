@@ -64,7 +64,7 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
             float(found.channel_errors.get(stage, {}).get(name, values[k]) if part == "test" else values[k])
             for stage, values in stands.items()
         ]
-        rows.append((name, *(f"{value_text(ratio * noise, unit)} ({ratio:.3g}×)" for ratio in ratios),
+        rows.append((name, *(f"{value_text(ratio * noise, unit)} ({_times(ratio)})" for ratio in ratios),
                      value_text(noise, unit)))  # fmt: skip
     header = ("Channel", *(f"{words} (× noise)" for _, words in _STAGES), "Noise")
     return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
@@ -108,6 +108,10 @@ def retuned_table(found: Findings) -> Table | None:
 def _error(errors: Errors, stage: str) -> str:
     value: float | None = getattr(errors, stage)
     return error_text(value)
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2f}×" if ratio < 10 else f"{ratio:.3g}×"
 
 
 def _interval(estimate: Estimate) -> str:
