@@ -14,6 +14,8 @@ ABOVE = 12.0
 """Times the spectrum's local median (power) that a tone must have."""
 NEIGHBOURS_HZ = 3.0
 ROUNDS = 4
+BLOCKS, STEADY = 12, 0.8
+"""Parts of a recording in which a tone must have the same amplitude and phase, and how nearly."""
 
 
 def _hummed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
@@ -39,9 +41,26 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
         if power[top] < ABOVE * float(np.median(power[near])):
             continue
         tone = _tone(residual[:, channel], evidence, float(lines_hz[top]))
-        if not any(abs(tone["frequency"] - other["frequency"]) < lines_hz[1] for other in found):
+        steady = _steadiness(residual[:, _loudest(residual, evidence, top)], evidence, tone["frequency"])
+        if steady > STEADY and not any(abs(tone["frequency"] - other["frequency"]) < lines_hz[1] for other in found):
             found.append(tone)
     return tuple(found)
+
+
+def _loudest(residual: FloatArray, evidence: Evidence, line: int) -> int:
+    """The channel with most of a line."""
+    turn = np.exp(-2j * np.pi * line * np.arange(len(residual)) / len(residual))
+    return int(np.argmax(np.abs(turn @ residual) / evidence.noise))
+
+
+def _steadiness(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> float:
+    """Of a tone's amplitude and phase throughout the recording: 1 for one that nothing stops or starts."""
+    turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(residual)) / evidence.sample_rate_hz) * residual
+    sums = np.array([part.sum() for part in np.array_split(turn, BLOCKS)])
+    counts = np.array([part.sum() for part in np.array_split(evidence.used, BLOCKS)])
+    each = sums[counts > 0] / counts[counts > 0]
+    size = float(np.sqrt(np.mean(np.abs(each) ** 2)))
+    return float(np.abs(each.mean())) / size if size > 0 else 0.0
 
 
 def _tone(residual: FloatArray, evidence: Evidence, frequency_hz: float) -> Values:

@@ -64,7 +64,11 @@ def starts_for_lateness(evidence: Evidence, axis: int, fitting: float | None, lo
 def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> FloatArray:
     """(k,): how much of each of the basis' (n, k) columns the residual (n,) holds."""
     columns = basis[used > 0]
-    return np.asarray(np.linalg.lstsq(columns, residual[used > 0], rcond=None)[0], dtype=np.float64)
+    size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    columns = columns / size
+    # Few columns of one length: their products lose nothing that matters, and are a tenth of the work.
+    found = np.linalg.lstsq(columns.T @ columns, columns.T @ residual[used > 0], rcond=None)[0]
+    return np.asarray(found / size, dtype=np.float64)
 
 
 def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float:

@@ -116,3 +116,11 @@ def test_a_tone_is_found_outside_the_mains_as_well(bench, command):
     seen = bench.measured(model, bench.placed("mains_hum", tone, 0), command, seed=2)
     found = EFFECTS["mains_hum"].starts(bench.evidence(model, seen), 0)
     assert any(start["frequency"] == pytest.approx(133.31, abs=1e-3) for start in found)
+
+
+def test_what_friction_adds_to_a_driven_line_is_no_tone(bench, command):
+    """It comes and goes with the excitation, and with another phase."""
+    model = bench.three_axes()
+    seen = bench.measured(model, bench.placed("coulomb_friction", {"level": 0.1}, 0), command, seed=2)
+    evidence = bench.evidence(model, seen)
+    assert [EFFECTS["mains_hum"].starts(evidence, channel) for channel in ALL] == [(), (), ()]
