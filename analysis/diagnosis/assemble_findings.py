@@ -36,8 +36,7 @@ def assembled(
     names: Sequence[str],
 ) -> Findings:
     """found.after is what is named; the same as re-tuned where nothing is. names: of the recordings."""
-    measure, tuning = arena.measure, arena.tuning
-    assert isinstance(measure, FreeSimulation)
+    measure, tuning = arena.whole, arena.tuning
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
@@ -89,8 +88,8 @@ def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
 
 def _errors(arena: Arena, found: Explanation) -> FloatArray:
     fitted = found.after.fitted
-    known = sensitivity(arena.measure, arena.tuning, fitted.deviations, fitted.hypothesis, arena.map_)
-    return standard_errors(arena.measure, arena.tuning, fitted, known)[len(fitted.deviations) :]
+    known = sensitivity(arena.whole, arena.tuning, fitted.deviations, fitted.hypothesis, arena.map_)
+    return standard_errors(arena.whole, arena.tuning, fitted, known)[len(fitted.deviations) :]
 
 
 def _courses(measure: FreeSimulation, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
@@ -131,8 +130,7 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
 
 def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature, ...]:
     """Each named effect's, against the final model without it alone."""
-    measure, tuning, fitted = arena.measure, arena.tuning, found.after.fitted
-    assert isinstance(measure, FreeSimulation)
+    measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
     names = Names(
         tuple(axis_letter(one, said.inputs) for one in said.inputs), said.outputs, said.response_unit, said.rotational
     )

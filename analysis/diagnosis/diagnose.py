@@ -46,7 +46,7 @@ def diagnose(
     noise = _noise(floors, records)
     unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
     measure = FreeSimulation(records, unit, noise)
-    arena = Arena(measure, tuning_of(model, recordings[0].command.channels), map_)
+    arena = Arena(measure.shortened(), measure, tuning_of(model, recordings[0].command.channels), map_)
     found = explain(arena, [one for one in CATALOGUE if one.name not in settings.without], progress)
     progress("writing down what was found", 0.95)
     judged = judge(found)

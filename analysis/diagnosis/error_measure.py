@@ -1,7 +1,7 @@
 """How far a model with effects is from what was observed, sample by sample, in units of the noise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -45,6 +45,10 @@ class FreeSimulation:
     """(c,): rms"""
     name: str = "free simulation"
 
+    def shortened(self) -> "FreeSimulation":
+        """Without the samples behind the last that decisions may see."""
+        return replace(self, records=tuple(one.shortened() for one in self.records))
+
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
             (one.measured - channels(self.played(model, effects, one), one.measured.shape[1])) / self.unit
@@ -53,7 +57,8 @@ class FreeSimulation:
 
     def played(self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed) -> Played:
         signals, p = record.recording, model.outputs
-        seen = Seen(record.measured[:, :p], self.noise[:p])
+        position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
+        seen = Seen(record.measured[:, :p], self.noise[:p], position)
         return simulate_mechanism(model, record.command, signals.sample_rate_hz, effects, signals.hold, seen)
 
 

@@ -6,20 +6,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.candidates import candidates
-from analysis.diagnosis.error_measure import FreeSimulation
+from analysis.diagnosis.families import excludes
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import NOTHING
-from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
-from analysis.diagnosis.rivalry import Arena, Contender, contest, refine
+from analysis.diagnosis.output_error import Fitted, evaluated, fit
+from analysis.diagnosis.parsimony import plainest_first
+from analysis.diagnosis.rivalry import Arena, Contender, contest, refine, sensitivity_at
 from analysis.diagnosis.screening import screen
 from equalizer.effects.effect import Effect
 
 RETUNING_ROUNDS = 4
 MOST_EFFECTS = 3
 CLEAN = 1.05
-"""Errors of so many times the noise, in the worst channel, count as noise alone."""
-WORTHWHILE = 0.3
-"""Share of what is left over that a further effect must take to be added."""
+"""Errors of so many times the noise, in the worst channel, count as noise alone;"""
+MORE = 1.12
+"""and of so many, as no reason to look for a further effect: laws of real physics are never exact."""
+WORTHWHILE = 0.4
+"""Share of what is left over that an effect must take to be added,"""
+NOTICED = 0.06
+"""and what a further one must take in mean log error power."""
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share of all that is done."""
@@ -42,32 +47,54 @@ class Explanation:
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Explanation:
     measure, tuning = arena.measure, arena.tuning
     before = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
-    progress("re-tuning the model within its tolerances", 0.0)
-    known = sensitivity(measure, tuning, before.deviations, NOTHING, arena.map_)
+    progress("re-tuning the model within its tolerances", 0.02)
+    known = sensitivity_at(arena, before.deviations, NOTHING)
     retuned = refine(arena, fit(measure, tuning, before, known, RETUNING_ROUNDS))
     base = arena.contender(retuned)
     rounds: list[tuple[Contender, ...]] = []
     steps: list[Contender] = []
-    while len(rounds) < MOST_EFFECTS and base.standing.seen > CLEAN:
-        progress(f"looking for the {('first', 'second', 'third')[len(rounds)]} effect", (1 + len(rounds)) / 4)
-        contenders = _next(arena, catalogue, base.fitted)
+    while len(rounds) < MOST_EFFECTS and base.standing.seen > (MORE if rounds else CLEAN):
+        step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+        contenders = _next(arena, catalogue, base.fitted, step)
         if not contenders or not _worthwhile(base, contenders[0]):
             rounds.append(contenders)
             break
         rounds.append(contenders)
         base = contenders[0]
         steps.append(base)
-    return Explanation(arena.contender(before), arena.contender(retuned), base, tuple(rounds), tuple(steps))
+    ends = [arena.confirmed(one) for one in (arena.contender(before), arena.contender(retuned), base)]
+    return Explanation(*ends, tuple(rounds), tuple(steps))
 
 
-def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted) -> tuple[Contender, ...]:
-    assert isinstance(arena.measure, FreeSimulation)
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A stretch of the work, as it is shown."""
+
+    what: str
+    begun: float
+    progress: Progress
+
+    def at(self, share: float) -> None:
+        self.progress(self.what, self.begun + 0.3 * share)
+
+
+def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[Contender, ...]:
+    step.at(0.0)
+    held = base.hypothesis.claims
     evidence = gather_evidence(arena.measure, arena.tuning, base)
-    suggested = candidates(catalogue, evidence[0])
-    known: Sensitivity = sensitivity(arena.measure, arena.tuning, base.deviations, base.hypothesis, arena.map_)
+    suggested = [
+        one for one in candidates(catalogue, evidence[0]) if not any(excludes(claim, one.claims[0]) for claim in held)
+    ]
+    known = sensitivity_at(arena, base.deviations, base.hypothesis)
+    step.at(0.2)
     screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
-    return contest(arena, base, known, screened)
+    step.at(0.6)
+    return plainest_first(contest(arena, base, known, screened))
 
 
 def _worthwhile(base: Contender, better: Contender) -> bool:
-    return better.standing.chosen_by < (1 - WORTHWHILE) * base.standing.chosen_by
+    left, then = base.standing.chosen_by, better.standing.chosen_by
+    return left - then > max(WORTHWHILE * left, NOTICED if base.fitted.hypothesis.claims else 0.0)
+
+
+_COUNTED = ("first", "second", "third")

@@ -36,6 +36,14 @@ class Observed:
     test: Mask
     """and that are only looked at in the end."""
 
+    def shortened(self) -> "Observed":
+        """Up to the last sample to fit or to choose by; the recording itself stays whole."""
+        end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
+        sealed = np.zeros(end, dtype=np.bool_)
+        return Observed(
+            self.recording, self.command[:end], self.measured[:end], self.fit[:end], self.choose[:end], sealed
+        )
+
 
 def observed(recording: Recording, responses: int) -> Observed:
     """responses: how many position channels belong to the model's outputs; a position of another width is left out."""

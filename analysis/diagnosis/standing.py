@@ -33,9 +33,9 @@ class Standing:
         return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
 
 
-def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...], noise: FloatArray) -> Standing:
-    """residuals: per record (n, c), in units of `measure.unit`; noise: (c,) rms."""
-    scale = measure.unit / noise
+def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> Standing:
+    """residuals: per record (n, c), in units of `measure.unit`."""
+    scale = measure.unit / measure.noise
     return Standing(
         *(
             rms_over(measure.records, residuals, [getattr(record, part) for record in measure.records]) * scale
@@ -45,7 +45,7 @@ def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...], noise: Fl
 
 
 def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
-    """(c,)"""
+    """(c,); NaN where no sample counts."""
     squares = sum(np.einsum("nc,nc->c", each[mask], each[mask]) for each, mask in zip(residuals, masks, strict=True))
     count = sum(int(mask.sum()) for mask in masks)
-    return np.asarray(np.sqrt(squares / max(count, 1)))
+    return np.asarray(np.sqrt(squares / count)) if count else np.full(residuals[0].shape[1], np.nan)

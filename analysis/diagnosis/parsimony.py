@@ -1,0 +1,38 @@
+"""Of explanations that are about as good, the plainest: fewer numbers, and the law that the other one only refines."""
+
+from collections.abc import Sequence
+
+from analysis.diagnosis.rivalry import Contender
+from analysis.diagnosis.same_within_errors import inseparable
+
+REFINED = 0.12
+"""Mean log error power that a refined law must gain over the plain one that it contains,"""
+REFINED_SHARE = 0.35
+"""or as a share of what the plain law leaves."""
+
+
+def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
+    """contenders: sorted by their errors, the best first; the same with the one to prefer at the front."""
+    if not contenders:
+        return ()
+    chosen = contenders[0]
+    for other in contenders[1:]:
+        if _is_plainer(other, chosen) and _good_enough(other, chosen):
+            chosen = other
+    return (chosen, *(one for one in contenders if one is not chosen))
+
+
+def _is_plainer(one: Contender, other: Contender) -> bool:
+    return len(one.fitted.hypothesis.point) < len(other.fitted.hypothesis.point) or _contained(one, other)
+
+
+def _contained(one: Contender, other: Contender) -> bool:
+    plain, refined = one.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
+    return plain.effect.name in refined.effect.simpler and set(plain.sites) <= set(refined.sites)
+
+
+def _good_enough(plain: Contender, refined: Contender) -> bool:
+    if not _contained(plain, refined):
+        return inseparable(refined, plain)
+    left = plain.standing.chosen_by
+    return left - refined.standing.chosen_by <= max(REFINED, REFINED_SHARE * left)
