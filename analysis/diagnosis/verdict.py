@@ -8,6 +8,9 @@ from analysis.diagnosis.rivalry import Contender
 
 EXPLAINED = 1.12
 """In the worst channel, errors of so many times the noise are as good as none: laws of real physics are never exact."""
+CONVINCING, CONVINCED = 0.93, 1.5
+"""So are errors of so many times the noise (second) where the explanation takes so much of the mismatch (first), in
+logarithms of power: a force that flips its sign leaves a blow where the real one is a little rounder."""
 NEARLY = 3.0
 """With errors up to so many times the noise, what was found is named beside a remainder;"""
 MOSTLY = 0.9
@@ -31,9 +34,10 @@ def judge(found: Explanation) -> Judgement:
     if not claims:
         return Judgement("unexplained", False)
     worst = found.after.standing.seen
-    if worst <= EXPLAINED:
+    share = share_of_mismatch(found.retuned, found.after)
+    if worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING):
         return Judgement("explained", True)
-    if worst <= NEARLY or share_of_mismatch(found.retuned, found.after) >= MOSTLY:
+    if worst <= NEARLY or share >= MOSTLY:
         return Judgement("partly_explained", True)
     return Judgement("unexplained", False)
 
