@@ -16,7 +16,7 @@ _GUESS = 1.3
 
 @compiled_law
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return rubbing(of[0], of[1], at)
+    return float(rubbing(of[0], of[1], memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -41,10 +41,10 @@ EFFECT = Effect(
     name="asymmetric_friction",
     equation="F = -level_positive where v > 0, +level_negative where v < 0",
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30:1083",
-    signature="the missing force flips its sign with the velocity, by unequal amounts; odd and even harmonics fall as "
-    "the level rises",
+    signature="the missing force flips its sign with the velocity, by unequal amounts: there is a mean force while "
+    "the axis moves; its odd harmonics fall as the level rises",
     parameters=(Parameter("level_positive", 1e-9, 1e6, none=0.0), Parameter("level_negative", 1e-9, 1e6, none=0.0)),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, _pack, memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

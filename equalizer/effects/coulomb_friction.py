@@ -13,7 +13,7 @@ from equalizer.signals.signal import FloatArray
 
 @compiled_law
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return rubbing(of[0], of[0], at)
+    return float(rubbing(of[0], of[0], memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -29,10 +29,10 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 EFFECT = Effect(
     name="coulomb_friction",
     equation="F = -level sgn(v)",
-    source="Coulomb; held still as in Karnopp 1985, J. Dyn. Syst. Meas. Control 107:100",
+    source="Coulomb; bristles of Canudas de Wit and others 1995, IEEE Trans. Autom. Control 40:419, 50 nm long",
     signature="the missing force flips its sign with the velocity and does not grow with it; its odd harmonics fall "
     "as the level rises",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0),),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, _pack, memory=1),
     starts=_starts,
 )

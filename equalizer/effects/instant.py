@@ -14,6 +14,6 @@ A_FREE, A_PER_N = 6, 7
 """Acceleration at the start without this force, and what 1 N adds to it."""
 STEP_S, TIME_S = 8, 9
 F_END = 10
-"""For the law to fill: its force at the step's very end, which an acceleration shows. Where it leaves that as it is, not
-a number, the mean over the step is taken."""
+"""For the law to fill: its force at the step's very end, which an acceleration shows. Where it leaves that as it is,
+not a number, the mean over the step is taken."""
 LENGTH = 11

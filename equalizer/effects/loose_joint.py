@@ -41,7 +41,7 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             last = -way * stiffness * max(end + way * at[X_PER_N] * spring, 0.0)
             break
     at[V_FREE] += at[V_PER_N] * spring
-    slipped = rubbing(slip, slip, at)
+    slipped = rubbing(slip, slip, memory[0], memory, at)
     at[F_END] += last
     return float(spring + slipped)
 
@@ -116,6 +116,6 @@ EFFECT = Effect(
         Parameter("stiffness", 1e-6, 1e12, none=0.0),
         Parameter("slip", 1e-9, 1e6, none=0.0),
     ),
-    acts=JointForce(_change, _law, _pack, steps=STEPS),
+    acts=JointForce(_change, _law, _pack, memory=1, steps=STEPS),
     starts=_starts,
 )

@@ -17,7 +17,7 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """With the friction at the step's mean position."""
     mean = 0.5 * (at[X] + at[X_FREE])
     level = max(of[0] * (1 + of[1] * mean + of[2] * mean * mean), 0.0)
-    return rubbing(level, level, at)
+    return float(rubbing(level, level, memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
@@ -44,7 +44,7 @@ EFFECT = Effect(
         Parameter("slope_per_m", -1e6, 1e6, none=None, scale="signed"),
         Parameter("bend_per_m2", -1e9, 1e9, none=None, scale="signed"),
     ),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, _pack, memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

@@ -20,10 +20,10 @@ _MORE = 1.2
 @compiled_law
 def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """With the friction at the step's mean velocity, which itself depends on the force."""
-    mean, force = at[V], 0.0
+    mean, force, start = at[V], 0.0, memory[0]
     for _ in range(3):
         level = of[0] + (of[1] - of[0]) * np.exp(-((mean / of[2]) ** 2))
-        force = rubbing(level, level, at)
+        force = rubbing(level, level, start, memory, at)
         mean = 0.5 * (at[V] + at[V_FREE] + at[V_PER_N] * force)
     return float(force)
 
@@ -59,7 +59,7 @@ EFFECT = Effect(
         Parameter("static", 1e-9, 1e6, none=0.0),
         Parameter("speed", 1e-6, 1e3, none=None, step=0.03),
     ),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, _pack, memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )
