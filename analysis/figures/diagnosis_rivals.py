@@ -20,6 +20,8 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
+_SEEN = "The data that were fitted to and chosen by; rivals are not tried on held-out data."
+_BOTH = "Filled: the data that were fitted to and chosen by; open: held-out data, which decided nothing."
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 
@@ -31,7 +33,7 @@ class Tried:
     seen: float
     """On the data that were fitted to and chosen by."""
     test: float
-    """On held-out data."""
+    """On held-out data; NaN where these were not looked at."""
 
 
 def tried_explanations(round_: Sequence[Contender], axes: Sequence[str]) -> tuple[Tried, ...]:
@@ -60,11 +62,12 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                     title=f"What was tried for the {_ORDINALS[number - 1]} effect"
                     + ("" if held else "; none earned its place"),
                     caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
-                    "together with what had been found before. Filled: the data that were fitted to and chosen by; "
-                    "open: held-out data, which decided nothing. Dashed: the re-tuned model alone.",
+                    "together with what had been found before. "
+                    + (_BOTH if any(np.isfinite(one.test) for one in tried) else _SEEN)
+                    + " Dashed: the re-tuned model alone.",
                     figure=draw_rivals(tried, retuned, held),
                     folded=not held,
-                    alternative=" ".join(f"{one.words}: {one.seen:.3g}, held-out {one.test:.3g}." for one in tried),
+                    alternative=" ".join(_in_words(one) for one in tried),
                 )
             )
     return tuple(pictures)
@@ -81,7 +84,8 @@ def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Fi
         colour = AFTER.colour if row == 0 and held else GREY
         axes.plot([one.seen, one.test], [row, row], color=colour, linewidth=1.2, zorder=2)
         axes.plot(one.seen, row, "o", color=colour, markersize=6.5, zorder=3)
-        axes.plot(one.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
+        if np.isfinite(one.test):
+            axes.plot(one.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
     axes.axvline(retuned.seen, color=RETUNED.colour, linestyle=RETUNED.dash, linewidth=RETUNED.width, zorder=1)
     axes.axvline(1, color=BLACK, linewidth=1.0, zorder=1)
     _mark(axes, 1.0, "noise", "right")
@@ -102,6 +106,11 @@ def _mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> 
         words, (at, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
         textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,
     )  # fmt: skip
+
+
+def _in_words(one: Tried) -> str:
+    held_out = f", held-out {one.test:.3g}" if np.isfinite(one.test) else ""
+    return f"{one.words}: {one.seen:.3g}{held_out}."
 
 
 def _scale(axes: Axes, values: FloatArray) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.figures.diagnosis_pictures import diagnosis_pictures
 from protocols.apparatus import SafetySettings, TestDirections
 from protocols.exposure import CatchSettings, DetectionSettings
 from protocols.preparation import PracticeSettings
@@ -219,3 +220,16 @@ def everything(simulate_study: Callable[..., list[Trial]], full_protocol: StudyP
         first = replace(last, trial=0, phase=Phase.CATCH, level_n=PUBLISHED.cap_n, correct=True)
         beside.append(replace(first, answer=first.direction_shown, reversal=False))
     return beside + trials
+
+
+@pytest.fixture(scope="session")
+def friction_found(diagnosed):
+    """Findings on one axis whose model lacks dry friction and has a damping that is 0.8 % off."""
+    model = diagnosed.device(1)
+    return diagnosed.diagnosed(diagnosed.recorded(1), replace(model, damping=1.008 * model.damping))
+
+
+@pytest.fixture(scope="session")
+def friction_pictures(friction_found):
+    """Drawn once."""
+    return diagnosis_pictures(friction_found)

@@ -1,0 +1,169 @@
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.mismatch_cells import MismatchCell
+from analysis.diagnosis.remainder_spectrum import remainder_spectra
+from analysis.figures.diagnosis_held_out import draw_held_out, telling_excerpt
+from analysis.figures.diagnosis_mismatch_map import draw_mismatch_map, mismatch_map_pictures
+from analysis.figures.diagnosis_remainder import draw_remainder
+from analysis.figures.diagnosis_rivals import draw_rivals, rivals_pictures, tried_explanations
+from analysis.figures.diagnosis_signature import draw_signature
+from analysis.figures.diagnosis_style import ratio_ticks
+from analysis.figures.picture import picture_svg
+from analysis.figures.style import new_figure
+
+
+def cell(output="ax", input_="fx", low_hz=8.0, amplitude=1.0, in_noise=5.0, p=1e-6, quantity="acceleration"):
+    return MismatchCell(
+        output, quantity, input_, (low_hz, 2 * low_hz), amplitude, 0.1, 1.0, in_noise, 0.02, p, p, 1.0
+    )  # fmt: skip
+
+
+def written(figure):
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_a_diagnosis_has_every_picture_and_each_is_told_in_words(friction_pictures):
+    names = [picture.name for picture in friction_pictures]
+    assert names == ["mismatch-map-1", "signature-1", "rivals-1", "held-out", "remainder"]
+    assert all(picture.alternative and picture.caption for picture in friction_pictures)
+    for picture in friction_pictures:
+        root = ElementTree.fromstring(picture_svg(picture))
+        labels = root.attrib["aria-labelledby"].split()
+        told = {one.attrib["id"]: one.text for one in root.iter() if one.attrib.get("id") in labels}
+        assert told[labels[0]] == picture.title
+        assert told[labels[1]] == picture.alternative
+
+
+def test_the_map_has_a_row_of_panels_per_level_and_a_column_per_stage():
+    cells = tuple(cell(amplitude=level, low_hz=low) for level in (0.5, 1.5, 3.0) for low in (4.0, 8.0))
+    figure = draw_mismatch_map({"before": cells, "retuned": cells, "after": cells}, "fx", "N")
+    panels = figure.axes[:-1]
+    assert len(panels) == 9
+    assert [axes.get_title(loc="left") for axes in panels[:3]] == ["as given", "re-tuned", "with what was found"]
+    assert [axes.get_ylabel() for axes in panels[::3]] == ["at 0.5 N", "at 1.5 N", "at 3 N"]
+
+
+def test_what_is_significant_is_framed_and_every_cell_has_its_number():
+    cells = (cell(in_noise=5.0), cell(output="ay", in_noise=1.2, p=0.5), cell(output="az", in_noise=2400.0))
+    axes = draw_mismatch_map({"before": cells}, "fx", "N").axes[0]
+    assert len(axes.patches) == 2
+    assert written(axes.figure) == ["5", "1.2", "2.4k"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["ax", "ay", "az"]
+
+
+def test_many_levels_are_drawn_in_groups_of_which_the_worst_is_shown():
+    cells = tuple(cell(amplitude=float(level), in_noise=float(level)) for level in range(1, 9))
+    (picture,) = mismatch_map_pictures({"before": cells})
+    assert "8 levels are drawn in 4 groups" in picture.caption
+    assert written(picture.figure) == ["2", "4", "6", "8"]
+
+
+def test_each_input_has_a_map_and_all_but_the_worst_are_folded():
+    pictures = mismatch_map_pictures({"before": (cell(), cell(input_="fy", in_noise=50.0))})
+    assert [(one.title[-2:], one.folded) for one in pictures] == [("fy", False), ("fx", True)]
+    assert "1 of 1 cells differ significantly; the worst is ax at 8 to 16 Hz" in pictures[0].alternative
+
+
+def test_channels_of_one_name_are_told_apart_by_their_quantity():
+    axes = draw_mismatch_map({"before": (cell("x"), cell("x", quantity="position"))}, "fx", "N").axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["x (acceleration)", "x (position)"]
+
+
+def test_a_signature_shows_dots_with_errors_and_the_law_in_units_that_read_well(friction_found):
+    axes = draw_signature(friction_found.signatures[0]).axes[0]
+    assert axes.get_xlabel() == "Velocity of x (mm/s)"
+    assert axes.get_ylabel() == "Missing force (N)"
+    (law,) = [line for line in axes.lines if line.get_label() == "fitted law"]
+    assert law.get_ydata().max() == pytest.approx(0.2, abs=0.01)
+    assert law.get_xdata().max() > 10
+
+
+def test_a_signature_without_samples_says_so(friction_found):
+    none = np.zeros(0)
+    empty = replace(friction_found.signatures[0], measured_at=none, measured=none, spread=none)
+    assert [text.get_text() for text in draw_signature(empty).texts] == ["Too few samples show this effect to draw it."]
+
+
+def test_the_excerpt_lies_in_held_out_data_where_the_named_effect_changes_the_prediction(friction_found):
+    found = telling_excerpt(friction_found.courses, friction_found.noise_rms)
+    course = friction_found.courses[0]
+    (tested,) = course.tested
+    assert tested[0] <= found.start < found.stop <= tested[1]
+    part = slice(found.start, found.stop)
+    change = (course.retuned - course.after)[:, found.channel] / friction_found.noise_rms[
+        course.channels[found.channel]
+    ]
+    assert np.std(change[part]) > np.std(change[slice(*tested)])
+
+
+def test_without_a_change_there_is_no_excerpt(friction_found):
+    course = friction_found.courses[0]
+    same = replace(course, before=course.after, retuned=course.after)
+    assert telling_excerpt((same,), friction_found.noise_rms) is None
+    assert telling_excerpt((), {}) is None
+
+
+def test_errors_of_every_channel_stand_beside_the_noise_line(friction_found):
+    axes = draw_held_out(None, {}, friction_found.channel_errors).axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["ax", "x"]
+    marks = {line.get_marker(): line.get_xdata() for line in axes.lines if line.get_marker() != "None"}
+    assert list(marks["o"]) == list(friction_found.channel_errors["after"].values())
+    assert written(axes.figure) == ["noise"]
+
+
+def test_the_remainder_lies_on_the_noise_where_all_is_explained(friction_found):
+    for one in remainder_spectra(friction_found.courses, friction_found.floor):
+        over = one.after / one.noise
+        assert np.median(over) == pytest.approx(1.0, abs=0.15)
+        assert np.max(one.retuned / one.noise) > 10
+
+
+def test_a_spectrum_of_white_noise_has_the_density_of_its_rms(friction_found):
+    course = friction_found.courses[0]
+    noise = np.random.default_rng(1).standard_normal(course.measured.shape)
+    white = replace(course, measured=course.after + noise)
+    one = remainder_spectra((white,), None)[0]
+    assert one.after[-10:].mean() == pytest.approx(np.sqrt(2 / course.sample_rate_hz), rel=0.05)
+    assert np.isnan(one.noise).all()
+
+
+def test_without_held_out_data_nothing_is_drawn(friction_found):
+    course = replace(friction_found.courses[0], tested=())
+    assert remainder_spectra((course,), friction_found.floor) == ()
+    sentence = "There are no held-out data to draw."
+    assert [text.get_text() for text in draw_remainder(()).texts] == [sentence]
+    assert [text.get_text() for text in draw_held_out(None, {}, {}).texts] == [sentence]
+
+
+def test_rivals_stand_below_the_best_with_their_errors(friction_found):
+    tried = tried_explanations(friction_found.explanation.rounds[0], ("x",))
+    assert [one.words for one in tried] == ["dry friction", "a lag of the amplifier"]
+    assert tried[0].seen < 1.1 < tried[1].seen
+    axes = draw_rivals(tried, replace(tried[1], words="re-tuned")).axes[0]
+    assert written(axes.figure) == ["noise", "re-tuned"]
+    assert axes.get_yticklabels()[0].get_fontweight() == "bold"
+
+
+def test_a_round_that_brought_nothing_is_folded_and_says_so(friction_found):
+    explanation = replace(friction_found.explanation, steps=())
+    (picture,) = rivals_pictures(explanation, ("x",))
+    assert picture.folded
+    assert picture.title == "What was tried for the first effect; none earned its place"
+    assert picture.figure.axes[0].get_yticklabels()[0].get_fontweight() != "bold"
+
+
+@pytest.mark.parametrize("high", [1.4, 3.0, 50.0, 800.0, 2e4, 3e6])
+def test_there_is_room_for_every_tick_of_a_ratio(high):
+    axes = new_figure(4.0, 3.0).add_subplot()
+    axes.set_xscale("log")
+    ratio_ticks(axes.xaxis, 0.7, high)
+    assert 2 <= len(axes.get_xticks()) <= 14
+
+
+def test_a_map_without_a_known_noise_says_so():
+    figure = draw_mismatch_map({}, "fx", "N")
+    assert [text.get_text() for text in figure.texts] == ["The noise is not known, so there is no map in its units."]

@@ -1,0 +1,201 @@
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.document import Errors, Estimate, Fit, Mismatch, Rival
+from analysis.diagnosis.findings import BlackBox
+from analysis.diagnosis.plausibility import implausible_sentences
+from analysis.diagnosis.wording import moved_of, summary_lines
+from analysis.reports.diagnosis_method import method_paragraphs
+from analysis.reports.diagnosis_report import render_diagnosis_report
+from analysis.reports.diagnosis_tables import channel_table, mismatch_table, parameter_table, retuned_table, rival_table
+from equalizer.effects.effect import PlacedEffect
+
+PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, None, 0.8, 1e-9)
+
+
+class Headings(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.found, self.inside, self.outside = [], "", []
+
+    def handle_starttag(self, tag, attrs):
+        self.inside = tag
+        named = [value for key, value in attrs if key in ("src", "href", "xlink:href")]
+        self.outside += [value for value in named if not value.startswith(("#", "data:"))]
+
+    def handle_data(self, data):
+        if self.inside in ("h1", "h2") and data.strip():
+            self.found.append(data)
+
+    def handle_endtag(self, tag):
+        self.inside = ""
+
+
+def rendered(found, pictures=()):
+    html = render_diagnosis_report(found, pictures, {"Recording": "rec.h5"}, "2026-01-01T00:00Z")
+    headings = Headings()
+    headings.feed(html)
+    return html, headings
+
+
+def told(found, **changes):
+    return replace(found, diagnosis=replace(found.diagnosis, **changes))
+
+
+@pytest.fixture(scope="module")
+def page(friction_found, friction_pictures):
+    return rendered(friction_found, friction_pictures)
+
+
+def test_the_verdict_comes_first_then_the_map_then_a_section_per_effect(page):
+    assert page[1].found == [
+        "Diagnosis of small", "What the model lacks", "Where model and device disagree", "Dry friction on the x drive",
+        "What else was tried", "How well it predicts", "What is still unexplained", "The model's own numbers",
+        "A black box beside it", "The next recording", "Remarks", "How this was done", "Where this comes from",
+    ]  # fmt: skip
+    assert page[0].index("The model lacks dry friction on the x drive. The error") < page[0].index("<h2")
+
+
+def test_an_effect_has_its_equation_source_numbers_figure_and_rivals(page):
+    for piece in ("Equation: F = -level sgn(v).", "Source: Coulomb;", 'id="signature-1"', "It and its rivals",
+                  "it leaves 4.1 times the noise."):  # fmt: skip
+        assert piece in page[0]
+
+
+def test_the_page_refers_to_nothing_outside_and_says_where_it_comes_from(page):
+    assert page[1].outside == []
+    assert "<dd>rec.h5</dd>" in page[0]
+
+
+def test_what_a_lab_named_is_escaped(friction_found):
+    text, _ = rendered(replace(friction_found, remarks=("<script>alert(1)</script>",)))
+    assert "<script>" not in text
+    assert "&lt;script&gt;" in text
+
+
+def test_held_out_data_that_do_not_confirm_stand_in_the_banner(friction_found):
+    fit = friction_found.diagnosis.fit
+    bad = told(friction_found, fit=Fit(fit.fit, Errors(0.5, 0.3, 0.4, 0.02)))
+    assert 'class="banner" role="note">The held-out data do not confirm this' in rendered(bad)[0]
+
+
+def test_a_black_box_that_beats_the_physics_stands_in_the_banner(friction_found):
+    better = replace(friction_found, black_box=BlackBox("ARX", 12, 0.01, 0.05))
+    assert 'class="banner" role="note">A black box (ARX, 12 numbers)' in rendered(better)[0]
+
+
+def test_a_confirmed_diagnosis_has_no_banner(page):
+    assert 'class="banner" role' not in page[0]
+
+
+def test_without_effects_there_is_no_section_of_any(friction_found):
+    bare = replace(
+        told(friction_found, verdict="unexplained", effects=(), mismatch=(PLACE,), next_experiment=None),
+        named=(), signatures=(), black_box=None, remarks=(), maps={},
+    )  # fmt: skip
+    text, headings = rendered(bare)
+    assert "no effect of the catalogue explains it" in text
+    assert "What the model lacks" not in headings.found
+    assert "There is no map: the noise of this recording is not known." in text
+
+
+def test_wrong_parameters_are_said_with_their_numbers(friction_found):
+    alone = replace(friction_found.explanation, after=friction_found.explanation.retuned)
+    bare = replace(told(friction_found, verdict="parameters", effects=()), explanation=alone, named=(), signatures=())
+    moved = moved_of(bare)
+    assert moved
+    text, _ = rendered(bare)
+    assert f"No physics is missing; numbers of the model are off: {moved[0].text}" in text
+
+
+def test_channels_stand_in_their_units_with_the_noise_beside(friction_found):
+    table = channel_table(friction_found, "test")
+    assert [row[0] for row in table.rows] == ["ax", "x"]
+    assert table.rows[1][3].endswith("×)")
+    assert "µm (" in table.rows[1][3]
+    ratio = friction_found.channel_errors["after"]["x"]
+    assert f"({ratio:.2f}×)" in table.rows[1][3]
+    assert channel_table(replace(friction_found, courses=()), "fit") is None
+
+
+def test_rivals_that_cannot_be_told_apart_stand_above_those_passed_over(friction_found):
+    (effect,) = friction_found.diagnosis.effects
+    rivals = (Rival("viscous_damping", 0.1, False, "worse"), Rival("stribeck_friction", 0.05, True, ""))
+    table = rival_table(replace(effect, rivals=rivals))
+    assert [row[2] for row in table.rows] == ["named", "cannot be told apart", "passed over"]
+
+
+def test_a_number_without_an_interval_has_a_dash(friction_found):
+    (effect,) = friction_found.diagnosis.effects
+    table = parameter_table(replace(effect, parameters={"level": Estimate(0.2, "N")}))
+    assert table.rows == (("level", "0.200 N", "–"),)
+
+
+def test_a_long_list_of_places_is_cut_and_says_so():
+    table = mismatch_table("Places", (PLACE,) * 15)
+    assert len(table.rows) == 12
+    assert table.notes == ("And 3 smaller places.",)
+
+
+def test_every_open_number_is_listed_with_how_far_it_moved(friction_found):
+    table = retuned_table(friction_found)
+    assert [row[0] for row in table.rows] == list(friction_found.tuning.names)
+    assert retuned_table(replace(friction_found, tuning=None)) is None
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        ("free simulation", "played from rest by the recorded commands alone"),
+        ("predicted force", "the force that it needs for the measured motion"),
+        ("windows of 1 s", "played over windows of 1 s, each begun from the measured state"),
+    ],
+)
+def test_the_method_says_how_errors_were_measured(friction_found, error, words):
+    assert words in method_paragraphs(told(friction_found, error=error))[0]
+
+
+def test_the_method_says_how_the_time_was_split_and_the_noise_found(friction_found):
+    said = " ".join(method_paragraphs(friction_found))
+    assert "6 s were fitted to, 3 s served to choose between explanations and 3 s were sealed" in said
+    assert "The noise was measured from what differs between repeats" in said
+
+
+def test_the_summary_begins_with_the_verdict_and_ends_with_the_remarks(friction_found):
+    lines = summary_lines(friction_found)
+    assert lines[0].startswith("The model lacks dry friction on the x drive.")
+    assert lines[1].startswith("Dry friction on the x drive, 0.")
+    assert lines[-1] == "A remark."
+
+
+def test_a_believable_fit_is_not_doubted(friction_found):
+    assert implausible_sentences(friction_found) == ()
+
+
+def test_a_number_at_the_end_of_its_range_is_doubted(friction_found):
+    (placed,) = friction_found.named
+    most = {"level": placed.effect.parameters[0].upper}
+    wild = replace(friction_found, named=(PlacedEffect(placed.effect, placed.sites, most),))
+    (said,) = implausible_sentences(wild)
+    assert said.startswith("The level of dry friction ran into the end of what was allowed (")
+
+
+def test_an_interval_that_holds_no_effect_is_doubted(friction_found):
+    (effect,) = friction_found.diagnosis.effects
+    faint = replace(effect, parameters={"level": Estimate(0.01, "N", (-0.01, 0.03))})
+    (said,) = implausible_sentences(told(friction_found, effects=(faint,)))
+    assert (
+        said == "The interval of dry friction, 0.01 N [−0.01, 0.03], holds no effect at all: the data hardly bear it."
+    )
+
+
+def test_an_improved_model_that_makes_energy_is_doubted(friction_found):
+    model = replace(friction_found.improved, damping=np.array([[-1.0]]))
+    (said,) = implausible_sentences(replace(friction_found, improved=model))
+    assert (
+        said
+        == "The improved model's damping is negative in one direction: in it, the device would gain energy by itself."
+    )
