@@ -19,13 +19,20 @@ def _read(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...]
     return read_other_times(response, 1 + 1e-6 * of["ppm"], 0.0, of.get("interpolated", 0.0))
 
 
+def _read_position(position: FloatArray, sample_rate_hz: float, of: Values) -> FloatArray:
+    return _read(position, sample_rate_hz, (), of) if of.get("with_position", 1.0) > 0.5 else position
+
+
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The slope of how late the response comes, window by window. A straight line between samples loses height where
     a real clock does not: both are tried."""
     slope = _lateness_per_second(evidence) if channel <= 0 else None
     if slope is None:
         return ()
-    starts = [{"ppm": -1e6 * slope, "interpolated": straight} for straight in (0.0, 1.0)]
+    with_position = _with_position(evidence, slope)
+    starts = [
+        {"ppm": -1e6 * slope, "interpolated": straight, "with_position": with_position} for straight in (0.0, 1.0)
+    ]
     return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
 
 
@@ -34,28 +41,42 @@ def _misfit(evidence: Evidence, values: Values) -> float:
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
+def _with_position(evidence: Evidence, slope: float) -> float:
+    """1 where the measured position drifts along, 0 where the commands' clock reads it."""
+    if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
+        return 1.0
+    noise = evidence.position_noise
+    own = _slope(evidence, evidence.position / noise, evidence.predicted_position / noise)
+    return 1.0 if own is None or abs(own[0] - slope) < abs(own[0]) else 0.0
+
+
 def _lateness_per_second(evidence: Evidence) -> float | None:
+    found = _slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
+    if found is None:
+        return None
+    slope, error = found
+    return slope if abs(slope) > LEAST_SIGMA * error and abs(slope) < 1e-6 * LARGEST_PPM else None
+
+
+def _slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
+    """By which the lateness grows with time, and its standard error."""
     rate = evidence.sample_rate_hz
     length = int(WINDOW_S * rate)
-    measured, predicted = evidence.response / evidence.noise, evidence.predicted / evidence.noise
-    found: list[tuple[float, float, float]] = []
+    at, late = [], []
     for start in range(0, len(measured) - length + 1, length):
         inside = slice(start, start + length)
-        size = float(np.sum(predicted[inside] ** 2))
-        if evidence.used[inside].all() and size > 0:
-            late = lateness(measured[inside], predicted[inside], int(LONGEST_S * rate)) / rate
-            found.append(((start + 0.5 * length) / rate, late, size))
-    if len(found) < LEAST_WINDOWS:
+        if evidence.used[inside].mean() > 0.5 and np.any(predicted[inside]):
+            at.append((start + 0.5 * length) / rate)
+            late.append(lateness(measured[inside], predicted[inside], int(LONGEST_S * rate)) / rate)
+    if len(at) < LEAST_WINDOWS:
         return None
-    at, late, _ = np.array(found).T
     # Windows in which nearly nothing moved are off by anything: pairwise slopes have a median that does not mind.
-    first, second = np.triu_indices(len(at), 1)
-    slopes = (late[second] - late[first]) / (at[second] - at[first])
-    slope = float(np.median(slopes))
-    rest = late - slope * at
+    when, by = np.array(at), np.array(late)
+    first, second = np.triu_indices(len(when), 1)
+    slope = float(np.median((by[second] - by[first]) / (when[second] - when[first])))
+    rest = by - slope * when
     spread = 1.5 * float(np.median(np.abs(rest - np.median(rest))))
-    error = spread / (np.sqrt(len(at)) * float(at.std()))
-    return slope if abs(slope) > LEAST_SIGMA * error and abs(slope) < 1e-6 * LARGEST_PPM else None
+    return slope, spread / (np.sqrt(len(when)) * float(when.std()))
 
 
 EFFECT = Effect(
@@ -67,8 +88,9 @@ EFFECT = Effect(
     parameters=(
         Parameter("ppm", -LARGEST_PPM, LARGEST_PPM, none=0.0, scale="linear", step=0.1),
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
+        Parameter("with_position", 0.0, 1.0, none=None, scale="linear", step=1.0, fixed=True),
     ),
-    acts=OnResponse(_read, stage=4, shared=True, position_too=True),
+    acts=OnResponse(_read, stage=4, shared=True, on_position=_read_position),
     starts=_starts,
     sites=("all",),
 )

@@ -102,11 +102,13 @@ class OnResponse:
     """It cannot befall one channel alone."""
     bandwidth_hz: Callable[[float, Values], float] | None = None
     """Of its channels' low pass, from what the model says it is; 0 = none."""
-    position_too: bool = False
-    """The position is read by the same clock or logger and undergoes the same."""
+    on_position: Callable[[FloatArray, float, Values], FloatArray] | None = None
+    """What becomes of the positions (n, p) where the same clock reads them: sample rate, values."""
     given: Callable[[FloatArray, FloatArray, FloatArray, tuple[int, ...], Values], FloatArray] | None = None
     """Where chance decides, what was read given what was measured: samples (n, p), measured (n, p), its noise (p,),
     channels, values. Without a measurement `change` plays some chance."""
+    given_position: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray] | None = None
+    """The same of the position: response before and after, position (n, p), as measured (n, p)."""
 
 
 Acts = Structure | AxisForce | JointForce | OnCommand | OnResponse

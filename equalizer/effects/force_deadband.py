@@ -1,4 +1,4 @@
-"""An actuator that does not answer small commands, and larger ones with that much less."""
+"""An actuator that does not answer small commands, and larger ones with that much less, or with a jump."""
 
 import numpy as np
 
@@ -9,23 +9,35 @@ from equalizer.signals.signal import FloatArray
 
 
 def _beyond(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
-    return np.asarray(commands - np.clip(commands, -of["width"], of["width"]))
+    width = of["width"]
+    jump = of.get("jump", 0.0) * width * np.sign(commands) * (np.abs(commands) > width)
+    return np.asarray(commands - np.clip(commands, -width, width) + jump)
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     peaks = grid_of_peaks(evidence, axis)
     grid = [peaks[0] / 30, peaks[0] / 10, peaks[0] / 3, *peaks] if peaks else []
-    width = likeliest_value(evidence, axis, lambda u, step_s, value: -np.clip(u, -value, value) + u, grid, True)
-    return () if width is None else ({"width": width},)
+    found = []
+    for jump in (0.0, 1.0):
+
+        def change(commands: FloatArray, step_s: float, width: float, jump: float = jump) -> FloatArray:
+            return _beyond(commands, step_s, {"width": width, "jump": jump})
+
+        width = likeliest_value(evidence, axis, change, grid, True)
+        found += [] if width is None else [{"width": width, "jump": jump}]
+    return tuple(found)
 
 
 EFFECT = Effect(
     name="force_deadband",
-    equation="F = u - max(-width, min(u, width))",
+    equation="F = 0 where |u| <= width, else u - (1 - jump) width sgn(u)",
     source="Tao and Kokotovic, IEEE Trans. Autom. Control 39 (1994) 59: dead zones of actuators",
     signature="the missing force flips its sign with the command, not with the motion, and does not grow with it; its "
     "odd harmonics fall as the level rises",
-    parameters=(Parameter("width", 1e-6, 1e4, none=0.0),),
+    parameters=(
+        Parameter("width", 1e-6, 1e4, none=0.0),
+        Parameter("jump", 0.0, 1.0, none=None, scale="linear", step=0.05),
+    ),
     acts=OnCommand(_beyond),
     starts=_starts,
     sites=("one", "all"),

@@ -55,6 +55,17 @@ def _repeated(
     return read, lost
 
 
+def _given_position(before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray) -> FloatArray:
+    """Repeats where the response does, if the measured position was read by the same logger and shows it."""
+    lost = np.any(after != before, axis=1)
+    if not lost.any():
+        return position
+    held = np.empty(position.shape)
+    repeat_where(np.ascontiguousarray(position), lost, held)
+    better = np.nansum((measured - held)[lost] ** 2) < np.nansum((measured - position)[lost] ** 2)
+    return held if better else position
+
+
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     which = [channel]
     found = _fraction(evidence, which, 1)
@@ -85,9 +96,10 @@ EFFECT = Effect(
     name="lost_samples",
     equation="y[k] = y[k-1] at a fraction of all samples, by chance; else x[k]",
     source="Gilbert 1960, Bell Syst. Tech. J. 39:1253: losses in a channel",
-    signature="single samples repeat the one before, scattered at random, while the position agrees",
+    signature="single samples repeat the one before, scattered at random, in the response and in nothing "
+    "that another logger read",
     parameters=(Parameter("fraction", 1e-6, LARGEST, none=0.0, fixed=True),),
-    acts=OnResponse(_played, stage=5, given=_given),
+    acts=OnResponse(_played, stage=5, given=_given, given_position=_given_position),
     starts=_starts,
     sites=("all", "one"),
 )

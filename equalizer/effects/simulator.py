@@ -22,6 +22,8 @@ class Seen:
     """(n, p)"""
     noise: FloatArray
     """(p,): rms"""
+    position: FloatArray | None = None
+    """(n, p), of the same rows"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,12 +85,15 @@ def _sensed(
         for acts, placed in on_response:
             if acts.after_filter is not after_filter:
                 continue
+            before = response
             if seen is not None and acts.given is not None:
                 response = acts.given(response, seen.response, seen.noise, placed.sites, placed.values)
             else:
                 response = acts.change(response, sample_rate_hz, placed.sites, placed.values)
-            if acts.position_too:
-                position = acts.change(position, sample_rate_hz, tuple(range(position.shape[1])), placed.values)
+            if acts.on_position is not None:
+                position = acts.on_position(position, sample_rate_hz, placed.values)
+            if seen is not None and seen.position is not None and acts.given_position is not None:
+                position = acts.given_position(before, response, position, seen.position)
     response = within_range(response, model.sensor.range)
     return Played(response, position, played.axis_position, played.axis_velocity, played.axis_force)
 

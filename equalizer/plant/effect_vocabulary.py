@@ -124,7 +124,7 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     ),
     EffectName("body_on_actuator", "actuator", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
     EffectName("force_saturation", "actuator", (_level("limit"),)),
-    EffectName("force_deadband", "actuator", (_level("width"),)),
+    EffectName("force_deadband", "actuator", (_level("width"), _optional("jump", "1"))),
     EffectName("slew_limit", "actuator", (_number("rate", "N/s", "N m/s"),)),
     EffectName("amplifier_lag", "actuator", (_number("time_constant", "s"),)),
     EffectName("transport_delay", "actuator", (_number("delay", "s"),)),
@@ -140,12 +140,16 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("sensor_gain", "sensor", (_number("gain", "1"),)),
     EffectName("sensor_nonlinearity", "sensor", (_number("cubic", f"1/{RESPONSE}^2"),)),
     EffectName("sensor_offset", "sensor", (_number("offset", RESPONSE),)),
-    EffectName("sensor_drift", "sensor", (_number("total", RESPONSE), _optional("bend", "1"))),
+    EffectName("sensor_drift", "sensor", (_number("total", RESPONSE), _optional("bend", "1"), _optional("start", "1"))),
     EffectName("quantization", "sensor", (_number("step", RESPONSE),)),
     EffectName(
         "mains_hum", "sensor", (_number("amplitude", RESPONSE), _number("frequency", "Hz"), _optional("phase", "rad"))
     ),
-    EffectName("clock_drift", "sensor", (_number("ppm", "ppm"), _optional("interpolated", "1"))),
+    EffectName(
+        "clock_drift",
+        "sensor",
+        (_number("ppm", "ppm"), _optional("interpolated", "1"), _optional("with_position", "1")),
+    ),
     EffectName("logger_offset", "sensor", (_number("offset", "s"),)),
     EffectName("lost_samples", "sensor", (_number("fraction", "1"),)),
 )

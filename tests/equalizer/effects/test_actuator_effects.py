@@ -68,3 +68,17 @@ def test_a_gain_scales_the_motion_of_a_linear_device(bench, command):
     plain = bench.measured(model, (), command, seed=None).response
     scaled = bench.measured(model, bench.placed("force_gain", {"gain": 1.3}, *ALL), command, seed=None).response
     np.testing.assert_allclose(scaled, 1.3 * plain, atol=1e-9)
+
+
+def test_a_dead_band_may_end_with_a_jump():
+    commands = np.array([-2.0, -0.5, 0.5, 2.0])
+    beyond = DEADBAND.acts.change(commands, 1e-3, {"width": 0.8, "jump": 1.0})
+    np.testing.assert_allclose(beyond, [-2.0, 0.0, 0.0, 2.0])
+
+
+def test_a_dead_band_with_a_jump_is_found_as_one(bench, command):
+    model = bench.three_axes()
+    values = {"width": 0.2, "jump": 1.0}
+    seen = bench.measured(model, bench.placed("force_deadband", values, 1), command, seed=3)
+    starts = EFFECTS["force_deadband"].starts(bench.evidence(model, seen), 1)
+    assert {start["jump"]: start["width"] for start in starts}[1.0] == pytest.approx(0.2, rel=0.1)

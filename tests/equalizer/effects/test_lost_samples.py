@@ -50,6 +50,21 @@ def test_given_what_was_measured_the_losses_stand_where_they_were(bench, command
     assert ((seen.response - given) / noise).std() == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.parametrize("same_logger", [True, False])
+def test_a_position_of_the_same_logger_is_lost_with_the_response(bench, command, same_logger):
+    model, seen = lossy(bench, command, 0.02, 4)
+    noise, rng = np.full(3, bench.NOISE_MPS2), np.random.default_rng(9)
+    lost, position = np.random.default_rng(104).random(len(command)) < 0.02, seen.played.position.copy()
+    if same_logger:
+        repeat_where(seen.played.position.copy(), lost, position)
+    measured = position + bench.NOISE_M * rng.standard_normal(position.shape)
+    placed = bench.placed("lost_samples", {"fraction": 0.02}, *ALL)
+    given = simulate_mechanism(model, command, 1000.0, placed, seen=Seen(seen.response, noise, measured))
+    # A loss that the response does not show, because it hardly moved, stays in the position.
+    assert ((measured - given.position) / bench.NOISE_M).std() < 1.2
+    assert np.any(given.position != seen.played.position) == same_logger
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_is_lost_in_a_clean_recording(bench, command, seed):
     model = bench.three_axes()

@@ -57,6 +57,13 @@ def test_a_drifting_clock_takes_the_position_with_it(bench, command):
     np.testing.assert_allclose(drifted.position, expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("with_position", [0.0, 1.0])
+def test_whether_the_position_drifts_along_is_seen(bench, command, with_position):
+    model, values = bench.three_axes(), {"ppm": 100.0, "with_position": with_position}
+    seen = bench.measured(model, bench.placed("clock_drift", values, *ALL), command, seed=4)
+    assert DRIFT.starts(bench.evidence(model, seen), 0)[0]["with_position"] == with_position
+
+
 @pytest.mark.parametrize("offset_s", [3e-4, -0.0123, 0.25])
 def test_a_loggers_offset_is_found_and_spares_the_position(bench, command, offset_s):
     model = bench.three_axes()

@@ -23,7 +23,7 @@ STRONG = [
     ("sensor_nonlinearity", {"cubic": -4e-4}, (0,), 0.05),
     ("sensor_offset", {"offset": -0.2}, (1,), 0.02),
     ("sensor_drift", {"total": 0.4, "bend": 0.2}, (1,), 0.02),
-    ("sensor_drift", {"total": -2.0, "bend": 0.0}, (0,), 0.02),
+    ("sensor_drift", {"total": -2.0, "bend": 0.0, "start": -0.5}, (0,), 0.02),
     ("mains_hum", {"amplitude": 0.06, "frequency": 49.987, "phase": 0.4}, (1,), 0.05),
 ]
 
@@ -103,6 +103,8 @@ def test_a_drift_ends_at_its_total_and_bends_in_the_middle():
     drifted = read("sensor_drift", {"total": 2.0, "bend": 0.25}, np.zeros((101, 2)), 1)
     assert not drifted[:, 0].any()
     np.testing.assert_allclose(drifted[[0, 50, 100], 1], [0.0, 1.5, 2.0])
+    shifted = read("sensor_drift", {"total": 2.0, "start": -0.5}, np.zeros((101, 1)), 0)
+    np.testing.assert_allclose(shifted[[0, 100], 0], [-1.0, 1.0])
 
 
 def test_a_cubic_bends_both_ways_alike():
@@ -124,3 +126,9 @@ def test_what_friction_adds_to_a_driven_line_is_no_tone(bench, command):
     seen = bench.measured(model, bench.placed("coulomb_friction", {"level": 0.1}, 0), command, seed=2)
     evidence = bench.evidence(model, seen)
     assert [EFFECTS["mains_hum"].starts(evidence, channel) for channel in ALL] == [(), (), ()]
+
+
+def test_an_offset_alone_is_no_drift(bench, command):
+    model = bench.three_axes()
+    seen = bench.measured(model, bench.placed("sensor_offset", {"offset": 0.3}, 1), command, seed=2)
+    assert EFFECTS["sensor_drift"].starts(bench.evidence(model, seen), 1) == ()
