@@ -19,72 +19,74 @@ class EffectWords:
     """Parameters that are read as per cent."""
 
 
-def _words(noun: str, *shares: str, **numbers: str) -> EffectWords:
-    return EffectWords(noun, numbers, shares)
-
-
 EFFECT_WORDS: Mapping[str, EffectWords] = {
-    "coulomb_friction": _words("dry friction"),
-    "asymmetric_friction": _words(
-        "dry friction that differs with the direction", level_positive="{} forwards", level_negative="{} backwards"
+    "coulomb_friction": EffectWords("dry friction"),
+    "asymmetric_friction": EffectWords(
+        "dry friction that differs with the direction",
+        {"level_positive": "{} forwards", "level_negative": "{} backwards"},
     ),
-    "stribeck_friction": _words(
+    "stribeck_friction": EffectWords(
         "friction that is larger at rest (Stribeck)",
-        coulomb="{} in motion",
-        static="{} at rest",
-        speed="a transition over {}",
+        {"coulomb": "{} in motion", "static": "{} at rest", "speed": "a transition over {}"},
     ),
-    "position_dependent_friction": _words(
+    "position_dependent_friction": EffectWords(
         "dry friction that depends on the position",
-        level="{} at the centre",
-        slope_per_m="growing by {}",
-        bend_per_m2="bent by {}",
+        {"level": "{} at the centre", "slope_per_m": "growing by {}", "bend_per_m2": "bent by {}"},
     ),
-    "presliding_hysteresis": _words(
-        "dry friction with elastic presliding", level=_BARE, stiffness="a stiffness of {} before it slides"
+    "presliding_hysteresis": EffectWords(
+        "dry friction with elastic presliding", {"level": _BARE, "stiffness": "a stiffness of {} before it slides"}
     ),
-    "viscous_damping": _words("viscous damping"),
-    "quadratic_damping": _words("damping that grows with the square of the speed"),
-    "hardening_stiffness": _words("a spring that hardens with displacement"),
-    "asymmetric_stiffness": _words("a spring that is stiffer to one side"),
-    "constant_force": _words("a constant force"),
-    "cogging": _words("a force ripple along the travel (cogging)", amplitude=_BARE, pitch="repeating every {}"),
-    "backlash": _words("play (backlash)", gap="a gap of {}"),
-    "loose_joint": _words("a loose joint", gap="a gap of {}", stiffness="a stiffness of {}", slip="slipping at {}"),
-    "end_stop": _words("an end stop", position="met at {}", stiffness="a stiffness of {}"),
-    "pose_dependent_inertia": _words("inertia that changes with the position", per_m=_BARE),
-    "extra_mode": _words(
-        "a resonance that the model lacks", frequency="at {}", mass="carrying {}", damping_ratio="damping ratio {}"
+    "viscous_damping": EffectWords("viscous damping"),
+    "quadratic_damping": EffectWords("damping that grows with the square of the speed"),
+    "hardening_stiffness": EffectWords("a spring that hardens with displacement"),
+    "asymmetric_stiffness": EffectWords("a spring that is stiffer to one side"),
+    "constant_force": EffectWords("a constant force"),
+    "cogging": EffectWords(
+        "a force ripple along the travel (cogging)", {"amplitude": _BARE, "pitch": "repeating every {}"}
     ),
-    "added_mass": _words("an added mass"),
-    "hand_impedance": _words(
-        "a hand that holds on", mass=_BARE, damping=_BARE, stiffness=_BARE
+    "backlash": EffectWords("play (backlash)", {"gap": "a gap of {}"}),
+    "loose_joint": EffectWords(
+        "a loose joint", {"gap": "a gap of {}", "stiffness": "a stiffness of {}", "slip": "slipping at {}"}
     ),
-    "time_varying_grip": _words("a grip that varies in time", "depth", rate_hz="at {}", depth="by {}"),
-    "body_on_actuator": _words("a body that hangs on the drive", mass=_BARE, damping=_BARE, stiffness=_BARE),
-    "force_saturation": _words("force saturation", limit="at {}"),
-    "force_deadband": _words("a dead band of the force", width="± {}"),
-    "slew_limit": _words("a limited rate of change of the force", rate="at most {}"),
-    "amplifier_lag": _words("a lag of the amplifier", time_constant="time constant {}"),
-    "transport_delay": _words("a delay of the command"),
-    "force_gain": _words("a wrong force gain", gain="a factor of {}"),
-    "sensor_lag": _words("a low pass in the sensor", bandwidth="at {}"),
-    "sensor_clipping": _words("clipping in the sensor", limit="at {}"),
-    "sensor_misalignment": _words("a turned sensor"),
-    "cross_axis_sensitivity": _words(
-        "sensor axes that hear each other", "from_next", "from_after_next",
-        from_next="{} of the next axis", from_after_next="{} of the one after it",
+    "end_stop": EffectWords("an end stop", {"position": "met at {}", "stiffness": "a stiffness of {}"}),
+    "pose_dependent_inertia": EffectWords("inertia that changes with the position", {"per_m": _BARE}),
+    "extra_mode": EffectWords(
+        "a resonance that the model lacks",
+        {"frequency": "at {}", "mass": "carrying {}", "damping_ratio": "damping ratio {}"},
     ),
-    "sensor_gain": _words("a wrong sensor gain", gain="a factor of {}"),
-    "sensor_nonlinearity": _words("a sensor that is not linear", cubic="cubic term {}"),
-    "sensor_offset": _words("a sensor offset"),
-    "sensor_drift": _words("a drift of the sensor", total="{} in all"),
-    "quantization": _words("rounding to steps (quantisation)", step="steps of {}"),
-    "mains_hum": _words("mains hum", amplitude=_BARE, frequency="at {}"),
-    "clock_drift": _words("clocks that run apart", ppm=_BARE),
-    "logger_offset": _words("a logger that is late", offset=_BARE),
-    "lost_samples": _words("lost samples", "fraction", fraction="{} of all"),
-}  # fmt: skip
+    "added_mass": EffectWords("an added mass"),
+    "hand_impedance": EffectWords("a hand that holds on", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}),
+    "time_varying_grip": EffectWords("a grip that varies in time", {"rate_hz": "at {}", "depth": "by {}"}, ("depth",)),
+    "body_on_actuator": EffectWords(
+        "a body that hangs on the drive", {"mass": _BARE, "damping": _BARE, "stiffness": _BARE}
+    ),
+    "force_saturation": EffectWords("force saturation", {"limit": "at {}"}),
+    "force_deadband": EffectWords("a dead band of the force", {"width": "± {}"}),
+    "slew_limit": EffectWords("a limited rate of change of the force", {"rate": "at most {}"}),
+    "amplifier_lag": EffectWords("a lag of the amplifier", {"time_constant": "time constant {}"}),
+    "transport_delay": EffectWords("a delay of the command"),
+    "force_gain": EffectWords("a wrong force gain", {"gain": "a factor of {}"}),
+    "sensor_lag": EffectWords("a low pass in the sensor", {"bandwidth": "at {}"}),
+    "sensor_clipping": EffectWords("clipping in the sensor", {"limit": "at {}"}),
+    "sensor_misalignment": EffectWords("a turned sensor"),
+    "cross_axis_sensitivity": EffectWords(
+        "sensor axes that hear each other",
+        {"from_next": "{} of the next axis", "from_after_next": "{} of the one after it"},
+        (
+            "from_next",
+            "from_after_next",
+        ),
+    ),
+    "sensor_gain": EffectWords("a wrong sensor gain", {"gain": "a factor of {}"}),
+    "sensor_nonlinearity": EffectWords("a sensor that is not linear", {"cubic": "cubic term {}"}),
+    "sensor_offset": EffectWords("a sensor offset"),
+    "sensor_drift": EffectWords("a drift of the sensor", {"total": "{} in all"}),
+    "quantization": EffectWords("rounding to steps (quantisation)", {"step": "steps of {}"}),
+    "mains_hum": EffectWords("mains hum", {"amplitude": _BARE, "frequency": "at {}"}),
+    "clock_drift": EffectWords("clocks that run apart", {"ppm": _BARE}),
+    "logger_offset": EffectWords("a logger that is late", {"offset": _BARE}),
+    "lost_samples": EffectWords("lost samples", {"fraction": "{} of all"}, ("fraction",)),
+}
 
 
 def noun_of(effect: str) -> str:
