@@ -57,7 +57,7 @@ def _bending(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_crossed(at: Circumstances) -> dict[str, float]:
-    return {"coupling": at.sign() * at.between(0.02, 0.5) * at.bench.stiffness[0, 0] / at.travel_m.max()}
+    return {"coupling": at.sign() * at.between(0.02, 0.3) * at.bench.stiffness[0, 0] / at.travel_m.max()}
 
 
 def _crossed(device: Device, axis: int, values: Values) -> Device:
@@ -73,7 +73,7 @@ def _skipped(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_tired(at: Circumstances) -> dict[str, float]:
-    return {"loss_per_n2": at.between(0.02, 0.5), "seconds": at.some(2.0, 8.0)}
+    return {"loss_per_n2": at.between(0.02, 0.3), "seconds": at.some(2.0, 8.0)}
 
 
 def _tired(device: Device, axis: int, values: Values) -> Device:

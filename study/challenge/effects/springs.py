@@ -20,7 +20,9 @@ def _hardening(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_asymmetric(at: Circumstances) -> dict[str, float]:
-    return {"k2": at.sign() * at.between(0.005, 0.4) / at.travel_m[at.axis] ** 2}
+    # A part of the ground's stiffness at the travel's end: with more, the handle would leave on the soft side.
+    stiffness = at.bench.stiffness[at.axis, at.axis]
+    return {"k2": float(at.sign() * at.between(0.005, 0.3) * stiffness / at.travel_m[at.axis])}
 
 
 def _asymmetric(device: Device, axis: int, values: Values) -> Device:
