@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
@@ -15,7 +17,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.new_folder import new_folder, require_new_folder
-from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, read_input
+from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, nothing_to_diagnose, read_input
 from study.workflows.worker_threads import worker_threads
 from study.workflows.write_diagnosis import write_diagnosis_into
 from study.workflows.write_twin import TwinPlan, write_twin
@@ -69,8 +71,14 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     model, remarks = _model(plan, found, on_progress)
     begun = FITTED if plan.model is None else READ
     settings = DiagnosisSettings(without=plan.without, names=found.names)
-    with worker_threads() as threads:
-        findings = engine(found.recordings, model, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+    try:
+        with worker_threads() as threads:
+            findings = engine(found.recordings, model, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+    except np.linalg.LinAlgError as problem:
+        raise nothing_to_diagnose(
+            (f"The fits broke down ({problem}): near the given numbers the model runs away from what was recorded",),
+            "State narrower tolerances in the model, or give one that is nearer to the device.",
+        ) from problem
     findings = replace(findings, remarks=(*found.remarks, *remarks, *findings.remarks))
     on_progress("writing the report", DIAGNOSED)
     parents = (*found.parents, *(() if plan.model is None else (plan.model,)))

@@ -26,7 +26,7 @@ Where does a recording differ from a model of the device, and what physics does 
   the simulated device is compared with its twin.
 * **Results**: a folder that is not there yet. Left empty, one beside the recording, or in the session's folder.
 
-**F5** begins. It takes a minute or so for two minutes of recording. **Esc** goes back.
+**F5** begins, **Esc** goes back.
 
 In a terminal: `hapteq diagnose REC.h5 --model MODEL.toml --out DIR`.
 """
