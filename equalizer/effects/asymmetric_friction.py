@@ -42,7 +42,7 @@ EFFECT = Effect(
     equation="F = -level_positive where v > 0, +level_negative where v < 0",
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30:1083",
     signature="the missing force flips its sign with the velocity, by unequal amounts: there is a mean force while "
-    "the axis moves; its odd harmonics fall as the level rises",
+    "the axis moves; its odd harmonics, and weaker even ones, fall as the level rises",
     parameters=(Parameter("level_positive", 1e-9, 1e6, none=0.0), Parameter("level_negative", 1e-9, 1e6, none=0.0)),
     acts=AxisForce(_law, _pack, memory=1),
     starts=_starts,

@@ -11,13 +11,18 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
-WINDOW_S = 2.0
+WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02
+"""Of a spectrum; least power of a line that counts, over the largest; share of the missing force that noise alone would
+let the best of all trials explain."""
 
 
 def with_oscillator(
     model: MechanicalModel, along: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
-    """One more coordinate, the last. along: (n,), the direction in the coordinates to which it is tied."""
+    """One more coordinate, the last; none for no mass. along: (n,), the direction in the coordinates to which it is
+    tied."""
+    if mass <= 0:
+        return model
     tie = np.append(-along, 1.0)
     grown = {name: np.pad(getattr(model, name), ((0, 1), (0, 1))) for name in ("mass", "damping", "stiffness")}
     grown["mass"][-1, -1] = mass
@@ -49,7 +54,7 @@ def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
     own, force = acceleration[:, axis], (evidence.axis_force * used).T
     frequency, power = csd(own, own, rate, nperseg=window)
     cross = np.array([csd(own, row, rate, nperseg=window)[1] for row in force]).T
-    inside = (frequency > 0) & (frequency < 0.45 * rate)
+    inside = (frequency > 0) & (frequency < 0.45 * rate) & (power > DRIVEN * power.max())
     return MissingMass(frequency[inside], power[inside].real, cross[inside])
 
 
@@ -72,28 +77,36 @@ class Hung:
     """(m,): its pull on each axis over that on the own one."""
 
 
+def _rest(shapes: FloatArray, aim: FloatArray) -> FloatArray:
+    size = np.linalg.norm(shapes, axis=0)
+    return np.asarray(aim - shapes / size @ np.linalg.lstsq(shapes / size, aim, rcond=1e-9)[0])
+
+
 def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]) -> list[Hung]:
-    """The best of each damping ratio and natural frequency, likeliest first; only masses above zero."""
+    """The best of each damping ratio and natural frequency, likeliest first; only masses above zero that explain more
+    than chance would, below the highest frequency that is driven."""
     root = np.sqrt(np.maximum(seen.power, np.finfo(float).tiny))
     wave = 2j * np.pi * seen.frequency_hz
     linear = np.stack([np.ones_like(wave), 1 / wave, 1 / wave**2], axis=1) * root[:, None]
     force = seen.cross / root[:, None]
+    aim = np.vstack([force.real, force.imag])
+    linear = np.vstack([linear.real, linear.imag])
+    alone = _rest(linear, aim)[:, axis]
+    power = max(float(alone @ alone), np.finfo(float).tiny)
     found = []
     for ratio in damping_ratios:
-        for natural in natural_hz:
+        for natural in (one for one in natural_hz if one < seen.frequency_hz[-1]):
             shape = hanging(seen.frequency_hz, natural, ratio) * root
-            columns = np.column_stack([shape, linear])
-            stacked = np.vstack([columns.real, columns.imag])
+            stacked = np.column_stack([np.append(shape.real, shape.imag), linear])
             size = np.linalg.norm(stacked, axis=0)
-            aim = np.vstack([force.real, force.imag])
             strengths, *_ = np.linalg.lstsq(stacked / size, aim, rcond=1e-9)
             rest = aim[:, axis] - stacked / size @ strengths[:, axis]
             mass = strengths[0, axis] / size[0]
             if mass > 0:
-                explained = 1 - float(rest @ rest / max(aim[:, axis] @ aim[:, axis], np.finfo(float).tiny))
+                explained = 1 - float(rest @ rest) / power
                 pulls = np.asarray(strengths[0] / strengths[0, axis])
                 found.append(Hung(natural, ratio, float(mass), explained, pulls))
-    return sorted(found, key=lambda one: -one.explained)
+    return sorted((one for one in found if one.explained > CHANCE), key=lambda one: -one.explained)
 
 
 def without(seen: MissingMass, one: Hung) -> MissingMass:

@@ -32,10 +32,13 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start <= 0 and end <= 0:
             continue
-        push = 0.5 * stiffness * (start + end) + rate * (end - start)
-        push /= 1 + at[X_PER_N] * (0.5 * stiffness + rate)
+        # Towards the force at the end for a contact that is too stiff for the step, which would kick otherwise.
+        slack = stiffness * at[X_PER_N]
+        late = (0.5 + slack) / (1 + slack)
+        push = stiffness * ((1 - late) * start + late * end) + rate * (end - start)
+        push /= 1 + at[X_PER_N] * (late * stiffness + rate)
         if end - at[X_PER_N] * push < 0:
-            push = 0.5 * stiffness * start
+            push = stiffness * (1 - late) * start
         push = max(push, 0.0)
         end -= at[X_PER_N] * push
         at[F_END] = -way * max(stiffness * end + rate * (end - start), 0.0) if end > 0 else 0.0

@@ -24,9 +24,12 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         stiffness = of[1] if side == 0 else of[1] * of[4]
         start = max(way * at[X] - of[0], 0.0)
         end = way * (at[X_FREE] + at[X_PER_N] * force) - of[0]
-        push = 0.5 * stiffness * (start + end) / (1 + 0.5 * stiffness * at[X_PER_N])
+        # Towards the force at the end for a stop that is too stiff for the step, which would kick otherwise.
+        slack = stiffness * at[X_PER_N]
+        late = (0.5 + slack) / (1 + slack)
+        push = stiffness * ((1 - late) * start + late * end) / (1 + late * slack)
         if end - at[X_PER_N] * push < 0:
-            push = 0.5 * stiffness * start
+            push = stiffness * (1 - late) * start
         force -= way * max(push, 0.0)
         last -= way * stiffness * max(end - at[X_PER_N] * push, 0.0)
     at[F_END] = last

@@ -19,9 +19,9 @@ from equalizer.signals.signal import FloatArray
 
 STEPS = 8
 """Per sample."""
-GAPS, STIFFNESSES, SLIPS = (0.3, 1.0, 3.0, 10.0), (0.05, 0.2, 0.8), (0.01, 0.1, 0.6)
+GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Tried: over the rms travel of the joint in the model; over its own stiffness; over the product of the two."""
-TRIED_S, SETTLING = 4.0, 4
+TRIED_S, SETTLING = 2.0, 4
 """On how much of the record, of which one in so many is left out, because it did not begin at rest."""
 _FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
@@ -34,9 +34,12 @@ def _law(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start > 0 or end > 0:
-            push = 0.5 * stiffness * (start + end) / (1 + 0.5 * stiffness * at[X_PER_N])
+            # Towards the force at the end for a spring that is too stiff for the step, which would kick otherwise.
+            slack = stiffness * at[X_PER_N]
+            late = (0.5 + slack) / (1 + slack)
+            push = stiffness * ((1 - late) * start + late * end) / (1 + late * slack)
             if end - at[X_PER_N] * push < 0:
-                push = 0.5 * stiffness * start
+                push = stiffness * (1 - late) * start
             spring = -way * max(push, 0.0)
             last = -way * stiffness * max(end + way * at[X_PER_N] * spring, 0.0)
             break
@@ -87,9 +90,10 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _part(evidence: Evidence, axis: int) -> slice:
-    """Where the axis is driven most strongly."""
+    """Where the axis shakes most, and with it the joint."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
-    power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
+    shaken = np.gradient(evidence.axis_velocity[:, axis])
+    power = np.cumsum(np.append(0.0, shaken**2 * evidence.used))
     first = int(np.argmax(power[length:] - power[:-length]))
     return slice(first, first + length)
 

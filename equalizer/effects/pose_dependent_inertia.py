@@ -12,6 +12,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LAGRANGE = 0.5
+"""Share of M per_m v^2 that comes with a mass that depends on the place; other sums of forces leave it out."""
 
 
 @compiled_law

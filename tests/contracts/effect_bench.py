@@ -119,3 +119,86 @@ def evidence(model: MechanicalModel, seen: Measured) -> Evidence:
 
 def placed(name: str, values: dict[str, float], *sites: int) -> tuple[PlacedEffect, ...]:
     return (PlacedEffect(EFFECTS[name], sites, values),)
+
+
+EXAMPLES: dict[str, dict[str, float]] = {
+    "coulomb_friction": {"level": 0.08},
+    "asymmetric_friction": {"level_positive": 0.1, "level_negative": 0.05},
+    "stribeck_friction": {"coulomb": 0.06, "static": 0.12, "speed": 0.01},
+    "position_dependent_friction": {"level": 0.08, "slope_per_m": 40.0, "bend_per_m2": 3000.0},
+    "presliding_hysteresis": {"level": 0.1, "stiffness": 3000.0},
+    "viscous_damping": {"damping": 2.0},
+    "quadratic_damping": {"coefficient": 8.0},
+    "hardening_stiffness": {"k3": 1e6},
+    "asymmetric_stiffness": {"k2": 6000.0},
+    "constant_force": {"force": 0.1},
+    "cogging": {"amplitude": 0.1, "pitch": 0.002, "phase": 0.7},
+    "backlash": {"gap": 5e-5, "motor_mass": 0.09, "contact_stiffness": 3e5, "contact_damping": 9.0},
+    "loose_joint": {"gap": 1e-5, "stiffness": 4000.0, "slip": 0.02},
+    "end_stop": {"position": 0.005, "stiffness": 3000.0, "opposite": 0.0},
+    "pose_dependent_inertia": {"per_m": 15.0, "speed_share": 0.5},
+    "extra_mode": {"frequency": 43.0, "mass": 0.012, "damping_ratio": 0.05, "tilt_next": 0.0, "tilt_after_next": 0.0},
+    "added_mass": {"mass": 0.03},
+    "hand_impedance": {"mass": 0.03, "damping": 1.5, "stiffness": 100.0},
+    "time_varying_grip": {"rate_hz": 0.23, "depth": 0.5, "phase": 1.0, "stiffness_share": 0.0},
+    "body_on_actuator": {"mass": 0.02, "damping": 2.0, "stiffness": 500.0},
+    "force_saturation": {"limit": 2.0},
+    "force_deadband": {"width": 0.05},
+    "slew_limit": {"rate": 300.0},
+    "amplifier_lag": {"time_constant": 0.001},
+    "transport_delay": {"delay": 0.0013},
+    "force_gain": {"gain": 0.9},
+    "sensor_lag": {"bandwidth": 90.0},
+    "sensor_clipping": {"limit": 8.0},
+    "sensor_misalignment": {"about_x": 3.0, "about_y": -2.0, "about_z": 4.0},
+    "cross_axis_sensitivity": {"from_next": 0.05, "from_after_next": -0.03},
+    "sensor_gain": {"gain": 0.9},
+    "sensor_nonlinearity": {"cubic": 2e-3},
+    "sensor_offset": {"offset": 0.3},
+    "sensor_drift": {"total": 0.5, "bend": 0.3},
+    "quantization": {"step": 0.2},
+    "mains_hum": {"amplitude": 0.1, "frequency": 50.03, "phase": 0.4},
+    "clock_drift": {"ppm": 60.0, "interpolated": 1.0},
+    "logger_offset": {"offset": 0.0013},
+    "lost_samples": {"fraction": 0.02},
+}
+"""Of strengths that can be seen on the one-axis bench."""
+NEEDS_THREE_AXES = ("sensor_misalignment", "cross_axis_sensitivity")
+
+
+def bench_of(name: str) -> MechanicalModel:
+    return three_axes() if name in NEEDS_THREE_AXES else one_axis()
+
+
+def example(name: str, model: MechanicalModel, **changes: float) -> tuple[PlacedEffect, ...]:
+    """At the first axis or channel, or at all where it befalls all."""
+    effect = EFFECTS[name]
+    sites = (0,) if "one" in effect.sites else tuple(range(model.inputs))
+    return placed(name, EXAMPLES[name] | changes, *sites)
+
+
+def absent(name: str, model: MechanicalModel) -> tuple[PlacedEffect, ...]:
+    return example(name, model, **{one.name: one.none for one in EFFECTS[name].parameters if one.none is not None})
+
+
+@dataclass(frozen=True, slots=True)
+class Distortion:
+    """Power at silent lines over that at driven ones, dB; per level."""
+
+    odd: list[float]
+    even: list[float]
+
+
+def distortion(model: MechanicalModel, effects: tuple[PlacedEffect, ...], signal: str = "response") -> Distortion:
+    """Of the first axis in its steady state, at each level, without noise."""
+    odd, even, n = [], [], int(PERIOD_S * RATE_HZ)
+    for level in LEVELS_N:
+        command = np.zeros((4 * n, model.inputs))
+        command[:, 0] = np.tile(level * odd_multisine(5), 4)
+        answer = getattr(simulate_mechanism(model, command, RATE_HZ, effects), signal)[:, 0]
+        lines = np.abs(np.fft.rfft(answer[-2 * n :].reshape(2, n).mean(axis=0))) ** 2
+        driven = np.setdiff1d(np.arange(3, 480, 2), silent_odd_lines())
+        whole = lines[driven].mean()
+        odd.append(10 * np.log10(lines[silent_odd_lines()].mean() / whole))
+        even.append(10 * np.log10(lines[4:480:2].mean() / whole))
+    return Distortion(odd, even)
