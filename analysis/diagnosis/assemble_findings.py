@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.diagnosis.error_measure import FreeSimulation
+from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.error_table import channel_errors, errors_of
 from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.findings import Course, Findings, Signature
@@ -92,7 +92,7 @@ def _errors(arena: Arena, found: Explanation) -> FloatArray:
     return standard_errors(arena.whole, arena.tuning, fitted, known)[len(fitted.deviations) :]
 
 
-def _courses(measure: FreeSimulation, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
+def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
     courses = []
     for number, record in enumerate(measure.records):
         count = record.measured.shape[1]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.assemble_findings import assembled
-from analysis.diagnosis.error_measure import FreeSimulation
 from analysis.diagnosis.explain import Progress, explain
 from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.free_simulation import FreeSimulation
 from analysis.diagnosis.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.observed import Observed, noise_in_units, observed
 from analysis.diagnosis.rivalry import Arena

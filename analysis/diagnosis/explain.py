@@ -83,7 +83,9 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
     held = base.hypothesis.claims
     evidence = gather_evidence(arena.measure, arena.tuning, base)
     suggested = [
-        one for one in candidates(catalogue, evidence[0]) if not any(excludes(claim, one.claims[0]) for claim in held)
+        one
+        for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
+        if not any(excludes(claim, one.claims[0]) for claim in held)
     ]
     known = sensitivity_at(arena, base.deviations, base.hypothesis)
     step.at(0.2)

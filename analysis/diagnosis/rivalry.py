@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.error_measure import FreeSimulation
+from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.hypothesis import Hypothesis, without_claim
 from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
 from analysis.diagnosis.screening import Mapper, Screened
@@ -32,9 +32,9 @@ class Contender:
 class Arena:
     """What all fits share."""
 
-    measure: FreeSimulation
+    measure: ErrorMeasure
     """Of what decisions may see,"""
-    whole: FreeSimulation
+    whole: ErrorMeasure
     """and with what they may not."""
     tuning: Tuning
     map_: Mapper

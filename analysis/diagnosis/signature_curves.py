@@ -9,9 +9,9 @@ import numpy as np
 from scipy.signal import welch
 
 from analysis.diagnosis.findings import Signature
-from analysis.diagnosis.gather_evidence import EXPECTED
 from analysis.diagnosis.missing_force import missing_force
 from analysis.diagnosis.signature_bins import binned, binned_law, running_rms
+from analysis.diagnosis.unexplained_motion import EXPECTED
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.simulator import Played, simulate_mechanism

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.error_measure import FreeSimulation
+from analysis.diagnosis.free_simulation import FreeSimulation
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import NOTHING
 from analysis.diagnosis.observed import observed
