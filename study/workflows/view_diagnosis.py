@@ -59,8 +59,14 @@ def _mismatch(mismatch: Mismatch) -> tuple[str, ...]:
         "all" if mismatch.amplitude is None else f"{mismatch.amplitude:g}",
         mismatch.state or "",
         _percent(mismatch.share),
-        f"{mismatch.p_value:.1e}" if 0 < mismatch.p_value < 1e-3 else f"{mismatch.p_value:.3f}",
+        _p_value(mismatch.p_value),
     )
+
+
+def _p_value(p_value: float) -> str:
+    if p_value >= 1e-3:
+        return f"{p_value:.3f}"
+    return f"{p_value:.1e}" if p_value else "< 1e-300"
 
 
 def _errors(record: str, errors: Errors) -> tuple[str, ...]:

@@ -82,8 +82,14 @@ def _result(job: _Job[Result]) -> Result:
 @contextmanager
 def worker_threads(workers: int | None = None) -> Iterator[WorkerThreads]:
     """workers: as many as this process may use cores, where nothing else is said."""
-    threads = WorkerThreads(workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
+    threads = WorkerThreads(workers or _cores())
     try:
         yield threads
     finally:
         threads.leave()
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

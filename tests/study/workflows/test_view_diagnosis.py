@@ -58,6 +58,12 @@ def test_tables_have_a_header_and_a_row_each(view):
     assert view.fit[1] == ("fit", "0.3000", "0.2800", "0.0500", "–")
 
 
+def test_a_p_value_below_all_numbers_is_no_zero(tmp_path):
+    sure = replace(FOUND, mismatch=(replace(PLACE, p_value=0.0), replace(PLACE, p_value=0.02)))
+    write_diagnosis(tmp_path / "diagnosis.json", sure)
+    assert [row[-1] for row in diagnosis_view(tmp_path / "diagnosis.json").mismatch[1:]] == ["< 1e-300", "0.020"]
+
+
 def test_the_next_experiment_begins_with_its_command(view):
     assert view.next_experiment.splitlines()[0] == "hapteq record slow --out N.h5"
     assert "It tells dry friction apart" in view.next_experiment
