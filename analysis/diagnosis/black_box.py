@@ -1,0 +1,73 @@
+"""A correction without physics, fitted beside the named effects: whoever beats them knows something that they do not.
+
+A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term as each takes
+most of what is left (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per channel as the physics
+has numbers.
+"""
+
+import numpy as np
+
+from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.findings import BlackBox
+from analysis.diagnosis.observed import Mask
+from analysis.diagnosis.rivalry import Contender
+from analysis.diagnosis.standing import rms_over
+from equalizer.signals.signal import FloatArray
+
+SEEN = 20_000
+"""Samples that terms are chosen by, evenly taken from those to fit; all that are fitted to weigh in the end."""
+_TINY = np.finfo(np.float64).tiny
+
+
+def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: float) -> BlackBox | None:
+    """physics: the named effects' error on the test samples, as `document.Errors`. None where nothing is sealed."""
+    if not any(record.test.any() for record in measure.records):
+        return None
+    terms = [
+        _terms(record.command, record.measured - left * measure.unit)
+        for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
+    ]
+    fitted = [record.fit for record in measure.records]
+    rows = np.vstack([one[mask] for one, mask in zip(terms, fitted, strict=True)])
+    left = np.vstack([one[mask] for one, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
+    scale = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), _TINY)
+    weights = np.stack([_chosen(rows / scale, left[:, c], numbers) for c in range(left.shape[1])], axis=1)
+    corrected = tuple(one - each / scale @ weights for one, each in zip(retuned.fitted.residuals, terms, strict=True))
+    error = _normalised(measure, corrected, [record.test for record in measure.records])
+    return BlackBox("polynomial of the model's signals", numbers * left.shape[1], error, physics)
+
+
+def _terms(command: FloatArray, predicted: FloatArray) -> FloatArray:
+    """(n, terms): powers and products of commands, predictions, and their changes."""
+    signals = np.hstack([command, predicted])
+    signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
+    before = np.vstack([signals[:1], signals[:-1]])
+    base = np.hstack([before, signals - before])
+    base = base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY)
+    half = signals.shape[1]
+    products = [base[:, i] * base[:, j] for i in range(half) for j in range(i + 1, half)]
+    return np.hstack([base, base**2, base * np.abs(base), base**3, np.stack(products, axis=1)])
+
+
+def _chosen(rows: FloatArray, left: FloatArray, count: int) -> FloatArray:
+    """(terms,): weights, all but `count` of them zero."""
+    every = max(len(rows) // SEEN, 1)
+    seen, wanted = rows[::every], left[::every]
+    picked: list[int] = []
+    rest = wanted
+    power = np.sum(seen**2, axis=0)
+    for _ in range(count):
+        gain = (seen.T @ rest) ** 2 / np.maximum(power, _TINY)
+        gain[picked] = -1.0
+        picked.append(int(np.argmax(gain)))
+        rest = wanted - seen[:, picked] @ np.linalg.lstsq(seen[:, picked], wanted, rcond=None)[0]
+    weights = np.zeros(rows.shape[1])
+    weights[picked] = np.linalg.lstsq(rows[:, picked], left, rcond=None)[0]
+    return weights
+
+
+def _normalised(measure: ErrorMeasure, residuals: tuple[FloatArray, ...], masks: list[Mask]) -> float:
+    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
+    size = np.maximum(rms_over(measure.records, signals, masks), _TINY)
+    rms = rms_over(measure.records, residuals, masks) * measure.unit / size
+    return float(np.sqrt(np.mean(rms**2)))
