@@ -47,12 +47,17 @@ def test_the_map_has_a_row_of_panels_per_level_and_a_column_per_stage():
     assert [axes.get_ylabel() for axes in panels[::3]] == ["at 0.5 N", "at 1.5 N", "at 3 N"]
 
 
-def test_what_is_significant_is_framed_and_every_cell_has_its_number():
-    cells = (cell(in_noise=5.0), cell(output="ay", in_noise=1.2, p=0.5), cell(output="az", in_noise=2400.0))
+def test_what_is_significant_is_framed_and_what_is_more_than_noise_has_its_number():
+    cells = (
+        cell(in_noise=5.0),
+        cell(output="ay", in_noise=1.2, p=0.5),
+        cell(output="y", in_noise=1.1, p=0.9),
+        cell(output="az", in_noise=2400.0),
+    )
     axes = draw_mismatch_map({"before": cells}, "fx", "N").axes[0]
-    assert len(axes.patches) == 2
+    assert len(axes.collections[0].get_segments()) == 2
     assert written(axes.figure) == ["5", "1.2", "2.4k"]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["ax", "ay", "az"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["ax", "ay", "y", "az"]
 
 
 def test_many_levels_are_drawn_in_groups_of_which_the_worst_is_shown():
