@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.black_box import black_box
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.error_table import channel_errors, errors_of
@@ -18,8 +19,9 @@ from analysis.diagnosis.mismatch_rows import mismatch_rows
 from analysis.diagnosis.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.noise_floor import NoiseFloor
 from analysis.diagnosis.observed import Mask
-from analysis.diagnosis.output_error import evaluated, sensitivity
-from analysis.diagnosis.rivalry import Arena
+from analysis.diagnosis.output_error import evaluated
+from analysis.diagnosis.proposed_experiment import proposed_experiment
+from analysis.diagnosis.rivalry import Arena, sensitivity_at
 from analysis.diagnosis.signature_curves import Names, signature_of
 from analysis.diagnosis.verdict import Judgement
 from equalizer.effects.effect import Values
@@ -52,7 +54,9 @@ def assembled(
         else mismatch_rows(maps.cells["after"]) or whole_mismatch(measure, found.after),
         fit=errors_of(measure, found),
         error=measure.name,
-        next_experiment=None,
+        next_experiment=proposed_experiment(arena, found)
+        if judged.named and measure.name == "free simulation"
+        else None,
     )
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
@@ -67,7 +71,7 @@ def assembled(
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
         signatures=_signatures(arena, found, said),
-        black_box=None,
+        black_box=black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
         remarks=tuple(dict.fromkeys(remark for floor in floors for remark in floor.remarks)),
         maps=maps.cells,
         floor=floors[0],
@@ -87,9 +91,9 @@ def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
 
 
 def _errors(arena: Arena, found: Explanation) -> FloatArray:
-    fitted = found.after.fitted
-    known = sensitivity(arena.whole, arena.tuning, fitted.deviations, fitted.hypothesis, arena.map_)
-    return standard_errors(arena.whole, arena.tuning, fitted, known)[len(fitted.deviations) :]
+    fitted = found.steps[-1].fitted
+    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
+    return standard_errors(arena.measure, arena.tuning, fitted, known)[len(fitted.deviations) :]
 
 
 def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:

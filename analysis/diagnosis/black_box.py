@@ -19,9 +19,9 @@ SEEN = 20_000
 _TINY = np.finfo(np.float64).tiny
 
 
-def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: float) -> BlackBox | None:
+def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: float | None) -> BlackBox | None:
     """physics: the named effects' error on the test samples, as `document.Errors`. None where nothing is sealed."""
-    if not any(record.test.any() for record in measure.records):
+    if physics is None or not any(record.test.any() for record in measure.records):
         return None
     terms = [
         _terms(record.command, record.measured - left * measure.unit)

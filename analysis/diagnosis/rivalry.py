@@ -13,10 +13,14 @@ from analysis.diagnosis.standing import Standing, standing
 from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.effect import AxisForce, JointForce
 
-FITTED = 10
+MOST_FITTED, LEAST_FITTED = 10, 4
 """Hypotheses that get a first fit."""
-REFINED = 3
-"""And a second one, with everything recomputed where they stand."""
+WORTH_FITTING = 0.2
+"""Share of the best one's foreseen gain that another must foresee."""
+MOST_REFINED = 3
+"""And a second one, with everything recomputed where they stand,"""
+WORTH_REFINING = 0.5
+"""where they gained such a share of what the best one gained."""
 FIRST_ROUNDS, SECOND_ROUNDS = 3, 5
 NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
@@ -56,10 +60,12 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
     def first(one: Screened) -> Fitted:
         return fit(measure, tuning, evaluated(measure, tuning, base.deviations, one.hypothesis), known, FIRST_ROUNDS)
 
-    fits: list[Fitted] = list(arena.map_(first, _varied(screened)[:FITTED]))  # type: ignore[arg-type]
+    fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
     fits.sort(key=lambda one: one.cost)
-    refined = [refine(arena, one) for one in fits[:REFINED]]
-    contenders = [arena.contender(one) for one in [*refined, *fits[REFINED:]]]
+    gained = [base.cost - one.cost for one in fits]
+    worth = [one for one, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
+    refined = [refine(arena, one) for one in worth[:MOST_REFINED]]
+    contenders = [arena.contender(one) for one in [*refined, *fits[len(refined) :]]]
     return tuple(sorted(contenders, key=lambda one: one.standing.chosen_by))
 
 
@@ -87,6 +93,13 @@ def sensitivity_at(arena: Arena, deviations: np.ndarray, hypothesis: Hypothesis)
 def _refined_from(arena: Arena, fitted: Fitted) -> Fitted:
     there = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
     return fit(arena.measure, arena.tuning, fitted, there, SECOND_ROUNDS)
+
+
+def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:
+    varied = _varied(screened)
+    best = max((base.cost - one.cost for one in varied), default=0.0)
+    worth = [one for one in varied if base.cost - one.cost >= WORTH_FITTING * best]
+    return (worth if len(worth) >= LEAST_FITTED else varied[:LEAST_FITTED])[:MOST_FITTED]
 
 
 def _varied(screened: Sequence[Screened]) -> list[Screened]:

@@ -1,0 +1,54 @@
+"""The next recording for a finished search whose data could not tell two effects apart."""
+
+import numpy as np
+
+from analysis.diagnosis.document import NextExperiment
+from analysis.diagnosis.experiment_menu import experiment_menu
+from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.next_experiment import Bench, as_document, foresee
+from analysis.diagnosis.output_error import fitting, own_columns
+from analysis.diagnosis.rivalry import Arena, Contender, sensitivity_at
+from analysis.diagnosis.same_within_errors import inseparable
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.signals.signal import FloatArray
+
+
+def proposed_experiment(arena: Arena, found: Explanation) -> NextExperiment | None:
+    """None where no rival is as good as what is named, or no recording of the menu would tell."""
+    for contenders in found.rounds[: len(found.steps)]:
+        rival = _rival(contenders)
+        if rival is None:
+            continue
+        named, other = contenders[0].fitted, rival.fitted
+        claims = named.hypothesis.claims[-1], other.hypothesis.claims[-1]
+        record = arena.measure.records[0]
+        sensed = EFFECTS_BY_NAME[claims[0].effect.name].place == "sensor"
+        axis = min(claims[0].sites[0], record.command.shape[1] - 1) if sensed else claims[0].sites[0]
+        level = float(np.abs(record.command).max())
+        rate_hz = record.recording.sample_rate_hz
+        bench = Bench(arena.tuning, rate_hz, record.recording.hold, arena.measure.noise)
+        menu = experiment_menu(arena.tuning.model, rate_hz, axis, level)
+        foreseen = foresee(bench, named, other, _known(arena, rival), menu)
+        return as_document(foreseen[0], (claims[0].effect.name, claims[1].effect.name))
+    return None
+
+
+def _rival(contenders: tuple[Contender, ...]) -> Contender | None:
+    """The best that is as good as the named one, and another effect."""
+    best = contenders[0]
+    name = best.fitted.hypothesis.claims[-1].effect.name
+    for other in contenders[1:]:
+        if other.fitted.hypothesis.claims[-1].effect.name != name and inseparable(best, other):
+            return other
+    return None
+
+
+def _known(arena: Arena, contender: Contender) -> FloatArray:
+    """What has been recorded so far says of a contender's numbers: the information matrix, with the calibration."""
+    fitted = contender.fitted
+    own = own_columns(arena.measure, arena.tuning, fitted, fitting(arena.measure, fitted.residuals))
+    columns = np.vstack([sensitivity_at(arena, fitted.deviations, fitted.hypothesis).columns, own])
+    known = columns @ columns.T
+    t = len(fitted.deviations)
+    known[:t, :t] += np.eye(t)
+    return np.asarray(known)
