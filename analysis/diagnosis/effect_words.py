@@ -108,7 +108,7 @@ def place_words(place: Place, axis: str | None, single: bool = False) -> str:
 _SEATS: Mapping[str, tuple[str, str]] = {
     "mechanism": ("on the {} drive", "on all drives"),
     "actuator": ("in the {} actuator", "in all actuators"),
-    "sensor": ("in the {} channel of the sensor", "in all channels of the sensor"),
+    "sensor": ("in the {} channel", "in all channels"),
 }
 
 

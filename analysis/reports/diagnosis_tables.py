@@ -14,6 +14,7 @@ from analysis.wording import NONE, p_value
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
+_SHARE = "Share: mismatch over signal there; where a state is named, of the mismatch's power that sits in it."
 _PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "held-out data"}
 
 
@@ -87,7 +88,8 @@ def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
     )
     more = len(places) - len(worst)
     notes = (f"And {more} smaller {'place' if more == 1 else 'places'}.",) if more > 0 else ()
-    header = ("Channel", "Driven by", "Band", "Level", "State", "Share of the signal there", "p")
+    notes += (_SHARE,) if worst else ()
+    header = ("Channel", "Driven by", "Band", "Level", "State", "Share", "p")
     return Table(caption, header, rows, notes, folded=True)
 
 

@@ -86,8 +86,8 @@ def test_an_effect_that_nobody_has_words_for_is_called_by_its_own_name():
         ("mechanism", None, False, "on all drives"),
         ("mechanism", None, True, "on the drive"),
         ("actuator", "y", False, "in the y actuator"),
-        ("sensor", "ax", False, "in the ax channel of the sensor"),
-        ("sensor", None, False, "in all channels of the sensor"),
+        ("sensor", "ax", False, "in the ax channel"),
+        ("sensor", None, False, "in all channels"),
         ("hand", None, False, "at the handle"),
     ],
 )

@@ -137,7 +137,7 @@ def test_a_number_without_an_interval_has_a_dash(friction_found):
 def test_a_long_list_of_places_is_cut_and_says_so():
     table = mismatch_table("Places", (PLACE,) * 15)
     assert len(table.rows) == 12
-    assert table.notes == ("And 3 smaller places.",)
+    assert table.notes[0] == "And 3 smaller places."
 
 
 def test_every_open_number_is_listed_with_how_far_it_moved(friction_found):
