@@ -37,16 +37,14 @@ class Tried:
 
 
 def tried_explanations(round_: Sequence[Contender], axes: Sequence[str]) -> tuple[Tried, ...]:
-    """The best of each hypothesis, the best first."""
+    """The best of each hypothesis: first the round's first, which need not have the least error where a simpler one is
+    as good; then the others by their errors."""
     best: dict[object, Tried] = {}
     for one in round_:
-        key = one.fitted.hypothesis.key
-        tried = _tried(
-            ", ".join(_claim_words(claim, axes) for claim in one.fitted.hypothesis.claims[-1:]), one.standing
-        )
-        if key not in best or tried.seen < best[key].seen:
-            best[key] = tried
-    return tuple(sorted(best.values(), key=lambda one: one.seen)[:MOST_RIVALS])
+        words = ", ".join(_claim_words(claim, axes) for claim in one.fitted.hypothesis.claims[-1:])
+        best.setdefault(one.fitted.hypothesis.key, _tried(words, one.standing))
+    chosen, others = list(best.values())[:1], list(best.values())[1:]
+    return (*chosen, *sorted(others, key=lambda one: one.seen))[:MOST_RIVALS]
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
@@ -74,7 +72,7 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
 
 
 def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Figure:
-    """The best on top, marked where it is held to be true."""
+    """The chosen one on top, marked where it is held to be true."""
     if not tried:
         return say_nothing_to_draw(new_figure(7.4, 1.4), "Nothing was tried.")
     figure = new_figure(8.8, 1.05 + 0.3 * len(tried))

@@ -87,7 +87,7 @@ def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
         for one in worst
     )
     more = len(places) - len(worst)
-    notes = (f"And {more} smaller {'place' if more == 1 else 'places'}.",) if more > 0 else ()
+    notes: tuple[str, ...] = (f"And {more} smaller {'place' if more == 1 else 'places'}.",) if more > 0 else ()
     notes += (_SHARE,) if worst else ()
     header = ("Channel", "Driven by", "Band", "Level", "State", "Share", "p")
     return Table(caption, header, rows, notes, folded=True)

@@ -153,6 +153,12 @@ def test_rivals_stand_below_the_best_with_their_errors(friction_found):
     assert axes.get_yticklabels()[0].get_fontweight() == "bold"
 
 
+def test_the_one_that_was_chosen_stands_on_top_even_where_another_has_less_error(friction_found):
+    best, worse = friction_found.explanation.rounds[0]
+    tried = tried_explanations((worse, best), ("x",))
+    assert [one.words for one in tried] == ["a lag of the amplifier", "dry friction"]
+
+
 def test_a_round_that_brought_nothing_is_folded_and_says_so(friction_found):
     explanation = replace(friction_found.explanation, steps=())
     (picture,) = rivals_pictures(explanation, ("x",))
