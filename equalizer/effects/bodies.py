@@ -1,15 +1,14 @@
 """The bodies of a model with its effects: another structure, forces in it, and their motion under a driven command."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from equalizer.effects.command_path import Driven
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
-from equalizer.effects.mechanism_kernel import LAWS, Integers, Three, no_force, play
+from equalizer.effects.mechanism_kernel import LAWS, no_force
+from equalizer.effects.stepping import Forces, coasting, pushed
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -62,62 +61,62 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     return Bodies(structure, model.inputs, aligned, tuple(acts), tuple(where), tuple(numbers))
 
 
-def moved(bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float) -> tuple[FloatArray, FloatArray]:
+def moved(
+    bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float, motion: bool = True
+) -> tuple[FloatArray, FloatArray]:
     """(n, 3 r + 2 p): the ports' positions, velocities and accelerations, the response and its rows' positions; and
-    (n, r), the forces. driven: n or n steps; size: n and steps."""
+    (n, r), the forces. Without the motion (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps."""
     linear = linear_steps(bodies.structure, step_s, bodies.ports)
-    look = _transposed(_looked_at(linear))
-    looked, added = np.empty((size[0], look[0].shape[1])), np.empty((size[0], bodies.ports.shape[1]))
-    laws, places, of, memory = _items(bodies)
-    mean = np.require(driven.mean, requirements=["C", "W"])
-    with warnings.catch_warnings():
-        # numba calls functions that are passed as values an experimental feature.
-        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-        play(
-            laws, places, of, memory, _transposed((linear.advance, linear.by_command, linear.by_axis_force)), look,
-            _whole((linear.motion, linear.motion_by_command, linear.motion_by_axis_force)),
-            mean, np.zeros(linear.advance.shape[0]), (looked, added), size[1], step_s,
-        )  # fmt: skip
-    if driven.end is not driven.mean:
-        # An acceleration shows the force of its very instant, not the last step's mean.
-        last = slice(len(driven.mean) // size[0] - 1, None, len(driven.mean) // size[0])
-        looked[1:] += (driven.end - driven.mean)[last][:-1] @ look[1]
+    ports = tuple(sorted(set(bodies.port)))
+    steps, stride = size[1], len(driven.mean) // size[0]
+    stepping = pushed(linear, _forces(bodies, ports), steps, stride) if ports else coasting(linear, steps, stride)
+    look = _looked_at(linear, stepping.outward, ports, motion)
+    looked, added = np.empty((size[0], look.shape[1])), np.zeros((size[0], bodies.ports.shape[1] if motion else 0))
+    inner, rows = len(look) - driven.end.shape[1], stepping.rows
+    drive, last = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
+    spare = np.zeros((min(stepping.block, size[0]) * rows, len(look)))
+    # A fit may try a model that is unstable.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for first in range(0, size[0], stepping.block):
+            end = min(first + stepping.block, size[0])
+            course = spare[: (end - first) * rows]
+            np.matmul(drive[first * rows : end * rows], stepping.into, out=course[:, :inner])
+            stepping.run(course, first)
+            seen = course[::rows]
+            # An acceleration shows the force of its very instant, not the last step's mean.
+            seen[0, inner:], seen[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
+            np.matmul(seen, look, out=looked[first:end])
+            if motion:
+                added[first:end, list(ports)] = seen[:, len(stepping.outward) : inner]
     return looked, added
 
 
-def _looked_at(linear: LinearSteps) -> Three:
+def _looked_at(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
+    """(s + r + m, rows): of what is kept of each instant, the state, the forces at the ports and the commands."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
-    return (
-        np.vstack((linear.motion, linear.response, linear.position)),
-        np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m)))),
-        np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r)))),
-    )
+    first = 0 if motion else 3 * r
+    of_state = np.vstack((linear.motion, linear.response, linear.position))[first:]
+    of_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first:]
+    of_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first:]
+    return np.vstack([(of_state @ outward).T, of_force.T[list(ports)], of_command.T])
 
 
-def _transposed(parts: Three) -> Three:
-    return _whole((parts[0].T, parts[1].T, parts[2].T))
-
-
-def _whole(parts: Three) -> Three:
-    first, second, third = (np.ascontiguousarray(part) for part in parts)
-    return first, second, third
-
-
-def _items(bodies: Bodies) -> tuple[tuple[object, ...], Integers, FloatArray, FloatArray]:
+def _forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0
     for act, port, numbers in zip(bodies.acts, bodies.port, bodies.numbers, strict=True):
         if act.law not in laws:
             laws.append(act.law)
-        places.append((laws.index(act.law), port, used, used + len(numbers), kept, kept + act.memory))
+        places.append((laws.index(act.law), ports.index(port), used, used + len(numbers), kept, kept + act.memory))
         used, kept = used + len(numbers), kept + act.memory
     if len(laws) > LAWS:
         raise ValueError(f"{len(laws)} different forces act at once; at most {LAWS} can be played")
-    where: Integers = np.array(places, dtype=np.int64).reshape(-1, 6)
-    return (
+    return Forces(
+        ports,
         (*laws, *(no_force,) * (LAWS - len(laws))),
-        where,
+        np.array(places, dtype=np.int64).reshape(-1, 6),
         np.concatenate([*bodies.numbers, [0.0]]),
         np.zeros(kept + 1),
+        any(act.acceleration for act in bodies.acts),
     )

@@ -60,6 +60,8 @@ class AxisForce:
     """How many numbers the law keeps between instants; they start at zero."""
     steps: int = STEPS
     """At least so many per sample."""
+    acceleration: bool = False
+    """The law asks for accelerations, which are not computed otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,7 @@ class JointForce:
     """Of the model before the change."""
     memory: int = 0
     steps: int = STEPS
+    acceleration: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ X_FREE, V_FREE = 2, 3
 X_PER_N, V_PER_N = 4, 5
 """What 1 N over the step adds to them."""
 A_FREE, A_PER_N = 6, 7
-"""Acceleration at the start without this force, and what 1 N adds to it."""
+"""Acceleration at the start without this force, and what 1 N adds to it; not a number unless the effect says that its
+law asks for it."""
 STEP_S, TIME_S = 8, 9
 F_END = 10
 """For the law to fill: its force at the step's very end, which an acceleration shows. Where it leaves that as it is,

@@ -39,14 +39,16 @@ LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
 """What every law of force is compiled as."""
 
 Integers = npt.NDArray[np.int64]
-Three = tuple[FloatArray, FloatArray, FloatArray]
+Four = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
-_THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
-_TWO = types.UniTuple(_MATRIX, 2)  # type: ignore[no-untyped-call]
+_FOUR = types.UniTuple(_MATRIX, 4)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
-_PLAY = types.void(
-    _LAWS, _PLACES, _VECTOR, _VECTOR, _THREE, _THREE, _THREE, _MATRIX, _VECTOR, _TWO, types.int64, types.float64
-)
+_COUNT = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
+_FAST = {"reassoc", "contract"}
+_NOW_X, _NOW_V, _NEXT_X, _NEXT_V, _A, _FORCE, _FORCE_END = range(7)
+PORT_ROWS = 7
+"""Rows of what is known of each port: position and velocity at a step's start and, so far, end; acceleration at its
+start without forces; forces over the step and at its end."""
 
 
 def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
@@ -54,6 +56,92 @@ def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         return njit(LAW, cache=True, error_model="numpy")(law)
+
+
+@njit(inline="always")
+def _go(advance: FloatArray, added: FloatArray, state: FloatArray, spare: FloatArray) -> None:
+    """One step. advance: (4, s / 2) or (s, s), see `equalizer.effects.modal_form`. added: (s, ...), by commands."""
+    size = state.shape[0]
+    half = size // 2
+    if advance.shape[1] == half:
+        for i in range(half):
+            first, second = state[i], state[half + i]
+            state[i] = advance[0, i] * first + advance[1, i] * second + added[i]
+            state[half + i] = advance[2, i] * first + advance[3, i] * second + added[half + i]
+        return
+    for i in range(size):
+        spare[i] = state[i]
+        state[i] = added[i]
+    for j in range(size):
+        for i in range(size):
+            state[i] += advance[j, i] * spare[j]
+
+
+@njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=_FAST)
+def coast(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
+    """Motion without further forces. rows: (n, s ...), what the commands add over each step; becomes the state before
+    each. state: (s,), becomes that of the end."""
+    size = state.shape[0]
+    added, spare = np.empty(size), np.empty(size)
+    for k in range(rows.shape[0]):
+        for i in range(size):
+            added[i] = rows[k, i]
+            rows[k, i] = state[i]
+        _go(advance, added, state, spare)
+
+
+@njit(inline="always")
+def _aim(look: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Where a step would end without forces. look: (2 r, s)"""
+    count = ports.shape[1]
+    for port in range(count):
+        x = v = 0.0
+        for i in range(state.shape[0]):
+            x += look[port, i] * state[i]
+            v += look[count + port, i] * state[i]
+        ports[_NEXT_X, port], ports[_NEXT_V, port] = x, v
+        ports[_FORCE, port] = ports[_FORCE_END, port] = 0.0
+
+
+@njit(inline="always")
+def _land(by_force: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Lets the forces act. by_force: (r, s)"""
+    for port in range(ports.shape[1]):
+        ports[_NOW_X, port], ports[_NOW_V, port] = ports[_NEXT_X, port], ports[_NEXT_V, port]
+        force = ports[_FORCE, port]
+        for i in range(state.shape[0]):
+            state[i] += by_force[port, i] * force
+
+
+@njit(inline="always")
+def _keep(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
+    for i in range(state.shape[0]):
+        row[i] = state[i]
+    for port in range(ports.shape[1]):
+        row[state.shape[0] + port] = ports[_FORCE_END, port]
+
+
+@njit(inline="always")
+def _feel(look: FloatArray, added: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """The accelerations without forces. look: (3 r, s). added: (s + r), the last r by commands."""
+    count = ports.shape[1]
+    for port in range(count):
+        total = added[state.shape[0] + port]
+        for i in range(state.shape[0]):
+            total += look[2 * count + port, i] * state[i]
+        ports[_A, port] = total
+
+
+@njit(inline="always")
+def _act(per_newton: FloatArray, port: int, mean: float, end: float, ports: FloatArray) -> None:
+    """per_newton: (r, 3 r), what 1 N at a port adds to the positions, velocities and accelerations of all."""
+    count = ports.shape[1]
+    ports[_FORCE, port] += mean
+    ports[_FORCE_END, port] += end
+    for other in range(count):
+        ports[_NEXT_X, other] += per_newton[port, other] * mean
+        ports[_NEXT_V, other] += per_newton[port, count + other] * mean
+        ports[_A, other] += per_newton[port, 2 * count + other] * mean
 
 
 with warnings.catch_warnings():
@@ -64,91 +152,68 @@ with warnings.catch_warnings():
     def no_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         return 0.0
 
-    @njit(types.void(_VECTOR, _MATRIX, _VECTOR), cache=True, fastmath={"reassoc", "contract"})
-    def _add(out: FloatArray, matrix: FloatArray, by: FloatArray) -> None:
-        """out += matrix.T @ by; matrices are kept transposed, so that the inner loop runs along memory."""
-        for j in range(matrix.shape[0]):
-            b = by[j]
-            for i in range(out.shape[0]):
-                out[i] += matrix[j, i] * b
-
-    @njit(types.float64(_MATRIX, types.int64, _VECTOR), cache=True, fastmath={"reassoc", "contract"})
-    def _row(matrix: FloatArray, row: int, by: FloatArray) -> float:
-        total = 0.0
-        for j in range(by.shape[0]):
-            total += matrix[row, j] * by[j]
-        return total
-
-    @njit(
-        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _THREE, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _VECTOR),
-        cache=True, nogil=True, error_model="numpy",
-    )  # fmt: skip
+    @njit(inline="always")
     def _push(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, motion: Three, state: FloatArray,
-        u: FloatArray, free: FloatArray, by_force: FloatArray, force: FloatArray, at: FloatArray,
+        laws: Any, places: Integers, of: FloatArray, memories: tuple[FloatArray, FloatArray], per_newton: FloatArray,
+        ports: FloatArray, own: FloatArray, at: FloatArray,
     ) -> None:  # fmt: skip
-        """Finds the forces (2, ports) over one step and at its end, and lets them act on `free`, the state at its end
-        without them."""
-        ports = force.shape[1]
-        before, items = memory.copy(), places.shape[0]
-        own, own_end = np.zeros(items), np.zeros(items)
-        force[:] = 0.0
+        """Finds the forces over one step and at its end. memories: as it becomes, and where to keep what it was."""
+        memory, before = memories
+        items, count = places.shape[0], ports.shape[1]
+        if items > 1:
+            for i in range(memory.shape[0]):
+                before[i] = memory[i]
         for sweep in range(SWEEPS if items > 1 else 1):
             for item in range(items):
                 port, kept, end = places[item, 1], places[item, 4], places[item, 5]
                 if sweep > 0:
-                    force[0, port] -= own[item]
-                    force[1, port] -= own_end[item]
-                    for i in range(free.shape[0]):
-                        free[i] -= by_force[port, i] * own[item]
-                    memory[kept:end] = before[kept:end]
-                at[X], at[V] = _row(motion[0], port, state), _row(motion[0], ports + port, state)
-                at[X_FREE], at[V_FREE] = _row(motion[0], port, free), _row(motion[0], ports + port, free)
-                at[X_PER_N] = _row(motion[0], port, by_force[port])
-                at[V_PER_N] = _row(motion[0], ports + port, by_force[port])
-                row = 2 * ports + port
-                at[A_FREE] = _row(motion[0], row, state) + _row(motion[1], row, u) + _row(motion[2], row, force[0])
-                at[A_PER_N] = motion[2][row, port]
+                    _act(per_newton, port, -own[0, item], -own[1, item], ports)
+                    for i in range(kept, end):
+                        memory[i] = before[i]
+                at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
+                at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
+                at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
+                at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
                 at[F_END] = np.nan
                 added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], memory[kept:end], at)
-                own[item] = added
-                own_end[item] = added if np.isnan(at[F_END]) else at[F_END]
-                force[0, port] += added
-                force[1, port] += own_end[item]
-                for i in range(free.shape[0]):
-                    free[i] += by_force[port, i] * added
+                own[0, item] = added
+                own[1, item] = added if np.isnan(at[F_END]) else at[F_END]
+                _act(per_newton, port, own[0, item], own[1, item], ports)
 
-    @njit(_PLAY, cache=True, nogil=True, error_model="numpy")
+    @njit(
+        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, _MATRIX, _VECTOR, _COUNT, types.float64),
+        cache=True, nogil=True, error_model="numpy", fastmath=_FAST,
+    )  # fmt: skip
     def play(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, advance: Three, look: Three, motion: Three,
-        command: FloatArray, state: FloatArray, out: tuple[FloatArray, FloatArray], steps: int, step_s: float,
+        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
+        ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
     ) -> None:  # fmt: skip
-        """Fills out = (what is looked at (n, rows), forces (n, ports)), as they are just before a command is written.
+        """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
+        ports' accelerations at its start; a sample's first row becomes the state before it and the forces (r,) just
+        then. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
 
-        places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. advance: transposed, (s, s),
-        (m, s) and (ports, s). look: transposed, (s, rows), (m, rows), (ports, rows). motion: (3 ports, s), (3 ports, m)
-        and (3 ports, ports), the ports' positions, velocities and accelerations. command: (n, m), or (n steps, m).
+        places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. step: how the state advances,
+        the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
+        state (r, s), and `per_newton`. count: steps per sample; stride, which is 1 where commands are held over all of
+        them, else so many; the first sample's number.
         """
-        looked, forces = out
-        n, ports, size = looked.shape[0], forces.shape[1], state.shape[0]
-        fine = command.shape[0] == n * steps and steps > 1
-        free, before, force = np.empty(size), np.zeros(command.shape[1]), np.zeros((2, ports))
-        at, seen = np.zeros(LENGTH), np.empty(looked.shape[1])
-        at[STEP_S] = step_s
-        for k in range(n):
-            seen[:] = 0.0
-            _add(seen, look[0], state)
-            _add(seen, look[1], before)
-            _add(seen, look[2], force[1])
-            looked[k] = seen
-            forces[k] = force[1]
-            for step in range(steps):
-                u = command[k * steps + step] if fine else command[k]
-                free[:] = 0.0
-                _add(free, advance[0], state)
-                _add(free, advance[1], u)
-                if len(places):
-                    at[TIME_S] = (k * steps + step) * step_s
-                    _push(laws, places, of, memory, motion, state, u, free, advance[2], force, at)
-                state[:] = free
-                before[:] = u
+        advance, look, by_force, per_newton = step
+        steps, stride, begun = count
+        size, r = state.shape[0], ports.shape[1]
+        added, spare, at = np.empty(size + r), np.empty(size), np.zeros(LENGTH)
+        memories, own = (memory, np.empty(memory.shape[0])), np.zeros((2, places.shape[0]))
+        at[STEP_S], ports[_A] = step_s, np.nan
+        for k in range(rows.shape[0] // stride):
+            for now in range(steps):
+                if now == 0 or stride > 1:
+                    for i in range(size + r):
+                        added[i] = rows[k * stride + now, i]
+                if now == 0:
+                    _keep(state, ports, rows[k * stride])
+                if look.shape[0] > 2 * r:
+                    _feel(look, added, state, ports)
+                _go(advance, added, state, spare)
+                _aim(look, state, ports)
+                at[TIME_S] = ((begun + k) * steps + now) * step_s
+                _push(laws, places, of, memories, per_newton, ports, own, at)
+                _land(by_force, state, ports)
