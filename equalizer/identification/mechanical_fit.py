@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from equalizer.identification.mechanical_choice import choose
 from equalizer.identification.mechanical_fit_result import (
     ChannelError,
     MechanicalFit,
@@ -16,15 +17,19 @@ from equalizer.identification.mechanical_free_simulation import simulation_error
 from equalizer.identification.mechanical_lines import SegmentLines, of_band, roles, segment_lines
 from equalizer.identification.mechanical_misfit import LineGroup, line_groups
 from equalizer.identification.mechanical_model_of import readable_model
-from equalizer.identification.mechanical_order import choose
+from equalizer.identification.mechanical_order import stages
 from equalizer.identification.mechanical_refinement import Refined, refined
 from equalizer.identification.mechanical_refusals import refuse_noise, refuse_unfit, refuse_unstable
 from equalizer.identification.mechanical_start import rigid_start
 from equalizer.identification.mechanical_structure import Structure
+from equalizer.identification.modal_order import in_balance
+from equalizer.identification.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-_LOW_PARTS = (1.0, 0.5, 0.25)
+LINES_TO_CHOOSE_BY = 400
+"""Of each group; the chosen structure is then fitted to all."""
+_LOW_PARTS = (0.25, 0.5, 1.0)
 """Of the band in octaves, from its beginning: modes above would draw the start away from the rigid body."""
 
 
@@ -52,10 +57,11 @@ def fit_mechanical_model(
     band = _band(segments)
     groups = line_groups(segments, settings.floor)
     structure = _structure(recordings[0], settings, band)
-    starts = _rigid_fits(segments, groups, structure, band, settings)
-    chosen = choose(groups, starts, band, settings, on_progress)
+    fewer = [group.thinned(LINES_TO_CHOOSE_BY) for group in groups]
+    starts = _rigid_fits(segments, fewer, structure, band, settings)
+    chosen = choose(fewer, starts, band, settings, on_progress)
     every = [group.of(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
-    final = refined(_nothing_left_out(every), chosen.best.structure, chosen.best.unknowns, band)
+    final = _refitted(_nothing_left_out(every), chosen.best, band)
     refuse_unstable(final)
     tested = [one for each in test if (one := segment_lines(*each)) is not None]
     on_progress(1.0)
@@ -102,15 +108,18 @@ def _rigid_fits(
     structure: Structure,
     band: tuple[float, float],
     settings: MechanicalFitSettings,
-) -> list[Refined]:
-    found = []
-    for part in _LOW_PARTS:
-        end = band[0] * (band[1] / band[0]) ** part
-        lower = of_band(segments, (band[0], end))
-        if sum(len(one.frequency_hz) for one in lower) < 8 * structure.inputs:
+) -> list[Refined[Structure]]:
+    found: list[Refined[Structure]] = []
+    first = stages(band)[0]
+    lower = [part for group in groups if len((part := group.of(group.frequency_hz <= first)).frequency_hz)]
+    for share in _LOW_PARTS:
+        end = band[0] * (first / band[0]) ** share
+        low = of_band(segments, (band[0], end))
+        if sum(len(one.frequency_hz) for one in low) < 8 * structure.inputs and (found or share != _LOW_PARTS[-1]):
             continue
-        begun, unknowns = rigid_start(lower, structure, settings.floor)
-        found.append(refined(groups, begun, unknowns, band))
+        for delayed in (False, True)[: 1 + settings.fit_delay]:
+            begun, unknowns = rigid_start(low, replace(structure, delayed=delayed), settings.floor)
+            found.append(refined(lower, begun, unknowns, (band[0], first)))
     return found
 
 
@@ -138,17 +147,29 @@ def _band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
     )
 
 
+def _refitted(
+    groups: Sequence[LineGroup], best: Refined[Structure] | Refined[ModalStructure], band: tuple[float, float]
+) -> Refined[Structure] | Refined[ModalStructure]:
+    if isinstance(best.structure, ModalStructure):
+        return in_balance(refined(groups, best.structure, best.unknowns, band, most_steps=6))
+    return refined(groups, best.structure, best.unknowns, band)
+
+
 def _nothing_left_out(groups: Sequence[LineGroup]) -> list[LineGroup]:
     return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
 
 
-def _remarks(final: Refined, channels: tuple[str, ...], tested: bool) -> tuple[str, ...]:
+def _remarks(
+    final: Refined[Structure] | Refined[ModalStructure], channels: tuple[str, ...], tested: bool
+) -> tuple[str, ...]:
     structure = final.structure
     own = ", ".join(channels[: structure.inputs])
     found = [f"The model is linear and was fitted, as none was given; {own} taken to move as the commands act."]
-    if -1.0 in structure.signs:
+    if isinstance(structure, ModalStructure):
+        found.append("The sensors see the modes otherwise than the commands push them: a joint or cable lies between.")
+    elif -1.0 in structure.signs:
         found.append("The response counts the other way than the command acts.")
-    if not structure.grounded:
+    if isinstance(structure, Structure) and not structure.grounded:
         found.append("No spring to the ground is seen: the device drifts freely under a constant command.")
     if not tested:
         found.append("Nothing was kept for a test: the error is that of the fitted segments.")

@@ -19,6 +19,9 @@ class MechanicalFitSettings:
     """As its data sheet has it: it is taken as known, not fitted."""
     actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
     """Known beforehand; the delay is where its fit starts, if it is fitted."""
+    sensors_elsewhere: bool | None = None
+    """Whether response i may move otherwise than what command i pushes (a cable or a joint lies between). None: where
+    the left-out lines say so."""
     fit_delay: bool = True
     """Whether a delay may be added where the left-out lines ask for it."""
     floor: float = 0.02

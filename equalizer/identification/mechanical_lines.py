@@ -18,7 +18,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import FloatArray
 
-EXCITED = 3e-3
+EXCITED = 1e-2
 """Of the strongest line's amplitude: below it nothing was played."""
 MOST_LINES = 2000
 """Of one segment that does not repeat: beyond, every second, third... is taken."""
@@ -75,7 +75,7 @@ def of_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | Non
     low, high = band_hz or (0.0, np.inf)
     found = []
     for one in segments:
-        alike = [other.excited for other in segments if _repeat_alike(one, other)]
+        alike = [other.excited for other in segments if repeat_alike(one, other)]
         excited = one.excited if one.transient else np.any(alike, axis=0)
         chosen = np.flatnonzero(excited & (one.frequency_hz >= low) & (one.frequency_hz <= high))
         if one.transient and len(chosen) > MOST_LINES:
@@ -85,7 +85,7 @@ def of_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | Non
     return tuple(found)
 
 
-def _repeat_alike(one: SegmentLines, other: SegmentLines) -> bool:
+def repeat_alike(one: SegmentLines, other: SegmentLines) -> bool:
     return not (one.transient or other.transient) and (one.rate_hz, one.hold, len(one.frequency_hz)) == (
         other.rate_hz, other.hold, len(other.frequency_hz),
     )  # fmt: skip

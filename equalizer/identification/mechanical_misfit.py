@@ -1,13 +1,14 @@
 """How far a mechanical model is from measured lines, in units of what is expected of it, and its slope."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from equalizer.identification.frequency_response import BoolArray
 from equalizer.identification.mechanical_lines import SegmentLines
 from equalizer.identification.mechanical_response import free_response, sampled_response
+from equalizer.identification.mechanical_scatter import with_scatter
 from equalizer.identification.noise_floor import over_neighbours
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.lockin import ComplexArray
@@ -40,6 +41,12 @@ class LineGroup:
     def without_left_out(self) -> "LineGroup":
         return self.of(~self.left_out)
 
+    def thinned(self, most: int) -> "LineGroup":
+        """Every second, third... line, of which others are left out in turn."""
+        every = -(-len(self.frequency_hz) // most)
+        part = self.of(np.arange(len(self.frequency_hz)) % every == 0)
+        return replace(part, left_out=_turn_by_turn(len(part.frequency_hz)))
+
     def of(self, chosen: BoolArray) -> "LineGroup":
         return LineGroup(
             self.frequency_hz[chosen], self.root[chosen], self.target[chosen], self.weight[chosen],
@@ -50,11 +57,11 @@ class LineGroup:
 def line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGroup, ...]:
     """Segments that repeat and have the same lines become one group, however many they are."""
     found: list[LineGroup] = []
-    for segment in segments:
+    for segment in with_scatter(segments):
         weight = _weight(segment, floor)
         root = weight[:, :, None, None] * segment.command[:, None, None, :]
         target = (weight * segment.response)[:, :, None]
-        left_out = np.arange(len(segment.frequency_hz)) % LEFT_OUT_EVERY == LEFT_OUT_EVERY // 2
+        left_out = _turn_by_turn(len(segment.frequency_hz))
         group = LineGroup(
             segment.frequency_hz, root, target, weight, left_out, np.count_nonzero(weight, axis=1).astype(float),
             segment.transient, segment.rate_hz, segment.hold,
@@ -72,7 +79,7 @@ def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[Complex
     found = []
     for group in groups:
         response = sampled_response(model, group.frequency_hz, group.rate_hz, group.hold)
-        misfit = group.target - np.einsum("lpem,lpm->lpe", group.root, response)
+        misfit = group.target - (group.root @ response[..., None])[..., 0]
         found.append(_without_transient(group, model, misfit) if group.transient else misfit)
     return found
 
@@ -113,6 +120,10 @@ def _weight(segment: SegmentLines, floor: float) -> FloatArray:
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
     least = 1e-12 * power.max(axis=0, initial=0.0) + 1e-300
     return np.asarray(segment.excited[:, None] / np.sqrt(noise + floor**2 * size + least))
+
+
+def _turn_by_turn(lines: int) -> BoolArray:
+    return np.asarray(np.arange(lines) % LEFT_OUT_EVERY == LEFT_OUT_EVERY // 2)
 
 
 def _same_lines(one: LineGroup, other: LineGroup) -> bool:

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from equalizer.identification.mechanical_misfit import jacobian
 from equalizer.identification.mechanical_refinement import Refined
-from equalizer.identification.mechanical_structure import diagonal_places
+from equalizer.identification.mechanical_structure import Structure
+from equalizer.identification.modal_structure import ModalStructure, at_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
@@ -13,41 +15,59 @@ LEAST_TOLERANCE = 0.01
 """Of the value: no calibration is better than its force sensor or current loop."""
 
 
-def readable_model(fit: Refined, name: str) -> MechanicalModel:
+AnyFit = Refined[Structure] | Refined[ModalStructure]
+
+
+def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
     """With a tolerance; absolute coordinates for the oscillators, so that their masses stand on the diagonal."""
-    model = _absolute(fit.structure.model(fit.unknowns, name), fit.structure.inputs)
-    return replace(model, tolerance=tolerance_of(fit, model))
+    model = fit.structure.model(fit.unknowns, name)
+    if isinstance(fit.structure, ModalStructure):
+        model = at_driven_axes(model)
+    else:
+        model = _absolute(model, fit.structure.inputs)
+    return replace(model, tolerance=tolerance_of(fit))
 
 
-def tolerance_of(fit: Refined, model: MechanicalModel) -> Tolerance:
-    """One standard deviation by the misfit's own size, the largest over the driven axes."""
-    structure = fit.structure
-    slope, m = fit.slope, structure.inputs
-    rows = max(len(slope) - structure.parameters, 1)
-    size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
-    spread = np.sqrt(np.diag(np.linalg.pinv((slope / size).T @ (slope / size)))) / size
-    spread = spread * np.sqrt(max(fit.squares / rows, 1e-300))
-    diagonal, units, part = diagonal_places(m), structure.units, structure.slices
-    mass, damping, stiffness = (np.diag(matrix)[:m] for matrix in (model.mass, model.damping, model.stiffness))
-    # The logarithm of the root is what is fitted: twice its spread is the mass's relative one.
-    of_mass = float((2 * spread[part["mass"]][diagonal] * mass).max())
-    of_damping = float((spread[part["damping"]][diagonal] * units[1]).max())
-    of_stiffness = float((spread[part["stiffness"]][diagonal] * units[2]).max()) if structure.grounded else 0.0
+def tolerance_of(fit: AnyFit) -> Tolerance:
+    """One standard deviation by the misfit's own size, the largest over the driven axes; of modes with shapes of their
+    own only their frequencies', for how hard each is pushed where no sensor sits is not told by the data."""
+    if isinstance(fit.structure, ModalStructure):
+        structure = fit.structure
+        logs = np.sqrt(np.diag(_covariance(fit))).reshape(structure.modes, -1)[:, 0]
+        return Tolerance(modes=max(float(np.median(logs)), LEAST_TOLERANCE))
+    return _of_oscillators(fit.structure, fit)
+
+
+def _of_oscillators(structure: Structure, fit: AnyFit) -> Tolerance:
+    here = _driven_axes(structure, fit.unknowns)
+    slope = jacobian(
+        lambda unknowns: _driven_axes(structure, unknowns), fit.unknowns, here, np.full(structure.parameters, np.inf)
+    )
+    covariance = _covariance(fit)
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
+    spread, values = spread.reshape(3, -1).max(axis=1), here.reshape(3, -1).max(axis=1)
+    mass, damping, stiffness = np.maximum(spread, LEAST_TOLERANCE * values).tolist()
     of_modes = None
     if structure.modes:
-        each = spread[part["modes"]].reshape(structure.modes, -1)
+        each = np.sqrt(np.diag(covariance)[structure.slices["modes"]]).reshape(structure.modes, -1)
         of_modes = max(float(np.median(each[:, 0])), LEAST_TOLERANCE)
-    grounded = stiffness if structure.modes == 0 else _grounded(fit)
-    return Tolerance(
-        mass_kg=max(of_mass, LEAST_TOLERANCE * float(mass.max())),
-        damping_n_s_per_m=max(of_damping, LEAST_TOLERANCE * float(damping.max())),
-        stiffness_n_per_m=max(of_stiffness, LEAST_TOLERANCE * float(grounded.max(initial=0.0))),
-        modes=of_modes,
-    )
+    return Tolerance(mass, damping, stiffness, of_modes)
 
 
-def _grounded(fit: Refined) -> FloatArray:
-    return np.asarray(np.diag(fit.structure.model(fit.unknowns).stiffness)[: fit.structure.inputs])
+def _driven_axes(structure: Structure, unknowns: FloatArray) -> FloatArray:
+    """(3 m,): masses, damping and stiffness to the ground at each."""
+    model, m = structure.model(unknowns), structure.inputs
+    own = structure.oscillators(unknowns)[2]
+    masses = np.diag(model.mass)[:m] - np.sum(own**2, axis=0)
+    return np.concatenate([masses, np.diag(model.damping)[:m], np.diag(model.stiffness)[:m]])
+
+
+def _covariance(fit: AnyFit) -> FloatArray:
+    slope = fit.slope
+    size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+    inverse = np.linalg.pinv((slope / size).T @ (slope / size), rcond=1e-10)
+    left = fit.squares / max(len(slope) - slope.shape[1], 1)
+    return np.asarray(left * inverse / np.outer(size, size))
 
 
 def _absolute(model: MechanicalModel, m: int) -> MechanicalModel:

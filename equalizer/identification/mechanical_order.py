@@ -1,12 +1,15 @@
 """How many coordinates the data need: one more unknown thing is kept while lines that were not fitted gain by it."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from equalizer.identification.mechanical_fit_result import MechanicalFitSettings, OrderTried
 from equalizer.identification.mechanical_misfit import LineGroup
 from equalizer.identification.mechanical_refinement import Refined, refined
 from equalizer.identification.mechanical_start import mode_starts
+from equalizer.identification.mechanical_structure import Structure
 
 LEAST_GAIN = 0.08
 """Of the left-out squares: less is not worth a mode on a device that no linear model fits."""
@@ -14,56 +17,95 @@ PER_UNKNOWN = 4.0
 """Times what an unknown gains from noise alone, in the mean squares."""
 REACHED = 1.1
 """Left-out error in units of what noise and floor expect: nothing more to explain."""
+FIRST_STAGE, LEAST_STAGE, STAGE = 6.0, 0.05, 1.5
+"""How far the band reaches at first, times its beginning, or of its end; then times the last stage."""
+CLEAR_DELAY = 4.0
+"""Times smaller must the left-out squares be for a delay to be taken before any mode is."""
 SIMPLER = 1.02
 """So much worse may the left-out squares be without springs to the ground."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Chosen:
-    best: Refined
-    tried: tuple[OrderTried, ...]
-    reason: str
-
-
-def choose(
+def by_stages(
     groups: Sequence[LineGroup],
-    starts: Sequence[Refined],
+    best: Refined[Structure],
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
-) -> Chosen:
-    """starts: fits of the driven axes alone, from several beginnings."""
-    best = min(starts, key=lambda each: each.squares)
-    tried = [_tried("the driven axes alone", best, True)]
-    if best.structure.grounded:
-        structure, unknowns = best.structure.larger(best.unknowns, grounded=False)
-        free = refined(groups, structure, unknowns, band_hz)
-        simpler = free.left_out <= SIMPLER * best.left_out
-        tried.append(_tried("without springs to the ground", free, simpler))
-        best = free if simpler else best
-    reason = f"{settings.most_modes} modes, the most that were allowed, were used."
-    settled = False
-    while not settled and best.structure.modes <= settings.most_modes:
-        on_progress(min(0.9, 0.1 + 0.8 * best.structure.modes / max(settings.most_modes, 1)))
-        if best.error < REACHED:
-            reason = "What is left on lines that were not fitted is what noise allows."
-            break
-        settled = True
-        for what, larger in _larger(groups, best, band_hz, settings):
-            better = _earns_its_place(best, larger)
-            tried.append(_tried(what, larger, better))
+) -> tuple[Refined[Structure], tuple[OrderTried, ...], str]:
+    """The band grows upwards, for what is fitted below tells where what lies above begins."""
+    tried = [_tried("the driven axes alone", best, best.structure, True)]
+    ends = stages(band_hz)
+    for number, end in enumerate(ends):
+        on_progress(0.9 * number / len(ends))
+        band = (band_hz[0], end)
+        lower = [part for group in groups if len((part := group.of(group.frequency_hz <= end)).frequency_hz)]
+        best = refined(lower, best.structure, best.unknowns, band)
+        if number == 0 and best.structure.grounded:
+            best = _without_ground(lower, best, band, tried)
+        last = number == len(ends) - 1
+        best, reason = _grown(lower, best, band, _Limits(settings.most_modes, settings.fit_delay, last), tried)
+    return best, tuple(tried), reason
+
+
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    most_modes: int
+    delay: bool
+    whole_band: bool
+
+
+def stages(band_hz: tuple[float, float]) -> tuple[float, ...]:
+    """Ends of the growing band, hertz."""
+    low, high = band_hz
+    first = min(high, max(low * FIRST_STAGE, high * LEAST_STAGE))
+    count = int(np.ceil(np.log(high / first) / np.log(STAGE))) + 1
+    return tuple(float(end) for end in np.geomspace(first, high, count))
+
+
+def _without_ground(
+    groups: Sequence[LineGroup], best: Refined[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
+) -> Refined[Structure]:
+    structure = replace(best.structure, grounded=False)
+    free = refined(groups, structure, best.structure.carried_over(best.unknowns, structure), band_hz)
+    simpler = free.left_out <= SIMPLER * best.left_out
+    tried.append(_tried("without springs to the ground", free, structure, simpler))
+    return free if simpler else best
+
+
+def _grown(
+    groups: Sequence[LineGroup],
+    best: Refined[Structure],
+    band_hz: tuple[float, float],
+    limits: "_Limits",
+    tried: list[OrderTried],
+) -> tuple[Refined[Structure], str]:
+    """With all that earns its place in this band, and why no more."""
+    while best.error >= REACHED:
+        for what, larger in _larger(groups, best, band_hz, limits):
+            better = earns_its_place(best, larger)
+            tried.append(_tried(f"{what}, up to {band_hz[1]:.3g} Hz", larger, larger.structure, better))
             if better:
-                best, settled = larger, False
+                best = larger
                 break
         else:
-            reason = (
-                f"Nothing more explains {LEAST_GAIN:.0%} of what is left on lines that were not fitted, and more than "
-                "noise does."
+            full = best.structure.modes >= limits.most_modes
+            allowed = f"{limits.most_modes} modes, the most that are allowed, are used, and n" if full else "N"
+            return best, (
+                f"{allowed}othing more explains {LEAST_GAIN:.0%} of what is left on lines that were not fitted, and "
+                "more than noise does."
             )
-    return Chosen(best, tuple(tried), reason)
+    return best, "What is left on lines that were not fitted is what noise allows."
 
 
-def _earns_its_place(now: Refined, larger: Refined) -> bool:
+def simplest(starts: Sequence[Refined[Structure]]) -> Refined[Structure]:
+    """The best of those with the fewest unknowns, unless more of them earn their place."""
+    fewest = min(each.structure.parameters for each in starts)
+    best = min((one for one in starts if one.structure.parameters == fewest), key=lambda one: one.left_out)
+    richer = min(starts, key=lambda one: one.left_out)
+    return richer if CLEAR_DELAY * richer.left_out < best.left_out else best
+
+
+def earns_its_place(now: Refined[Structure], larger: Refined[Structure]) -> bool:
     gain = now.left_out - larger.left_out
     unknowns = larger.structure.parameters - now.structure.parameters
     by_chance = unknowns * larger.left_out / max(larger.left_out_count, 1)
@@ -71,25 +113,31 @@ def _earns_its_place(now: Refined, larger: Refined) -> bool:
 
 
 def _larger(
-    groups: Sequence[LineGroup], now: Refined, band_hz: tuple[float, float], settings: MechanicalFitSettings
-) -> Iterator[tuple[str, Refined]]:
+    groups: Sequence[LineGroup], now: Refined[Structure], band_hz: tuple[float, float], limits: _Limits
+) -> Iterator[tuple[str, Refined[Structure]]]:
     """One thing more, the cheaper ones first."""
     structure = now.structure
-    small: list[tuple[str, dict[str, bool | int]]] = []
-    if settings.fit_delay and not structure.delayed:
-        small.append(("with a delay", {"delayed": True}))
-    if structure.inputs > 1 and not structure.turned:
-        small.append(("with a turned sensor", {"turned": True}))
+    starts = mode_starts(groups, now, band_hz) if structure.modes < limits.most_modes else ()
+    for start in starts:
+        what = f"with a mode begun at {start.frequency_hz:.3g} Hz ({start.structure.modes} in all)"
+        yield what, refined(groups, start.structure, start.unknowns, band_hz)
+    if structure.inputs > 1 and not limits.whole_band:  # what is between axes shows once all modes are there
+        return
+    small: list[tuple[str, Structure]] = []
     if structure.modes and not structure.shared:
-        small.append(("with sensors that see the modes too", {"shared": True}))
-    for what, changes in small:
-        other, unknowns = structure.larger(now.unknowns, **changes)
+        small.append(("with sensors that see the modes too", replace(structure, shared=True)))
+    if limits.delay and not structure.delayed:
+        small.append(("with a delay", replace(structure, delayed=True)))
+    if structure.inputs > 1 and not structure.turned:
+        small.append(("with a turned sensor", replace(structure, turned=True)))
+    for what, other in small:
+        yield what, refined(groups, other, structure.carried_over(now.unknowns, other), band_hz)
+    for start in () if structure.shared else starts[:1]:
+        other = replace(start.structure, shared=True)
+        unknowns = start.structure.carried_over(start.unknowns, other)
+        what = f"with a mode begun at {start.frequency_hz:.3g} Hz that the sensors see ({other.modes} in all)"
         yield what, refined(groups, other, unknowns, band_hz)
-    if structure.modes < settings.most_modes:
-        for start in mode_starts(groups, now, band_hz):
-            what = f"with a mode begun at {start.frequency_hz:.3g} Hz ({start.structure.modes} in all)"
-            yield what, refined(groups, start.structure, start.unknowns, band_hz)
 
 
-def _tried(what: str, fit: Refined, accepted: bool) -> OrderTried:
-    return OrderTried(what, fit.structure.coordinates, fit.structure.parameters, fit.error, accepted)
+def _tried(what: str, fit: Refined[Structure], structure: Structure, accepted: bool) -> OrderTried:
+    return OrderTried(what, structure.coordinates, structure.parameters, fit.error, accepted)

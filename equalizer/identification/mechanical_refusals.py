@@ -6,6 +6,8 @@ import numpy as np
 
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
 from equalizer.identification.mechanical_refinement import Refined
+from equalizer.identification.mechanical_structure import Structure
+from equalizer.identification.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -66,7 +68,7 @@ def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
         )
 
 
-def refuse_unstable(final: Refined) -> None:
+def refuse_unstable(final: Refined[Structure] | Refined[ModalStructure]) -> None:
     """Raises MechanicalFitRefused for a fit that moves by itself."""
     from equalizer.identification.mechanical_response import pole_form
 

@@ -55,9 +55,8 @@ def sampled_response(model: MechanicalModel, frequency_hz: FloatArray, rate_hz: 
     """(lines, p, m), sensor and delay included; frequencies above zero."""
     form = pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
-    answers, direct = _answers(form.poles, z, rate_hz, hold, model.actuator.delay_s)
-    through = np.einsum("lk,pk,km->lpm", answers, form.outputs, form.inputs, optimize=True)
-    response = through + direct[:, None, None] * form.direct
+    answers, direct = pole_answers(form.poles, z, rate_hz, hold, model.actuator.delay_s)
+    response = _through(answers, form.outputs, form.inputs) + direct[:, None, None] * form.direct
     return np.asarray(response * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
@@ -69,8 +68,15 @@ def free_response(model: MechanicalModel, frequency_hz: FloatArray, rate_hz: flo
     form = pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
     decays = z[:, None] / (z[:, None] - np.exp(form.poles / rate_hz))
-    spectra = np.einsum("lk,pk,kn->lpn", decays, form.outputs, form.states, optimize=True)
+    spectra = _through(decays, form.outputs, form.states)
     return np.asarray(spectra * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
+
+
+def _through(answers: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
+    """(lines, p, m), in one product of matrices. answers: (lines, poles)."""
+    residues = outputs.T[:, :, None] * inputs[:, None, :]
+    flat = answers @ residues.reshape(len(residues), -1)
+    return np.asarray(flat.reshape(len(answers), *residues.shape[1:]))
 
 
 def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
@@ -90,7 +96,7 @@ def _behind_a_pole(
     return lagged, driven, np.concatenate([C, direct], axis=1), np.zeros_like(direct)
 
 
-def _answers(
+def pole_answers(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
     """(lines, poles), (lines,): what a pole, and what goes straight through, makes of a command."""

@@ -13,7 +13,7 @@ from equalizer.identification.mechanical_lines import SegmentLines
 from equalizer.identification.mechanical_misfit import LineGroup, jacobian, misfits, stacked
 from equalizer.identification.mechanical_refinement import Refined
 from equalizer.identification.mechanical_response import sampled_response, sensor_response
-from equalizer.identification.mechanical_structure import Structure, packed_mass, packed_symmetric
+from equalizer.identification.mechanical_structure import Structure, packed_mass, packed_square
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
@@ -22,6 +22,9 @@ _LEAST_EIGENVALUE = 0.05
 _GRID = 60
 _RATIOS = (0.01, 0.05, 0.25)
 _MOST_ROWS = 6000
+_DELAYS = 33
+_MOST_DELAY_CYCLES = 8.0
+"""Of the highest line."""
 _SMALL_START = 0.02
 """Root of an added mass over the whole, where the linear estimate says nothing."""
 
@@ -29,8 +32,13 @@ _SMALL_START = 0.02
 def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:
     """Unknowns of a structure without modes; in it the signs and scales that the data ask for."""
     m = structure.inputs
-    rows, right = _stiffness_rows(segments, structure, floor)
-    parts = _scaled_least_squares(rows, right)[: 3 * m * (m + 1) // 2].reshape(3, -1)
+    if structure.delayed:
+        delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _DELAYS)
+        solved = [_solved(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
+        delay_s = float(delays_s[int(np.argmin([left for _, left in solved]))])
+    else:
+        delay_s = structure.actuator.delay_s
+    parts = _solved(segments, structure, floor, delay_s)[0].reshape(3, -1)
     mass, damping, stiffness = (_symmetric(part, m) for part in parts)
     if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
         return rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
@@ -40,17 +48,28 @@ def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: f
     structure = replace(structure, mass_scale=float(np.trace(mass) / m))
     units = structure.units
     unknowns = np.zeros(structure.parameters)
+    unknowns[structure.slices["delay"]] = delay_s / structure.step_s
     unknowns[structure.slices["mass"]] = packed_mass(mass / units[0])
-    unknowns[structure.slices["damping"]] = packed_symmetric(_not_negative(damping) / units[1])
+    unknowns[structure.slices["damping"]] = packed_square(_not_negative(damping) / units[1])
     if structure.grounded:
-        unknowns[structure.slices["stiffness"]] = packed_symmetric(_not_negative(stiffness) / units[2])
+        unknowns[structure.slices["stiffness"]] = packed_square(_not_negative(stiffness) / units[2])
     if structure.outputs > m:
         unknowns[structure.slices["rows"]] = _other_rows(segments, m).ravel()
     return structure, unknowns
 
 
+def _solved(
+    segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
+) -> tuple[FloatArray, float]:
+    """Entries of the three matrices, and the squares that are left."""
+    rows, right = _stiffness_rows(segments, structure, floor, delay_s)
+    found = _scaled_least_squares(rows, right)
+    m = structure.inputs
+    return found[: 3 * m * (m + 1) // 2], float(np.sum((right - rows @ found) ** 2))
+
+
 def _stiffness_rows(
-    segments: Sequence[SegmentLines], structure: Structure, floor: float
+    segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """u = M a + D v + K x, and what a segment's ends add; real rows, weighted by the force's expected error."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
@@ -62,7 +81,7 @@ def _stiffness_rows(
         z = np.exp(s / one.rate_hz)
         late = late_steps if one.hold.value == "zero-order" else 0.0
         shown = sensor_response(structure.sensor.bandwidth_hz, z, one.rate_hz) * z ** (-late)
-        shown = shown * np.exp(-s * structure.actuator.delay_s)
+        shown = shown * np.exp(-s * delay_s)
         moved = one.response[:, :m] * np.array(structure.signs) / shown[:, None]
         size = np.linalg.norm(one.response[:, :m], axis=1)
         noise = np.sqrt(np.nan_to_num(one.noise[:, :m]).sum(axis=1)) / np.maximum(size, 1e-300)
@@ -136,7 +155,7 @@ class ModeStart:
 
 
 def mode_starts(
-    groups: Sequence[LineGroup], now: Refined, band_hz: tuple[float, float], most: int = 2
+    groups: Sequence[LineGroup], now: Refined[Structure], band_hz: tuple[float, float], most: int = 2
 ) -> tuple[ModeStart, ...]:
     """The most promising frequencies for one more oscillator, best first."""
     thinned = [_thinned(group.without_left_out(), len(groups)) for group in groups]
@@ -159,7 +178,7 @@ def mode_starts(
     return tuple(_started(now, *candidate) for candidate in chosen[:most])
 
 
-def _known_directions(groups: Sequence[LineGroup], now: Refined, misfit: FloatArray) -> FloatArray:
+def _known_directions(groups: Sequence[LineGroup], now: Refined[Structure], misfit: FloatArray) -> FloatArray:
     """Orthonormal: what the present unknowns could still change."""
     high = np.full(now.structure.parameters, np.inf)
     slope = jacobian(
@@ -209,15 +228,21 @@ def _mode_columns(
     return -np.stack(flat, axis=1)
 
 
-def _started(now: Refined, explained: float, frequency_hz: float, ratio: float, strengths: FloatArray) -> ModeStart:
+def _started(
+    now: Refined[Structure], explained: float, frequency_hz: float, ratio: float, strengths: FloatArray
+) -> ModeStart:
     structure, m = now.structure, now.structure.inputs
-    grown, unknowns = structure.larger(now.unknowns, modes=structure.modes + 1)
+    grown = replace(structure, modes=structure.modes + 1)
+    unknowns = structure.carried_over(now.unknowns, grown)
     pairs = m * (m + 1) // 2
-    values, vectors = np.linalg.eigh(_symmetric(strengths[:pairs], m))
-    least = _SMALL_START * np.sqrt(structure.mass_scale)
-    participation = vectors[:, -1] * max(np.sqrt(max(values[-1], 0.0)), least)
-    seen = strengths[pairs:].reshape(-1, m) @ participation / (participation @ participation)
+    own, others = _symmetric(strengths[:pairs], m), strengths[pairs:].reshape(-1, m)
     root = np.sqrt(structure.mass_scale)
+    # One direction for both: what drives the mode. The other responses count by what they show at the mode itself.
+    along = (
+        np.linalg.svd(np.concatenate([own / root**2, others]))[2][0] if len(others) else np.linalg.eigh(own)[1][:, -1]
+    )
+    participation = along * max(np.sqrt(max(along @ own @ along, 0.0)), _SMALL_START * root)
+    seen = others @ participation / (participation @ participation)
     speed = np.log(2 * np.pi * frequency_hz / structure.speed_scale)
     each = np.concatenate([[speed, np.log(ratio)], participation / root, seen * root])
     part = grown.slices["modes"]

@@ -14,6 +14,12 @@ import numpy.typing as npt
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.signal import FloatArray
 
+_WIDEST_LOG = 12.0
+_FARTHEST_MODE = 4.0
+"""Times the band's end, or a part of its beginning."""
+_LARGEST_TURN = 0.3
+_MOST_DELAY_SAMPLES = 200.0
+
 
 @dataclass(frozen=True, eq=False)
 class Structure:
@@ -71,9 +77,8 @@ class Structure:
             self.mass_scale * self.speed_scale**2,
         )
 
-    def larger(self, unknowns: FloatArray, **changes: bool | int) -> tuple["Structure", FloatArray]:
-        """With more unknowns, which begin at zero; those of added oscillators too."""
-        other = replace(self, **changes)  # type: ignore[arg-type]
+    def carried_over(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
+        """The same in a structure with more unknowns, which begin at zero, or with fewer."""
         grown = np.zeros(other.parameters)
         for name, part in self.slices.items():
             there = other.slices[name]
@@ -87,7 +92,7 @@ class Structure:
                 grown[there] = new.ravel()
             elif name != "modes" and part.stop - part.start == there.stop - there.start:
                 grown[there] = unknowns[part]
-        return other, grown
+        return grown
 
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """In relative coordinates. Raises MechanicalModelError for what is no mass."""
@@ -95,24 +100,41 @@ class Structure:
         units = self.units
         lower = _lower(unknowns[part["mass"]], m)
         mass = units[0] * lower @ lower.T
-        damping = units[1] * _symmetric(unknowns[part["damping"]], m)
-        stiffness = units[2] * _symmetric(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        damping = units[1] * _square(unknowns[part["damping"]], m)
+        stiffness = units[2] * _square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
         frequency, ratio, participation, seen = self.oscillators(unknowns)
-        one = np.eye(self.modes)
         own = np.diag(self.signs) @ _turn(unknowns[part["turn"]], m)
         rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
         return MechanicalModel(
             name=name,
             quantity=self.quantity,
-            mass=np.block([[mass + participation.T @ participation, participation.T], [participation, one]]),
-            damping=_apart(damping, np.diag(2 * ratio * frequency)),
-            stiffness=_apart(stiffness, np.diag(frequency**2)),
+            mass=_joined(mass + participation.T @ participation, participation, np.ones(self.modes)),
+            damping=_joined(damping, None, 2 * ratio * frequency),
+            stiffness=_joined(stiffness, None, frequency**2),
             input=np.concatenate([np.eye(m), np.zeros((self.modes, m))]),
             output=np.concatenate([rows, seen.T], axis=1),
             sensor=self.sensor,
             actuator=replace(self.actuator, delay_s=self.delay_s(unknowns)),
             rotational=self.rotational,
         )
+
+    def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+        """Within which unknowns are sought: no negative damper or spring, modes about the band."""
+        low, high = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
+        part, diagonal = self.slices, diagonal_places(self.inputs)
+        for name in ("damping", "stiffness"):
+            if part[name].stop > part[name].start:
+                low[part[name].start + diagonal] = 0.0
+        low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_WIDEST_LOG, _WIDEST_LOG
+        low[part["turn"]], high[part["turn"]] = -_LARGEST_TURN, _LARGEST_TURN
+        low[part["delay"]], high[part["delay"]] = 0.0, _MOST_DELAY_SAMPLES
+        if self.modes:
+            size = (part["modes"].stop - part["modes"].start) // self.modes
+            first = part["modes"].start + size * np.arange(self.modes)
+            low[first] = np.log(2 * np.pi * band_hz[0] / _FARTHEST_MODE / self.speed_scale)
+            high[first] = np.log(2 * np.pi * band_hz[1] * _FARTHEST_MODE / self.speed_scale)
+            low[first + 1], high[first + 1] = np.log(1e-4), np.log(3.0)
+        return low, high
 
     def delay_s(self, unknowns: FloatArray) -> float:
         if not self.delayed:
@@ -137,8 +159,9 @@ def packed_mass(mass: FloatArray) -> FloatArray:
     return np.asarray(lower[np.tril_indices(len(mass))])
 
 
-def packed_symmetric(matrix: FloatArray) -> FloatArray:
-    return np.asarray(matrix[np.tril_indices(len(matrix))])
+def packed_square(matrix: FloatArray) -> FloatArray:
+    """Likewise of a damping or stiffness: as its root, so that none can feed a motion. matrix: positive definite."""
+    return np.asarray(np.linalg.cholesky(matrix)[np.tril_indices(len(matrix))])
 
 
 def diagonal_places(m: int) -> npt.NDArray[np.intp]:
@@ -154,10 +177,10 @@ def _lower(unknowns: FloatArray, m: int) -> FloatArray:
     return lower
 
 
-def _symmetric(unknowns: FloatArray, m: int) -> FloatArray:
+def _square(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
     lower[np.tril_indices(m)] = unknowns
-    return np.asarray(lower + np.tril(lower, -1).T)
+    return np.asarray(lower @ lower.T)
 
 
 def _turn(angles: FloatArray, m: int) -> FloatArray:
@@ -170,5 +193,12 @@ def _turn(angles: FloatArray, m: int) -> FloatArray:
     return np.asarray(np.linalg.solve(np.eye(m) - skew, np.eye(m) + skew))
 
 
-def _apart(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.block([[one, np.zeros((len(one), len(other)))], [np.zeros((len(other), len(one))), other]])
+def _joined(driven: FloatArray, between: FloatArray | None, own: FloatArray) -> FloatArray:
+    """Driven axes first, then the oscillators. own: (modes,), between: (modes, m)."""
+    m, n = len(driven), len(driven) + len(own)
+    whole = np.zeros((n, n))
+    whole[:m, :m] = driven
+    whole[range(m, n), range(m, n)] = own
+    if between is not None:
+        whole[m:, :m], whole[:m, m:] = between, between.T
+    return whole

@@ -34,6 +34,7 @@ from study.cli import (
     sessions,
     show,
     study,
+    twin,
     validate,
     watch,
     withdraw,
@@ -58,6 +59,7 @@ app.command("record")(record.record)
 app.command("import")(import_recording.import_recording)
 app.command("identify")(identify.identify)
 app.command("equalize")(equalize.equalize)
+app.command("twin")(twin.twin)
 app.command("diagnose")(diagnose.diagnose)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)

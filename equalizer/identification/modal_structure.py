@@ -1,0 +1,107 @@
+"""The unknowns of a mechanical model as a sum of modes, each with its own shape at the commands and at the sensors:
+for devices whose sensors move otherwise than what the commands push."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.signals.signal import FloatArray
+
+_WIDEST = 10.0
+"""Times the band: how far from it a mode may lie."""
+_LARGEST_RATIO = 100.0
+_WEAKEST = 1e-9
+_SHARE = 0.5
+_ALIKE = 1.5
+"""Frequencies within this ratio of the slowest are those of the rigid body."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModalStructure:
+    """Per mode: log of its frequency over `speed_scale`, log of its damping ratio, m numbers where the commands push,
+    p numbers where the sensors sit; modal masses are one in `mass_scale`."""
+
+    inputs: int
+    outputs: int
+    quantity: str
+    modes: int
+    mass_scale: float
+    speed_scale: float
+    """rad/s"""
+    sensor: SensorLimits
+    actuator: ActuatorLimits
+    rotational: bool
+
+    @property
+    def parameters(self) -> int:
+        return self.modes * (2 + self.inputs + self.outputs)
+
+    @property
+    def coordinates(self) -> int:
+        return self.modes
+
+    def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
+        each = unknowns.reshape(self.modes, -1)
+        speed, ratio = self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1])
+        return MechanicalModel(
+            name=name,
+            quantity=self.quantity,
+            mass=np.eye(self.modes),
+            damping=np.diag(2 * ratio * speed),
+            stiffness=np.diag(speed**2),
+            input=each[:, 2 : 2 + self.inputs] / np.sqrt(self.mass_scale),
+            output=(each[:, 2 + self.inputs :] / np.sqrt(self.mass_scale)).T,
+            sensor=self.sensor,
+            actuator=self.actuator,
+            rotational=self.rotational,
+        )
+
+    def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+        low = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
+        high = -low
+        low[:, 0] = np.log(2 * np.pi * band_hz[0] / _WIDEST / self.speed_scale)
+        high[:, 0] = np.log(2 * np.pi * band_hz[1] * _WIDEST / self.speed_scale)
+        low[:, 1], high[:, 1] = np.log(1e-4), np.log(_LARGEST_RATIO)
+        return low.ravel(), high.ravel()
+
+
+def balanced(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
+    """(parameters,): factors that leave every response as it is, and let no mode be pushed harder than half of what the
+    slowest one is. What the commands push is not measured by sensors that sit elsewhere; this is the least that moves
+    there, and the mass that it has stays that of a device."""
+    each = unknowns.reshape(structure.modes, -1)
+    pushed = slice(2, 2 + structure.inputs)
+    size = np.maximum(np.linalg.norm(each[:, pushed], axis=1), 1e-300)
+    slowest = each[:, 0] <= each[:, 0].min() + np.log(_ALIKE)
+    most = _SHARE * size[slowest].max()
+    share = np.where(slowest, 1.0, np.minimum(1.0, most / size))
+    factors = np.ones_like(each)
+    factors[:, pushed] = share[:, None]
+    factors[:, 2 + structure.inputs :] = 1 / share[:, None]
+    return np.asarray(factors.ravel())
+
+
+def at_driven_axes(model: MechanicalModel) -> MechanicalModel:
+    """The same model in other coordinates: first what the commands push, then what hangs on it, each by itself.
+
+    Raises numpy.linalg.LinAlgError where the modes do not move every command's axis by itself."""
+    B = model.input
+    m, n = B.shape[1], model.coordinates
+    left, strengths, right = np.linalg.svd(B)
+    if strengths[-1] < _WEAKEST * strengths[0]:
+        raise np.linalg.LinAlgError("an axis that no mode moves")
+    pushed = left[:, :m] / strengths @ right
+    rest = left[:, m:]
+    if n > m:  # what hangs on it: its own modes with the driven axes held
+        rest = rest @ np.linalg.eigh(rest.T @ model.stiffness @ rest)[1]
+    change = np.concatenate([pushed, rest], axis=1)
+    mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
+    return replace(
+        model,
+        mass=(mass + mass.T) / 2,
+        damping=(damping + damping.T) / 2,
+        stiffness=(stiffness + stiffness.T) / 2,
+        input=np.concatenate([np.eye(m), np.zeros((n - m, m))]),
+        output=model.output @ change,
+    )

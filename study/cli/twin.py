@@ -1,0 +1,36 @@
+"""`hapteq twin`: the nominal mechanical model of a device, as a laboratory would write it down."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.study import DeviceOption
+
+
+def twin(
+    out: Annotated[Path, typer.Option(help="The mechanical model to write, MODEL.toml.")],
+    device: DeviceOption = "simulated",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated device's noise.")] = 1,
+    protocol: Annotated[
+        str, typer.Option(help="Recording protocol with multisines along x, y and z, or a file.")
+    ] = "multisine",
+    band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (1.0, 150.0),
+    as_json: JsonOption = False,
+) -> None:
+    """Excite the device well above its friction at two levels, fit masses, dampers, springs and modes from the command
+    to the acceleration, and write them with their tolerances. Nobody may hold the handle."""
+    from study.cli.progress import late_bar
+    from study.cli.record import announce
+    from study.workflows.twin_summary import twin_lines, twin_summary
+    from study.workflows.write_twin import TwinPlan, check_free, write_twin
+
+    plan = TwinPlan(out, device, seed, protocol, band)
+    check_free(plan)
+    with late_bar("Twin (%)", total=100) as show:
+        written = write_twin(plan, lambda share: show(round(100 * share)), before_moving=announce)
+    typer.echo(json.dumps(twin_summary(written), indent=2) if as_json else "\n".join((str(out), *twin_lines(written))))
+    for note in written.notes:
+        typer.echo(f"Note: {note}", err=True)
