@@ -31,16 +31,11 @@ class AsOnePiece:
 def as_one_piece(
     fit: MechanicalFit, strong: Recording, weaker: Recording, settings: MechanicalFitSettings
 ) -> AsOnePiece:
-    """The tolerance is the fit's own, widened to what rigid fits at the two levels differ by, at the worst axis. Of the damping: to what
-    it would fall by at forces far above friction, whose equivalent falls as the force grows."""
+    """The tolerance is the fit's own, widened to what rigid fits at the two levels differ by, at the worst axis. Of the
+    damping: to what it would fall by at forces far above friction, whose equivalent falls as the force grows."""
     low, high = fit.band_hz
-    rigid = replace(
-        settings,
-        band_hz=(low, min(high, low * 2**RIGID_OCTAVES)),
-        most_modes=0,
-        fit_delay=False,
-        sensors_elsewhere=False,
-    )
+    up_to_hz = min(high, low * 2**RIGID_OCTAVES)
+    rigid = replace(settings, band_hz=(low, up_to_hz), most_modes=0, fit_delay=False, sensors_elsewhere=False)
     ratio = _amplitude(strong) / _amplitude(weaker)
     fits = [fit_mechanical_model([one], rigid).model for one in (strong, weaker)]
     change = np.abs(_driven(fits[1]) - _driven(fits[0]))
@@ -54,7 +49,7 @@ def as_one_piece(
         modes=mine.modes,
     )
     mass, damping, _ = _driven(fits[0])
-    return AsOnePiece(end, mass, damping, tolerance)
+    return AsOnePiece(up_to_hz, mass, damping, tolerance)
 
 
 def _driven(model: MechanicalModel) -> FloatArray:

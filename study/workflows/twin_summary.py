@@ -48,9 +48,8 @@ def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
         f"damping {_words(piece.damping)} N s/m{_about(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes := _modes_hz(written):
-        lines.append(
-            f"{model.coordinates} coordinates; what hangs on the driven axes swings at {', '.join(f'{each:.3g}' for each in modes)} Hz"
-        )
+        swing = ", ".join(f"{each:.3g}" for each in modes)
+        lines.append(f"{model.coordinates} coordinates; what hangs on the driven axes swings at {swing} Hz")
     for one in fit.errors:
         held = "" if one.held_out is None else f", {one.held_out:.1%} on what was kept for a test"
         noise = "" if one.noise is None else f" (noise {one.noise:.1%})"
