@@ -32,7 +32,9 @@ def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: 
 
     Raises ValueError where an effect befalls a channel that is not there.
     """
-    mean, end = np.array(commands.mean, dtype=np.float64), np.array(commands.end, dtype=np.float64)
+    mean, end = commands.mean, commands.end
+    if any(isinstance(placed.effect.acts, OnCommand) for placed in effects):
+        mean, end = mean.copy(), end.copy()
     for placed in effects:
         acts, values = placed.effect.acts, placed.values
         for site in placed.sites if isinstance(acts, OnCommand) else ():
@@ -56,7 +58,8 @@ def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: 
 def finer(commands: FloatArray, steps: int, hold: Hold) -> Driven:
     """From (n, m), by how the command moves between its samples."""
     if steps == 1 or hold is Hold.ZERO_ORDER:
-        held = np.repeat(commands, steps, axis=0)
+        commands = np.asarray(commands, dtype=np.float64)
+        held = np.repeat(commands, steps, axis=0) if steps > 1 else commands
         return Driven(held, held)
     if hold is Hold.LINEAR:
         change = np.diff(commands, axis=0, append=commands[-1:])

@@ -58,23 +58,27 @@ def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> 
         return njit(LAW, cache=True, error_model="numpy")(law)
 
 
+@njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=_FAST)
+def _go_together(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
+    """One step, of coordinates that do not come apart. advance: (s, s), transposed."""
+    before = state.copy()
+    state[:] = added[: state.shape[0]]
+    for j in range(state.shape[0]):
+        for i in range(state.shape[0]):
+            state[i] += advance[j, i] * before[j]
+
+
 @njit(inline="always")
-def _go(advance: FloatArray, added: FloatArray, state: FloatArray, spare: FloatArray) -> None:
+def _go(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
     """One step. advance: (4, s / 2) or (s, s), see `equalizer.effects.modal_form`. added: (s, ...), by commands."""
-    size = state.shape[0]
-    half = size // 2
-    if advance.shape[1] == half:
-        for i in range(half):
-            first, second = state[i], state[half + i]
-            state[i] = advance[0, i] * first + advance[1, i] * second + added[i]
-            state[half + i] = advance[2, i] * first + advance[3, i] * second + added[half + i]
+    half = state.shape[0] // 2
+    if advance.shape[1] != half:
+        _go_together(advance, added, state)
         return
-    for i in range(size):
-        spare[i] = state[i]
-        state[i] = added[i]
-    for j in range(size):
-        for i in range(size):
-            state[i] += advance[j, i] * spare[j]
+    for i in range(half):
+        first, second = state[i], state[half + i]
+        state[i] = advance[0, i] * first + advance[1, i] * second + added[i]
+        state[half + i] = advance[2, i] * first + advance[3, i] * second + added[half + i]
 
 
 @njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=_FAST)
@@ -82,12 +86,12 @@ def coast(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
     """Motion without further forces. rows: (n, s ...), what the commands add over each step; becomes the state before
     each. state: (s,), becomes that of the end."""
     size = state.shape[0]
-    added, spare = np.empty(size), np.empty(size)
+    added = np.empty(size)
     for k in range(rows.shape[0]):
         for i in range(size):
             added[i] = rows[k, i]
             rows[k, i] = state[i]
-        _go(advance, added, state, spare)
+        _go(advance, added, state)
 
 
 @njit(inline="always")
@@ -153,32 +157,43 @@ with warnings.catch_warnings():
         return 0.0
 
     @njit(inline="always")
+    def _push_at(  # noqa: PLR0913 - a kernel takes flat arrays
+        law: Any, of: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
+        at: FloatArray,
+    ) -> tuple[float, float]:  # fmt: skip
+        """One force, over the step and at its end, with all others as they are."""
+        count = ports.shape[1]
+        at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
+        at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
+        at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
+        at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
+        at[F_END] = np.nan
+        mean = law(of, memory, at)
+        end = mean if np.isnan(at[F_END]) else at[F_END]
+        _act(per_newton, port, mean, end, ports)
+        return mean, end
+
+    @njit(
+        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR),
+        cache=True, nogil=True, error_model="numpy", fastmath=_FAST,
+    )  # fmt: skip
     def _push(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: Any, places: Integers, of: FloatArray, memories: tuple[FloatArray, FloatArray], per_newton: FloatArray,
-        ports: FloatArray, own: FloatArray, at: FloatArray,
+        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
+        own: FloatArray, at: FloatArray,
     ) -> None:  # fmt: skip
-        """Finds the forces over one step and at its end. memories: as it becomes, and where to keep what it was."""
-        memory, before = memories
-        items, count = places.shape[0], ports.shape[1]
-        if items > 1:
-            for i in range(memory.shape[0]):
-                before[i] = memory[i]
-        for sweep in range(SWEEPS if items > 1 else 1):
-            for item in range(items):
+        """Several forces. own: (2, items), scratch."""
+        before = memory.copy()
+        for sweep in range(SWEEPS):
+            for item in range(places.shape[0]):
                 port, kept, end = places[item, 1], places[item, 4], places[item, 5]
                 if sweep > 0:
                     _act(per_newton, port, -own[0, item], -own[1, item], ports)
                     for i in range(kept, end):
                         memory[i] = before[i]
-                at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
-                at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
-                at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
-                at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
-                at[F_END] = np.nan
-                added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], memory[kept:end], at)
-                own[0, item] = added
-                own[1, item] = added if np.isnan(at[F_END]) else at[F_END]
-                _act(per_newton, port, own[0, item], own[1, item], ports)
+                begin, law = places[item, 2], laws[places[item, 0]]
+                own[0, item], own[1, item] = _push_at(
+                    law, of[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
+                )
 
     @njit(
         types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, _MATRIX, _VECTOR, _COUNT, types.float64),
@@ -200,8 +215,9 @@ with warnings.catch_warnings():
         advance, look, by_force, per_newton = step
         steps, stride, begun = count
         size, r = state.shape[0], ports.shape[1]
-        added, spare, at = np.empty(size + r), np.empty(size), np.zeros(LENGTH)
-        memories, own = (memory, np.empty(memory.shape[0])), np.zeros((2, places.shape[0]))
+        added, at = np.empty(size + r), np.zeros(LENGTH)
+        own, law = np.zeros((2, places.shape[0])), laws[places[0, 0]]
+        its, its_memory = of[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
         at[STEP_S], ports[_A] = step_s, np.nan
         for k in range(rows.shape[0] // stride):
             for now in range(steps):
@@ -212,8 +228,11 @@ with warnings.catch_warnings():
                     _keep(state, ports, rows[k * stride])
                 if look.shape[0] > 2 * r:
                     _feel(look, added, state, ports)
-                _go(advance, added, state, spare)
+                _go(advance, added, state)
                 _aim(look, state, ports)
                 at[TIME_S] = ((begun + k) * steps + now) * step_s
-                _push(laws, places, of, memories, per_newton, ports, own, at)
+                if places.shape[0] == 1:
+                    _push_at(law, its, its_memory, 0, per_newton, ports, at)
+                else:
+                    _push(laws, places, of, memory, per_newton, ports, own, at)
                 _land(by_force, state, ports)

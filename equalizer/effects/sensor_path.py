@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
+from equalizer.effects.low_pass_kernel import one_pole
 from equalizer.signals.signal import FloatArray
 
 
@@ -11,7 +12,9 @@ def low_passed(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float)
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
-    return np.asarray(lfilter([1 - decay], [1.0, -decay], response, axis=0))
+    passed = np.empty(response.shape)
+    one_pole(response.reshape(len(response), -1), decay, passed.reshape(len(passed), -1))
+    return passed
 
 
 def before_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: float) -> FloatArray:
