@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.document import Estimate, NamedEffect, Rival
 from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.hypothesis import Claim, Hypothesis
+from analysis.diagnosis.parsimony import only_refines
 from analysis.diagnosis.probability import probabilities
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.same_within_errors import inseparable
@@ -81,7 +82,7 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
         claim = other.fitted.hypothesis.claims[-1]
         if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
             continue
-        same = inseparable(best, other)
+        same = inseparable(best, other) and not only_refines(other, best)
         rivals[claim.effect.name] = Rival(claim.effect.name, chance, same, _why_not(best, other, same, said))
         if len(rivals) == RIVALS:
             break
@@ -93,6 +94,11 @@ def _why_not(best: Contender, other: Contender, same: bool, said: Said) -> str:
     claim = other.fitted.hypothesis.claims[-1]
     axis = axis_of(claim, said)
     where = f" ({axis})" if axis else ""
+    if only_refines(other, best):
+        return (
+            f"it holds the named law and more numbers beside it{where}, which bring too little: {worst:.3g} times the "
+            f"noise in the worst channel instead of {least:.3g}"
+        )
     if same:
         return f"as good{where}: it leaves {worst:.2f} times the noise in the worst channel, the named one {least:.2f}"
     return f"at its best{where} it leaves {worst:.3g} times the noise in the worst channel, the named one {least:.3g}"

@@ -23,7 +23,12 @@ def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
 
 
 def _is_plainer(one: Contender, other: Contender) -> bool:
-    return len(one.fitted.hypothesis.point) < len(other.fitted.hypothesis.point) or _contained(one, other)
+    return len(one.fitted.hypothesis.point) < len(other.fitted.hypothesis.point) or only_refines(other, one)
+
+
+def only_refines(other: Contender, one: Contender) -> bool:
+    """Whether the other's last effect holds the one's as a special case, at the same place."""
+    return _contained(one, other)
 
 
 def _contained(one: Contender, other: Contender) -> bool:

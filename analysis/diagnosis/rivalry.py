@@ -21,7 +21,9 @@ MOST_REFINED = 3
 """And a second one, with everything recomputed where they stand,"""
 WORTH_REFINING = 0.5
 """where they gained such a share of what the best one gained."""
-FIRST_ROUNDS, SECOND_ROUNDS = 3, 5
+FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
+MOST_REFRESHED, SETTLED = 3, 0.02
+"""What the model's numbers do is recomputed so often, or until that gains no more than such a share."""
 NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
 
@@ -91,8 +93,15 @@ def sensitivity_at(arena: Arena, deviations: np.ndarray, hypothesis: Hypothesis)
 
 
 def _refined_from(arena: Arena, fitted: Fitted) -> Fitted:
-    there = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
-    return fit(arena.measure, arena.tuning, fitted, there, SECOND_ROUNDS)
+    best = fitted
+    for _ in range(MOST_REFRESHED):
+        there = sensitivity_at(arena, best.deviations, best.hypothesis)
+        better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
+        settled = better.cost > (1 - SETTLED) * best.cost
+        best = better
+        if settled:
+            break
+    return best
 
 
 def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:
