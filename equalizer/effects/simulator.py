@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.bodies import Bodies, bodies_of, moved
-from equalizer.effects.command_path import Driven, driven_by, finer, moves_between_samples
+from equalizer.effects.bodies import bodies_of, moved
+from equalizer.effects.command_path import driven_by, finer, moves_between_samples
 from equalizer.effects.effect import STEPS, OnResponse, PlacedEffect
 from equalizer.effects.sensor_path import low_passed, within_range
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -55,20 +55,38 @@ def simulate_mechanism(
 
     Raises ValueError where an effect befalls an axis that is not there.
     """
-    bodies = bodies_of(model, effects)
-    moves = moves_between_samples(model, effects, hold)
-    steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
-    step_s = 1 / (sample_rate_hz * steps)
-    fine = steps if moves else 1
-    driven = driven_by(model, finer(commands, fine, hold), 1 / (sample_rate_hz * fine), effects)
-    played = _moved(bodies, driven, (len(commands), steps), step_s)
+    return _sensed(model, _moved(model, commands, (sample_rate_hz, hold), effects), sample_rate_hz, effects, seen)
+
+
+def simulate_response(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sample_rate_hz: float,
+    effects: Sequence[PlacedEffect] = (),
+    hold: Hold = Hold.ZERO_ORDER,
+    seen: Seen | None = None,
+) -> Played:
+    """The same sooner, but the driven axes are not looked at: their arrays are (n, 0)."""
+    played = _moved(model, commands, (sample_rate_hz, hold), effects, axes=False)
     return _sensed(model, played, sample_rate_hz, effects, seen)
 
 
-def _moved(bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float) -> Played:
-    m, p, ports = bodies.axes, bodies.structure.outputs, bodies.ports.shape[1]
-    looked, added = moved(bodies, driven, size, step_s)
-    rows = looked[:, 3 * ports :]
+def _moved(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampled: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+    axes: bool = True,
+) -> Played:
+    """Before the sensor."""
+    bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
+    moves = moves_between_samples(model, effects, hold)
+    steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
+    fine = steps if moves else 1
+    driven = driven_by(model, finer(commands, fine, hold), 1 / (rate_hz * fine), effects)
+    looked, added = moved(bodies, driven, (len(commands), steps), 1 / (rate_hz * steps), axes)
+    m, p, ports = bodies.axes if axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
+    rows = looked[:, 3 * ports if axes else 0 :]
     return Played(rows[:, :p], rows[:, p:], looked[:, :m], looked[:, ports : ports + m], added[:, :m])
 
 
@@ -77,11 +95,10 @@ def _sensed(
 ) -> Played:
     on_response = [(placed.effect.acts, placed) for placed in effects if isinstance(placed.effect.acts, OnResponse)]
     on_response.sort(key=lambda item: item[0].stage)
-    response, position = np.array(played.response), np.array(played.position)
+    response, position = played.response, played.position
     for after_filter in (False, True):
         if after_filter:
-            for channel, bandwidth_hz in enumerate(_bandwidths(model, response.shape[1], on_response)):
-                response[:, channel] = low_passed(response[:, channel], sample_rate_hz, bandwidth_hz)
+            response = _filtered(response, sample_rate_hz, _bandwidths(model, response.shape[1], on_response))
         for acts, placed in on_response:
             if acts.after_filter is not after_filter:
                 continue
@@ -96,6 +113,13 @@ def _sensed(
                 position = acts.given_position(before, response, position, seen.position)
     response = within_range(response, model.sensor.range)
     return Played(response, position, played.axis_position, played.axis_velocity, played.axis_force)
+
+
+def _filtered(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
+    if len(set(bandwidths_hz)) == 1:
+        return low_passed(response, sample_rate_hz, bandwidths_hz[0])
+    each = [low_passed(row, sample_rate_hz, hz) for row, hz in zip(response.T, bandwidths_hz, strict=True)]
+    return np.stack(each, axis=1)
 
 
 def _bandwidths(
