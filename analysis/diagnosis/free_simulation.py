@@ -1,6 +1,6 @@
 """The measured course against a simulated one that knows the commands alone."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from analysis.diagnosis.observed import Observed
 from analysis.diagnosis.unexplained_motion import evidence_of
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.effects.evidence import Evidence
-from equalizer.effects.simulator import Played, Seen, simulate_mechanism
+from equalizer.effects.simulator import Played, Seen, simulate_mechanism, simulate_response
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -25,28 +25,34 @@ class FreeSimulation:
     name: str = "free simulation"
 
     def shortened(self) -> "FreeSimulation":
-        return replace(self, records=tuple(one.shortened() for one in self.records))
+        kept = [one for one in self.records if (one.fit | one.choose).any()]
+        return replace(self, records=tuple(one.shortened() for one in kept))
 
     def tells(self, effect: Effect) -> bool:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
-            (one.measured - channels(self.played(model, effects, one), one.measured.shape[1])) / self.unit
+            (one.measured - channels(self._played(model, effects, one, simulate_response), one.measured.shape[1]))
+            / self.unit
             for one in self.records
         )
 
-    def played(self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed) -> Played:
+    def _played(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, simulate: Callable[..., Played]
+    ) -> Played:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         seen = Seen(record.measured[:, :p], self.noise[:p], position)
-        return simulate_mechanism(model, record.command, signals.sample_rate_hz, effects, signals.hold, seen)
+        return simulate(model, record.command, signals.sample_rate_hz, effects, signals.hold, seen)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         return tuple(
-            evidence_of(model, record, self.played(model, effects, record), left, (self.unit, self.noise))
+            evidence_of(
+                model, record, self._played(model, effects, record, simulate_mechanism), left, (self.unit, self.noise)
+            )
             for record, left in zip(self.records, residuals, strict=True)
         )
 

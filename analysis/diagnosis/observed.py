@@ -47,17 +47,23 @@ class Observed:
 
 def observed(recording: Recording, responses: int) -> Observed:
     """responses: how many position channels belong to the model's outputs; a position of another width is left out."""
-    signals = [recording.response.samples]
-    if recording.position is not None and recording.position.samples.shape[1] == responses:
-        signals.append(recording.position.samples)
-    measured = np.hstack(signals)
-    known = np.isfinite(measured).all(axis=1)
+    measured, known = measured_of(recording, responses)
     fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
-def roles(segments: tuple[Segment, ...], length: int) -> tuple[Mask, Mask, Mask]:
-    """Samples to fit, to choose and to test by: (length,) each.
+def measured_of(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
+    """(n, c), the response and, where it has so many channels, the position; and where all of it is known."""
+    signals = [recording.response.samples]
+    if recording.position is not None and recording.position.samples.shape[1] == responses:
+        signals.append(recording.position.samples)
+    measured = np.hstack(signals)
+    known: Mask = np.asarray(np.isfinite(measured).all(axis=1), dtype=np.bool_)
+    return measured, known
+
+
+def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> tuple[Mask, Mask, Mask]:
+    """Samples to fit, to choose and to test by: (length,) each. tested: another recording is there to test by.
 
     What is marked as test stays sealed. Of the rest, the middle level of three or more is kept back to choose by, else
     the last quarter of the time.
@@ -66,7 +72,9 @@ def roles(segments: tuple[Segment, ...], length: int) -> tuple[Mask, Mask, Mask]
     test = _covered([s for s in inside if s.role == "test"], length)
     fitted = [s for s in inside if s.role == "fit"] or [s for s in inside if s.role != "test"]
     fit = _covered(fitted, length) if fitted else ~test
-    if not test.any():
+    if inside and all(s.role == "test" for s in inside):
+        fit[:] = False
+    elif not test.any() and not tested:
         places = np.flatnonzero(fit)
         test[places[int((1 - TESTED) * len(places)) :]] = True
         fit &= ~test

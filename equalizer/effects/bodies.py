@@ -1,6 +1,6 @@
 """The bodies of a model with its effects: another structure, forces in it, and their motion under a driven command."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,15 +61,27 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     return Bodies(structure, model.inputs, aligned, tuple(acts), tuple(where), tuple(numbers))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Restarts:
+    """Where a motion goes on from another state than that which was reached."""
+
+    every: int
+    """Samples, from the first on."""
+    states: FloatArray
+    """(windows, 2n), of the model without effects: positions, then velocities."""
+
+
 def moved(
-    bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float, motion: bool = True
-) -> tuple[FloatArray, FloatArray]:
+    bodies: Bodies, driven: Driven, size: tuple[int, int], step_s: float, motion: bool = True,
+    restarts: Restarts | None = None,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """(n, 3 r + 2 p): the ports' positions, velocities and accelerations, the response and its rows' positions; and
-    (n, r), the forces. Without the motion (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps."""
+    (n, r), the forces. Without the motion (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps. From rest where
+    there are no restarts."""
     linear = linear_steps(bodies.structure, step_s, bodies.ports)
     ports = tuple(sorted(set(bodies.port)))
     steps, stride = size[1], len(driven.mean) // size[0]
-    stepping = pushed(linear, _forces(bodies, ports), steps, stride) if ports else coasting(linear, steps, stride)
+    stepping = pushed(linear, forces_of(bodies, ports), steps, stride) if ports else coasting(linear, steps, stride)
     look = _looked_at(linear, stepping.outward, ports, motion)
     looked, added = np.empty((size[0], look.shape[1])), np.zeros((size[0], bodies.ports.shape[1] if motion else 0))
     inner, rows = len(look) - driven.end.shape[1], stepping.rows
@@ -77,8 +89,9 @@ def moved(
     spare = np.zeros((min(stepping.block, size[0]) * rows, len(look)))
     # A fit may try a model that is unstable.
     with np.errstate(over="ignore", invalid="ignore"):
-        for first in range(0, size[0], stepping.block):
-            end = min(first + stepping.block, size[0])
+        for first, end in _blocks(size[0], stepping.block, restarts):
+            if restarts is not None and first % restarts.every == 0:
+                stepping.begin(grown_state(bodies.structure, restarts.states[first // restarts.every]))
             course = spare[: (end - first) * rows]
             np.matmul(drive[first * rows : end * rows], stepping.into, out=course[:, :inner])
             stepping.run(course, first)
@@ -91,6 +104,24 @@ def moved(
     return looked, added
 
 
+def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
+    edges = range(0, n, restarts.every) if restarts is not None else (0,)
+    for begin, stop in zip(edges, (*edges[1:], n), strict=True):
+        for first in range(begin, stop, longest):
+            yield first, min(first + longest, stop)
+
+
+def grown_state(structure: MechanicalModel, state: FloatArray) -> FloatArray:
+    """Of a structure to which effects have added bodies, the last coordinates: they follow the others as if at rest."""
+    known, n = len(state) // 2, structure.coordinates
+    if n == known:
+        return state
+    held, tied = structure.stiffness[known:, known:], structure.stiffness[known:, :known]
+    follows = -np.linalg.lstsq(held, tied, rcond=None)[0]
+    positions, velocities = state[:known], state[known:]
+    return np.concatenate([positions, follows @ positions, velocities, follows @ velocities])
+
+
 def _looked_at(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
     """(s + r + m, rows): of what is kept of each instant, the state, the forces at the ports and the commands."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
@@ -101,7 +132,7 @@ def _looked_at(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...],
     return np.vstack([(of_state @ outward).T, of_force.T[list(ports)], of_command.T])
 
 
-def _forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
+def forces_of(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.bodies import bodies_of, moved
+from equalizer.effects.bodies import Restarts, bodies_of, moved
 from equalizer.effects.command_path import driven_by, finer, moves_between_samples
 from equalizer.effects.effect import STEPS, OnResponse, PlacedEffect
 from equalizer.effects.sensor_path import low_passed, within_range
@@ -71,12 +71,25 @@ def simulate_response(
     return _sensed(model, played, sample_rate_hz, effects, seen)
 
 
+def simulate_windows(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampled: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+    seen: Seen | None,
+    restarts: Restarts,
+) -> Played:
+    """The same, but from given states again and again. sampled: rate in Hz, and how commands move between samples."""
+    return _sensed(model, _moved(model, commands, sampled, effects, restarts=restarts), sampled[0], effects, seen)
+
+
 def _moved(
     model: MechanicalModel,
     commands: FloatArray,
     sampled: tuple[float, Hold],
     effects: Sequence[PlacedEffect],
     axes: bool = True,
+    restarts: Restarts | None = None,
 ) -> Played:
     """Before the sensor."""
     bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
@@ -84,7 +97,7 @@ def _moved(
     steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
     fine = steps if moves else 1
     driven = driven_by(model, finer(commands, fine, hold), 1 / (rate_hz * fine), effects)
-    looked, added = moved(bodies, driven, (len(commands), steps), 1 / (rate_hz * steps), axes)
+    looked, added = moved(bodies, driven, (len(commands), steps), 1 / (rate_hz * steps), axes, restarts)
     m, p, ports = bodies.axes if axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
     rows = looked[:, 3 * ports if axes else 0 :]
     return Played(rows[:, :p], rows[:, p:], looked[:, :m], looked[:, ports : ports + m], added[:, :m])

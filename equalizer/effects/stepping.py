@@ -44,6 +44,8 @@ class Stepping:
     run: Callable[[FloatArray, int], None]
     """Block after block from rest: course (block rows, s + r ...), the first sample's number. What was added over each
     step becomes, in each sample's first row, the state and the forces just before it."""
+    begin: Callable[[FloatArray], None]
+    """Lets the next block begin from another state (2n,) than that which was reached."""
 
 
 def coasting(linear: LinearSteps, steps: int, stride: int) -> Stepping:
@@ -59,7 +61,10 @@ def coasting(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     def run(course: FloatArray, first: int) -> None:
         coast(form.advance, course, state)
 
-    return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run)
+    def begin(from_: FloatArray) -> None:
+        state[:] = form.inward @ from_
+
+    return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, begin)
 
 
 def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int) -> Stepping:
@@ -84,7 +89,11 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int) -> Step
                 linear.step_s,
             )  # fmt: skip
 
-    return Stepping(stride, into, form.outward, BLOCK_UNDER_FORCES, run)
+    def begin(from_: FloatArray) -> None:
+        state[:] = form.inward @ from_
+        ports[:2] = (look[: 2 * len(where)] @ from_).reshape(2, -1)
+
+    return Stepping(stride, into, form.outward, BLOCK_UNDER_FORCES, run, begin)
 
 
 def _whole(matrix: FloatArray) -> FloatArray:

@@ -1,0 +1,155 @@
+"""Which error measure suits recordings and a model, by a stated rule.
+
+Free simulation, from rest by the commands alone, is the strictest: nothing measured helps it. It cannot be asked of
+
+* a plant in closed loop that does not hold itself: the command then contains what the controller did about the very
+  physics that is missing. Where positions or velocities were measured, forces are compared instead: the one that
+  entered against the one that the model needs along the measured motion; where only accelerations were, windows;
+* a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
+  error grows without end. It is simulated in windows of 1 s, each from a state estimated from the measured motion, or,
+  where no state can be estimated, compared by forces;
+* a recording that does not begin at rest: windows, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.diagnosis.closed_loop import in_closed_loop
+from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.force_views import force_views
+from analysis.diagnosis.free_simulation import FreeSimulation
+from analysis.diagnosis.measured_motion import has_motion
+from analysis.diagnosis.noise_floor import NoiseFloor, noise_floor
+from analysis.diagnosis.observed import Observed, noise_in_units
+from analysis.diagnosis.observed_parts import observed_parts
+from analysis.diagnosis.windows import windows_of
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+Measure = Literal["free simulation", "windows", "predicted force"]
+
+DIES_OUT = 1 / 3
+"""Share of the longest record within which a plant that holds itself comes to rest."""
+UNKNOWN_NOISE = 1e-3
+"""Share of the signal that is taken for noise where a recording cannot tell."""
+AT_REST = 0.5
+"""Of a channel's rms: what it may start with. A sensor may have an offset, hence as it changes later."""
+RESTING_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    measure: Measure
+    why: str
+    """A sentence for the reader; empty for a free simulation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen:
+    measure: ErrorMeasure
+    floors: tuple[NoiseFloor, ...]
+    """Of what is compared, per record of the measure."""
+    remarks: tuple[str, ...]
+
+
+def measure_of(recordings: Sequence[Recording], model: MechanicalModel) -> Chosen:
+    """The error measure that the rule chooses, of every part of the recordings."""
+    records = observed_parts(recordings, model.outputs)
+    floors = tuple(noise_floor(one.recording) for one in records)
+    noise = _noise(floors, records)
+    unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
+    choice = choose_measure(records, model)
+    remarks = (choice.why,) if choice.why else ()
+    if choice.measure == "free simulation":
+        return Chosen(FreeSimulation(records, unit, noise), floors, remarks)
+    if choice.measure == "windows":
+        try:
+            return Chosen(windows_of(records, model, (unit, noise)), floors, remarks)
+        except np.linalg.LinAlgError:
+            if not all(has_motion(one.recording, model) for one in records):
+                return Chosen(FreeSimulation(records, unit, noise), floors, (NO_STATE,))
+    views = force_views(records, model, floors)
+    said = f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
+    return Chosen(views.measure, views.floors, (*remarks, said))
+
+
+def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
+    """The rule of this module's first lines."""
+    longest_s = max(len(one.command) / one.recording.sample_rate_hz for one in records)
+    holds, motion = holds_itself(model, longest_s), all(has_motion(one.recording, model) for one in records)
+    if any(one.recording.meta.get("imposed") for one in records):
+        return Choice("predicted force", IMPOSED)
+    if not holds and any(in_closed_loop(one.recording) for one in records):
+        return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
+    if not holds:
+        return Choice("windows", DRIFTS)
+    if any(_begins_moving(one) for one in records):
+        return Choice("windows", NOT_AT_REST)
+    return Choice("free simulation", "")
+
+
+def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
+    """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
+    n = model.coordinates
+    motion = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
+        ]
+    )
+    slowest = -float(np.linalg.eigvals(motion).real.max())
+    return slowest * DIES_OUT * longest_s > 1
+
+
+IMPOSED = (
+    "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
+    "with the measured one."
+)
+CLOSED_LOOP = (
+    "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "
+    "drift; the force that the model needs along the measured motion is compared with the one that entered."
+)
+CLOSED_LOOP_WINDOWS = (
+    "The command hangs on the response and the model does not hold itself; it is simulated in windows of 1 s, each "
+    "from a state estimated from the measured motion."
+)
+DRIFTS = (
+    "The model integrates freely, so that small errors would grow without end; it is simulated in windows of 1 s, each "
+    "from a state estimated from the measured motion."
+)
+NOT_AT_REST = (
+    "The recording does not begin at rest; the model is simulated in windows of 1 s, each from a state estimated from "
+    "the measured motion."
+)
+NO_STATE = (
+    "The model integrates freely and the sensors do not show its state, so it was simulated from rest; errors grow "
+    "with time."
+)
+
+
+def _begins_moving(record: Observed) -> bool:
+    first = max(int(RESTING_S * record.recording.sample_rate_hz), 4)
+    known = record.measured[np.isfinite(record.measured).all(axis=1)]
+    if len(known) < 4 * first:
+        return False
+    size = known.std(axis=0)
+    return bool(np.any(np.abs(np.median(known[:first], axis=0)) > AT_REST * size) and _drive(record)[:first].any())
+
+
+def _drive(record: Observed) -> FloatArray:
+    return np.asarray(np.abs(record.command).max(axis=1) > 0, dtype=np.float64)
+
+
+def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
+    """(c,): the quietest recording's, rms."""
+    count = records[0].measured.shape[1]
+    rows = [
+        np.concatenate([f.response_rms, f.position_rms if f.position_rms is not None else []])[:count] for f in floors
+    ]
+    signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
+    quietest = np.fmin.reduce(rows)
+    return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE * signal))

@@ -1,0 +1,55 @@
+"""Whether the commands of a recording hang on its responses: a controller, a virtual spring."""
+
+import numpy as np
+
+from equalizer.signals.recording import Hold, Recording
+from equalizer.signals.signal import FloatArray
+
+FED_BACK = 0.1
+"""Share of the command's rms that must differ from the recorded excitation."""
+FORETOLD = 0.05
+"""Share of what a command's own past leaves of it that the responses may leave; below, they make the command."""
+PAST = 6
+"""Samples of each that it is told by."""
+_LEAST = 200
+
+
+def in_closed_loop(recording: Recording) -> bool:
+    """By the excitation that was recorded beside the command, else by whether the responses up to each sample tell the
+    command that is written just after (Granger 1969)."""
+    command = recording.command.samples
+    if recording.excitation is not None:
+        by_feedback = command - recording.excitation.samples
+        return bool(_rms(by_feedback) > FED_BACK * _rms(command))
+    if recording.hold is not Hold.ZERO_ORDER:
+        # The command before a sample already hangs on the one after it.
+        return False
+    return any(_told_by(command[:, axis], recording) for axis in range(command.shape[1]))
+
+
+def _told_by(command: FloatArray, recording: Recording) -> bool:
+    signals = [recording.response.samples]
+    if recording.position is not None:
+        signals.append(recording.position.samples)
+    seen = np.hstack(signals)
+    known = np.isfinite(seen).all(axis=1) & np.isfinite(command)
+    rows = np.arange(PAST, len(command))
+    rows = rows[np.all([known[rows - back] for back in range(PAST + 1)], axis=0)]
+    if len(rows) < _LEAST:
+        return False
+    own = np.column_stack([command[rows - back] for back in range(1, PAST + 1)] + [np.ones(len(rows))])
+    others = np.column_stack([seen[rows - back] for back in range(PAST)])
+    alone, helped = _left(command[rows], own), _left(command[rows], np.hstack([own, others]))
+    # A smooth command is told by its own past alone, and nothing can be said.
+    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD * alone)
+
+
+def _left(aim: FloatArray, by: FloatArray) -> float:
+    scale = np.linalg.norm(by, axis=0)
+    columns = by / np.where(scale > 0, scale, 1.0)
+    found = np.linalg.lstsq(columns, aim, rcond=1e-12)[0]
+    return float(np.sqrt(np.mean((aim - columns @ found) ** 2)))
+
+
+def _rms(samples: FloatArray) -> float:
+    return float(np.sqrt(np.mean(samples**2)))

@@ -1,0 +1,29 @@
+"""Recordings in which a motion was imposed and a force measured, turned round: what a force does to a motion."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.recording import Recording
+
+_FORCES = frozenset({"force", "torque"})
+
+
+def force_driven(recording: Recording) -> Recording:
+    """The measured force as the command and the imposed motion as the response, and `imposed` in its meta; any other
+    recording as it is."""
+    moves = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+    pushes = set(recording.response.quantities) <= _FORCES
+    if not (moves and pushes and len(recording.command.channels) == len(recording.response.channels)):
+        return recording
+    return replace(
+        recording,
+        command=recording.response,
+        response=recording.command,
+        excitation=None,
+        meta={**recording.meta, "imposed": recording.command.quantity},
+    )
+
+
+def all_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    return tuple(force_driven(one) for one in recordings)

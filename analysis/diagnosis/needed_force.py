@@ -1,0 +1,67 @@
+"""The force that a model would need along a measured motion: the inverse problem, line by line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.band_limited import low_pass, straight, through
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_NEARLY_STILL_HZ = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NeededForce:
+    """All (n, m), within a band."""
+
+    force: FloatArray
+    axis_position: FloatArray
+    axis_velocity: FloatArray
+    axis_acceleration: FloatArray
+
+
+def needed_force(model: MechanicalModel, position: FloatArray, sample_rate_hz: float, band_hz: float) -> NeededForce:
+    """position: (n, m), finite, of the model's first m outputs' rows. Actuator, sensor and effects apart; the mean
+    force over a sample's time around each instant. Raises numpy.linalg.LinAlgError where these rows do not say how the
+    model moves."""
+    m = model.inputs
+
+    def gain(frequency_hz: FloatArray) -> ComplexArray:
+        within = low_pass(frequency_hz, band_hz)[:, None, None]
+        inverse = inverse_lines(model, frequency_hz)
+        inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
+        wave = 2j * np.pi * frequency_hz[:, None, None]
+        axes = inverse[:, m:]
+        return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
+
+    found = through(position, sample_rate_hz, gain) + _along_line(model, position, sample_rate_hz)
+    return NeededForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
+
+
+def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
+    """(lines, 2 m, m): from the positions of the model's first m outputs' rows to the forces along the driven axes, and
+    to the axes' positions."""
+    n, m = model.coordinates, model.inputs
+    s = 2j * np.pi * frequency_hz[:, None, None]
+    whole = np.zeros((len(frequency_hz), n + m, n + m), dtype=np.complex128)
+    whole[:, :n, :n] = model.mass * s**2 + model.damping * s + model.stiffness
+    whole[:, :n, n:] = -model.input
+    whole[:, n:, :n] = model.output[:m]
+    asked = np.concatenate([np.zeros((n, m)), np.eye(m)])
+    solved = np.linalg.solve(whole, np.broadcast_to(asked.astype(np.complex128), (len(frequency_hz), n + m, m)))
+    return np.concatenate([solved[:, n:], driven_axes(model).T @ solved[:, :n]], axis=1)
+
+
+def _along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
+    """(n, 4 m): of the straight line between the first and the last position, after which all has settled."""
+    m = model.inputs
+    line = straight(position)
+    slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
+    still = inverse_lines(model, np.array([0.0, _NEARLY_STILL_HZ]))
+    static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
+    moved = line @ static.T + slope @ rate.T
+    along = np.broadcast_to(slope @ static[m:].T, (len(line), m))
+    return np.hstack([moved, along, np.zeros((len(line), m))])

@@ -1,0 +1,69 @@
+"""Forces that depend on the motion, along a motion that is known, compiled."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+from numba.core.errors import NumbaExperimentalFeatureWarning
+
+from equalizer.effects.instant import (
+    A_FREE,
+    A_PER_N,
+    F_END,
+    LENGTH,
+    STEP_S,
+    TIME_S,
+    V_FREE,
+    V_PER_N,
+    X_FREE,
+    X_PER_N,
+    V,
+    X,
+)
+from equalizer.effects.mechanism_kernel import LAW, LAWS, Integers
+from equalizer.signals.signal import FloatArray
+
+_VECTOR = types.float64[::1]
+_MATRIX = types.float64[:, ::1]
+_THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
+_LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+
+    @njit(
+        types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, _MATRIX, _MATRIX, types.float64),
+        cache=True, nogil=True, error_model="numpy",
+    )  # fmt: skip
+    def follow(  # noqa: PLR0913 - a kernel takes flat arrays
+        laws: Any, places: Integers, of: FloatArray, memory: FloatArray,
+        motion: tuple[FloatArray, FloatArray, FloatArray], per_newton: FloatArray, force: FloatArray, step_s: float,
+    ) -> None:  # fmt: skip
+        """motion: positions, velocities and accelerations, (n, m) each. per_newton: (3, m), what 1 N over a step adds
+        to them. force: (n, m), what pushes beside the linear model, known from the motion, each over the step that
+        begins there; becomes the sum of the laws' forces. Friction at rest does not follow from the motion, but from
+        what pushes against it.
+
+        places: (items, 6) law, axis, begin and end in `of`, begin and end in `memory`.
+        """
+        position, velocity, acceleration = motion
+        at = np.zeros(LENGTH)
+        at[STEP_S] = step_s
+        for k in range(len(position) - 1):
+            at[TIME_S] = k * step_s
+            pushing = force[k].copy()
+            force[k] = 0.0
+            for item in range(places.shape[0]):
+                axis = places[item, 1]
+                at[X], at[V] = position[k, axis], velocity[k, axis]
+                at[X_PER_N], at[V_PER_N], at[A_PER_N] = per_newton[0, axis], per_newton[1, axis], per_newton[2, axis]
+                at[X_FREE] = position[k + 1, axis] + at[X_PER_N] * pushing[axis]
+                at[V_FREE] = velocity[k + 1, axis] + at[V_PER_N] * pushing[axis]
+                at[A_FREE] = acceleration[k, axis] + at[A_PER_N] * pushing[axis]
+                at[F_END] = np.nan
+                kept = memory[places[item, 4] : places[item, 5]]
+                added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], kept, at)
+                force[k, axis] += added
+                pushing[axis] += added
+        force[len(position) - 1] = force[len(position) - 2]
