@@ -1,0 +1,211 @@
+"""The quick simulator against the same recipe written plainly: dense matrices, one step after the other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.effects.bodies import bodies_of, moved
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.command_path import Driven
+from equalizer.effects.effect import AxisForce, PlacedEffect
+from equalizer.effects.instant import (
+    A_FREE,
+    A_PER_N,
+    F_END,
+    LENGTH,
+    STEP_S,
+    TIME_S,
+    V_FREE,
+    V_PER_N,
+    X_FREE,
+    X_PER_N,
+    V,
+    X,
+)
+from equalizer.effects.mechanism_kernel import SWEEPS, compiled_law
+from equalizer.effects.modal_form import step_form
+from equalizer.effects.simulator import simulate_mechanism, simulate_response
+from equalizer.effects.stepping import BLOCK
+from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.mechanical_model import MechanicalModel
+
+RATE_HZ, SAMPLES = 1000.0, 400
+WITHIN, RUBBING = 1e-9, 1e-6
+"""Relative. Dry friction is iterated to a millionth of its longest bend, where rounding may ask for one turn more."""
+
+
+def placed(*named) -> list[PlacedEffect]:
+    return [PlacedEffect(EFFECTS[name], sites, values) for name, sites, values in named]
+
+
+def plainly(bodies, driven, size, step_s):
+    """What `moved` gives."""
+    linear = linear_steps(bodies.structure, step_s, bodies.ports)
+    n, steps = size
+    r, stride = bodies.ports.shape[1], len(driven.mean) // n
+    rows = np.vstack([linear.motion, linear.response, linear.position])
+    nothing = np.zeros_like(linear.position)
+    by_u = np.vstack([linear.motion_by_command, linear.response_by_command, nothing[:, : driven.mean.shape[1]]])
+    by_f = np.vstack([linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((len(nothing), r))])
+    state, force_end, shown = np.zeros(len(linear.advance)), np.zeros(r), np.zeros(driven.mean.shape[1])
+    memories = [np.zeros(act.memory) for act in bodies.acts]
+    looked, added = np.empty((n, len(rows))), np.empty((n, r))
+    for k in range(n):
+        looked[k], added[k] = rows @ state + by_u @ shown + by_f @ force_end, force_end
+        for step in range(steps):
+            u = driven.mean[k * stride + (step if stride > 1 else 0)]
+            at = np.zeros(LENGTH)
+            at[STEP_S], at[TIME_S] = step_s, (k * steps + step) * step_s
+            state, force_end = _one_step(bodies, linear, state, u, memories, at)
+        shown = driven.end[(k + 1) * stride - 1]
+    return looked, added
+
+
+def _one_step(bodies, linear, state, u, memories, at):
+    r, items = bodies.ports.shape[1], len(bodies.acts)
+    force, end, own = np.zeros(r), np.zeros(r), np.zeros((items, 2))
+    before = [memory.copy() for memory in memories]
+    motion = linear.motion
+    for sweep in range(SWEEPS if items > 1 else 1):
+        for item, (act, port, numbers) in enumerate(zip(bodies.acts, bodies.port, bodies.numbers, strict=True)):
+            if sweep:
+                force[port] -= own[item, 0]
+                end[port] -= own[item, 1]
+                memories[item][:] = before[item]
+            free = linear.advance @ state + linear.by_command @ u + linear.by_axis_force @ force
+            unit = linear.by_axis_force[:, port]
+            at[X], at[V] = motion[port] @ state, motion[r + port] @ state
+            at[X_FREE], at[V_FREE] = motion[port] @ free, motion[r + port] @ free
+            at[X_PER_N], at[V_PER_N] = motion[port] @ unit, motion[r + port] @ unit
+            row = 2 * r + port
+            at[A_FREE] = motion[row] @ state + linear.motion_by_command[row] @ u
+            at[A_FREE] += linear.motion_by_axis_force[row] @ force
+            at[A_PER_N], at[F_END] = linear.motion_by_axis_force[row, port], np.nan
+            mean = act.law(numbers, memories[item], at)
+            own[item] = mean, mean if np.isnan(at[F_END]) else at[F_END]
+            force[port] += own[item, 0]
+            end[port] += own[item, 1]
+    return linear.advance @ state + linear.by_command @ u + linear.by_axis_force @ force, end
+
+
+def assert_same(model, effects, commands, steps, fine=1):
+    bodies = bodies_of(model, effects)
+    held = np.repeat(commands, fine, axis=0)
+    ramp = held + 0.1 * np.sin(np.arange(len(held)))[:, None] if fine > 1 else held
+    driven = Driven(ramp, ramp if fine == 1 else ramp + 0.01)
+    size, step_s = (len(commands), steps), 1 / (RATE_HZ * steps)
+    found, pushed = moved(bodies, driven, size, step_s)
+    wanted, forced = plainly(bodies, driven, size, step_s)
+    within = RUBBING if any(act.memory for act in bodies.acts) else WITHIN
+    scale = np.abs(wanted).max(axis=0) + 1e-12
+    np.testing.assert_array_less(np.abs(found - wanted).max(axis=0) / scale, within)
+    np.testing.assert_allclose(pushed, forced, atol=within * (np.abs(forced).max() + 1e-12), rtol=0)
+    short, none = moved(bodies, driven, size, step_s, motion=False)
+    np.testing.assert_array_equal(none, np.zeros((size[0], 0)))
+    np.testing.assert_allclose(
+        short, found[:, 3 * bodies.ports.shape[1] :], atol=1e-12 * np.abs(found).max(), rtol=1e-12
+    )
+
+
+def free_masses(axes: int, damping: float = 0.0) -> MechanicalModel:
+    eye = np.eye(axes)
+    return MechanicalModel("free", "acceleration", 0.3 * eye, damping * eye, 0 * eye, eye, eye)
+
+
+def springs(damping: float) -> MechanicalModel:
+    one = np.eye(1)
+    return MechanicalModel("spring", "acceleration", 0.3 * one, damping * one, 120.0 * one, one, one)
+
+
+CRITICAL = 2 * np.sqrt(0.3 * 120.0)
+STIFF = ("coulomb_friction", (0,), {"level": 0.4})
+SMOOTH = ("quadratic_damping", (1,), {"coefficient": 5.0})
+LOOSE = ("loose_joint", (0,), {"gap": 1e-4, "stiffness": 2e3, "slip": 0.05})
+
+
+@pytest.mark.parametrize(
+    ("named", "steps", "fine"),
+    [
+        ([], 1, 1), ([], 4, 1), ([], 4, 4),
+        ([STIFF], 4, 1), ([STIFF], 4, 4), ([SMOOTH], 4, 4), ([LOOSE], 8, 1),
+        ([STIFF, SMOOTH, LOOSE], 8, 1),
+        ([("coulomb_friction", (0, 1, 2), {"level": 0.2}), ("hardening_stiffness", (2,), {"k3": 1e7})], 4, 1),
+    ],
+)  # fmt: skip
+def test_three_axes_move_as_the_plain_recipe_says(bench, named, steps, fine):
+    commands = 2 * bench.commands(3)[300 : 300 + SAMPLES] + 0.2
+    assert_same(bench.three_axes(), placed(*named), commands, steps, fine)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [*map(free_masses, (1, 3)), free_masses(2, 4.0), *(springs(CRITICAL * over) for over in (1, 1 + 1e-9, 1.01, 3))],
+    ids=["free", "three free", "damped", "critical", "nearly", "over", "far over"],
+)  # fmt: skip
+@pytest.mark.parametrize("rubs", [False, True])
+def test_models_without_modes_of_their_own_move_so_too(model, rubs):
+    commands = np.random.default_rng(2).standard_normal((SAMPLES, model.inputs))
+    assert_same(model, placed(STIFF) if rubs else [], commands, 4)
+
+
+def test_blocks_join_without_a_seam(bench):
+    commands = np.tile(bench.commands(3)[:1000], (6, 1))
+    assert len(commands) > BLOCK
+    whole = simulate_mechanism(bench.three_axes(), commands, RATE_HZ)
+    part = simulate_mechanism(bench.three_axes(), commands[: BLOCK + 1], RATE_HZ)
+    np.testing.assert_allclose(whole.response[: BLOCK + 1], part.response, rtol=0, atol=1e-12)
+    quiet = placed(("quadratic_damping", (0,), {"coefficient": 0.0}))
+    np.testing.assert_allclose(
+        simulate_mechanism(bench.three_axes(), commands, RATE_HZ, quiet).response, whole.response, rtol=0, atol=1e-9
+    )
+
+
+def test_the_response_alone_is_the_same_response(bench):
+    commands, effects = bench.commands(3)[:SAMPLES], placed(STIFF)
+    whole = simulate_mechanism(bench.three_axes(), commands, RATE_HZ, effects)
+    alone = simulate_response(bench.three_axes(), commands, RATE_HZ, effects)
+    np.testing.assert_allclose(alone.response, whole.response, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(alone.position, whole.position, rtol=1e-12, atol=1e-18)
+    assert alone.axis_position.shape == alone.axis_velocity.shape == alone.axis_force.shape == (SAMPLES, 0)
+
+
+def test_commands_are_left_as_they_are(bench):
+    commands = bench.commands(3)[:SAMPLES]
+    kept = commands.copy()
+    simulate_mechanism(bench.three_axes(), commands, RATE_HZ, placed(STIFF, ("force_gain", (0,), {"gain": 1.1})))
+    np.testing.assert_array_equal(commands, kept)
+
+
+@compiled_law
+def _heavier(of: np.ndarray, memory: np.ndarray, at: np.ndarray) -> float:
+    return -of[0] * at[A_FREE] / (1 + of[0] * at[A_PER_N])
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
+    acts = AxisForce(_heavier, lambda model, axis, values: np.array([0.05]), acceleration=asked)
+    effects = [PlacedEffect(replace(EFFECTS["coulomb_friction"], acts=acts), (axis,), {}) for axis in (0, 1)]
+    commands = bench.commands(3)[:SAMPLES] + 0.1
+    if asked:
+        assert_same(bench.three_axes(), effects, commands, 4)
+    else:
+        assert np.isnan(simulate_mechanism(bench.three_axes(), commands, RATE_HZ, effects).response[1:]).any()
+
+
+@pytest.mark.parametrize(
+    ("model", "pairs"),
+    [(springs(CRITICAL), True), (springs(0.1), True), (free_masses(1), True), (free_masses(3), False)],
+)
+def test_pairs_are_used_where_they_are_well_apart_and_say_the_same(model, pairs):
+    advance = linear_steps(model, 1 / RATE_HZ).advance
+    form = step_form(advance)
+    half = len(advance) // 2
+    assert (form.advance.shape == (4, half)) is pairs
+    matrix = np.block([[np.diag(form.advance[0]), np.diag(form.advance[1])],
+                       [np.diag(form.advance[2]), np.diag(form.advance[3])]]) if pairs else form.advance.T  # fmt: skip
+    np.testing.assert_allclose(form.outward @ matrix @ form.inward, advance, rtol=0, atol=1e-12)
+
+
+def test_an_advance_that_is_not_finite_is_stepped_as_it_is():
+    assert step_form(np.full((2, 2), np.inf)).advance.shape == (2, 2)
