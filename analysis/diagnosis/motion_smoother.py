@@ -22,6 +22,8 @@ CHANGES_S = 0.005
 """within such a time."""
 _LEAK = 1e-5
 """Share of the state that is forgotten per sample: where sensors see no drift, a filter without it does not exist."""
+_STIRRED = 1e-12
+"""Variance that all states gain per sample, in their own size: an equation of exact states has no stable solution."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,16 +46,19 @@ def smoothed_motion(model: MechanicalModel, record: Observed, forces: FloatArray
     advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
     advance *= 1 - _LEAK
     look, direct = _looks(steps, record.measured.shape[1])
-    walk = (EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12) ** 2 / (CHANGES_S * rate_hz)
-    noise = np.diag(np.concatenate([np.full(size, 1e-18), walk]))
-    gain, back = _gains(advance, look, noise, np.diag(unit**2))
+    expected = EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
+    walk = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
+    gain, back = _gains(advance, look / unit[:, None], walk, _large(steps, expected))
+    gain = gain / unit[None, :]
     seen = _without_direct(model, record, forces, direct)
     pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
     out = np.zeros((len(forces), size + m))
     first = seen[np.isfinite(seen).all(axis=1)][:1]
     if len(first):
         out[0] = np.linalg.pinv(look, rcond=1e-6) @ first[0]
-    smooth(advance, look, gain, back, np.ascontiguousarray(pushed), np.ascontiguousarray(seen), out)
+    smooth(
+        advance, look, np.ascontiguousarray(gain), back, np.ascontiguousarray(pushed), np.ascontiguousarray(seen), out
+    )
     moved = out[:, :size] @ steps.motion[: 2 * m].T
     return SmoothedMotion(out[:, :size], moved[:, :m], moved[:, m:], out[:, size:])
 
@@ -74,18 +79,21 @@ def _without_direct(model: MechanicalModel, record: Observed, forces: FloatArray
     return seen
 
 
-def _gains(advance: FloatArray, look: FloatArray, noise: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of the filter, (s, c), and of the way back, (s, s). In units in which states and channels are alike large."""
-    by = 1 / np.sqrt(np.diagonal(seen))
-    large = np.maximum(np.abs(look * by[:, None]).max(axis=0), 1e-12)
-    scaled, eye = advance * large[:, None] / large[None, :], np.eye(len(look))
-    seeing = look * by[:, None] / large[None, :]
-    stirred = noise * np.outer(large, large) + 1e-12 * np.eye(len(advance))
+def _large(steps: LinearSteps, expected: FloatArray) -> FloatArray:
+    """(s + m,): how far the expected force takes each state while it changes."""
+    n = len(steps.advance) // 2
+    fast = np.abs(steps.by_axis_force[n:]) @ expected / steps.step_s * CHANGES_S
+    fast = np.maximum(fast, 1e-6 * fast.max())
+    return np.concatenate([fast * CHANGES_S, fast, expected])
+
+
+def _gains(advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of the filter, (s, c), and of the way back, (s, s). look: of channels in units of their noise. Solved in units in
+    which the states are alike large."""
+    scaled, seeing, eye = advance * large[None, :] / large[:, None], look * large[None, :], np.eye(len(look))
+    stirred = np.diag(walk / large**2) + _STIRRED * np.eye(len(advance))
     foreseen = solve_discrete_are(scaled.T, seeing.T, stirred, eye)
     gain = np.linalg.solve(seeing @ foreseen @ seeing.T + eye, seeing @ foreseen).T
     found = foreseen - gain @ seeing @ foreseen
     back = np.linalg.solve(foreseen, scaled @ found).T
-    return (
-        np.ascontiguousarray(gain * by[None, :] / large[:, None]),
-        np.ascontiguousarray(back * large[None, :] / large[:, None]),
-    )
+    return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
