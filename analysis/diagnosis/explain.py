@@ -23,6 +23,8 @@ MORE = 1.12
 """and of so many, as no reason to look for a further effect: laws of real physics are never exact."""
 WORTHWHILE = 0.4
 """Share of what is left over that an effect must take to be added,"""
+PLENTY = 1.6
+"""or this in mean log error power, four fifths of it: devices whose noise is small beside all physics leave much;"""
 NOTICED = 0.06
 """and what a further one must take in mean log error power."""
 
@@ -96,7 +98,7 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
 
 def _worthwhile(base: Contender, better: Contender) -> bool:
     left, then = base.standing.chosen_by, better.standing.chosen_by
-    return left - then > max(WORTHWHILE * left, NOTICED if base.fitted.hypothesis.claims else 0.0)
+    return left - then > max(min(WORTHWHILE * left, PLENTY), NOTICED if base.fitted.hypothesis.claims else 0.0)
 
 
 _COUNTED = ("first", "second", "third")

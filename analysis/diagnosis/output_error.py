@@ -98,6 +98,9 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
     cross = known.columns @ own.T
     products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
     pull = np.concatenate([known.columns @ errors - from_.deviations, own @ errors])
+    if not (np.isfinite(products).all() and np.isfinite(pull).all()):
+        # Some number moved the model to where it runs away.
+        return None
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
     low, high = _bounds(from_.hypothesis, t)
     for damping in (1e-9, 1e-3, 0.1, 3.0):

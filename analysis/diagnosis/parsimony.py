@@ -8,7 +8,9 @@ from analysis.diagnosis.same_within_errors import inseparable
 REFINED = 0.12
 """Mean log error power that a refined law must gain over the plain one that it contains,"""
 REFINED_SHARE = 0.35
-"""or as a share of what the plain law leaves."""
+"""or as a share of what the plain law leaves,"""
+HALVED = 0.7
+"""or this: half of the power, which no plainness makes up for."""
 
 
 def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
@@ -40,4 +42,4 @@ def _good_enough(plain: Contender, refined: Contender) -> bool:
     if not _contained(plain, refined):
         return inseparable(refined, plain)
     left = plain.standing.chosen_by
-    return left - refined.standing.chosen_by <= max(REFINED, REFINED_SHARE * left)
+    return left - refined.standing.chosen_by <= max(REFINED, min(REFINED_SHARE * left, HALVED))

@@ -14,7 +14,10 @@ logarithms of power: a force that flips its sign leaves a blow where the real on
 NEARLY = 3.0
 """With errors up to so many times the noise, what was found is named beside a remainder;"""
 MOSTLY = 0.9
-"""with larger ones, where it explains so much of the logarithm of the mismatch."""
+"""with larger ones, where it explains so much of the logarithm of the mismatch,"""
+BULK = 1.6
+"""or takes so much of the logarithm of its power, four fifths of it: where noise is small beside all physics, no law is
+exact enough for the former."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,8 @@ def judge(found: Explanation) -> Judgement:
     share = share_of_mismatch(found.retuned, found.after)
     if worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING):
         return Judgement("explained", True)
-    if worst <= NEARLY or share >= MOSTLY:
+    taken = found.retuned.standing.chosen_by - found.after.standing.chosen_by
+    if worst <= NEARLY or share >= MOSTLY or taken >= BULK:
         return Judgement("partly_explained", True)
     return Judgement("unexplained", False)
 
