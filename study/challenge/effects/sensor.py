@@ -14,10 +14,11 @@ from scipy.spatial.transform import Rotation
 from equalizer.signals.signal import FloatArray
 from study.challenge.device import Device
 from study.challenge.hidden import Circumstances, HiddenEffect, Values
+from study.challenge.sensor import Sensor
 
 
-def _sensed(device: Device, **changes: float | FloatArray) -> Device:
-    return replace(device, sensor=replace(device.sensor, **changes))  # type: ignore[arg-type]
+def _sensed(device: Device, sensor: Sensor) -> Device:
+    return replace(device, sensor=sensor)
 
 
 def _in_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
@@ -31,7 +32,7 @@ def _draw_lag(at: Circumstances) -> dict[str, float]:
 
 
 def _lag(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, bandwidth_hz=values["bandwidth"])
+    return _sensed(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
 
 
 def _draw_clipping(at: Circumstances) -> dict[str, float]:
@@ -39,7 +40,7 @@ def _draw_clipping(at: Circumstances) -> dict[str, float]:
 
 
 def _clipping(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, limit=_in_channel(device.sensor.limit, axis, values["limit"]))
+    return _sensed(device, replace(device.sensor, limit=_in_channel(device.sensor.limit, axis, values["limit"])))
 
 
 def _draw_misalignment(at: Circumstances) -> dict[str, float]:
@@ -50,7 +51,7 @@ def _draw_misalignment(at: Circumstances) -> dict[str, float]:
 
 def _misalignment(device: Device, axis: int, values: Values) -> Device:
     about = np.array([values["about_x"], values["about_y"], values["about_z"]])
-    return _sensed(device, orientation=Rotation.from_rotvec(about, degrees=True).as_matrix())
+    return _sensed(device, replace(device.sensor, orientation=Rotation.from_rotvec(about, degrees=True).as_matrix()))
 
 
 def _draw_gain(at: Circumstances) -> dict[str, float]:
@@ -58,7 +59,7 @@ def _draw_gain(at: Circumstances) -> dict[str, float]:
 
 
 def _gain(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, gain=_in_channel(device.sensor.gain, axis, values["gain"]))
+    return _sensed(device, replace(device.sensor, gain=_in_channel(device.sensor.gain, axis, values["gain"])))
 
 
 def _draw_curve(at: Circumstances) -> dict[str, float]:
@@ -66,7 +67,7 @@ def _draw_curve(at: Circumstances) -> dict[str, float]:
 
 
 def _curve(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, cubic=_in_channel(device.sensor.cubic, axis, values["cubic"]))
+    return _sensed(device, replace(device.sensor, cubic=_in_channel(device.sensor.cubic, axis, values["cubic"])))
 
 
 def _shares(at: Circumstances) -> dict[str, float]:
@@ -85,7 +86,7 @@ def _draw_drift(at: Circumstances) -> dict[str, float]:
 
 
 def _drift(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, drift=values["total"] * _in_shares(values))
+    return _sensed(device, replace(device.sensor, drift=values["total"] * _in_shares(values)))
 
 
 def _draw_steps(at: Circumstances) -> dict[str, float]:
@@ -93,7 +94,7 @@ def _draw_steps(at: Circumstances) -> dict[str, float]:
 
 
 def _steps(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, step=values["step"])
+    return _sensed(device, replace(device.sensor, step=values["step"]))
 
 
 def _draw_hum(at: Circumstances) -> dict[str, float]:
@@ -106,8 +107,11 @@ def _hum(device: Device, axis: int, values: Values) -> Device:
     size = values["amplitude"] * _in_shares(values)
     return _sensed(
         device,
-        hum=np.array([np.cos(values["phase"]) * size, np.sin(values["phase"]) * size]),
-        hum_hz=values["frequency"],
+        replace(
+            device.sensor,
+            hum=np.array([np.cos(values["phase"]) * size, np.sin(values["phase"]) * size]),
+            hum_hz=values["frequency"],
+        ),
     )
 
 
@@ -116,7 +120,7 @@ def _draw_clock(at: Circumstances) -> dict[str, float]:
 
 
 def _clock(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, ppm=values["ppm"])
+    return _sensed(device, replace(device.sensor, ppm=values["ppm"]))
 
 
 def _draw_lost(at: Circumstances) -> dict[str, float]:
@@ -124,7 +128,7 @@ def _draw_lost(at: Circumstances) -> dict[str, float]:
 
 
 def _lost(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, lost=values["fraction"])
+    return _sensed(device, replace(device.sensor, lost=values["fraction"]))
 
 
 def _draw_crossed(at: Circumstances) -> dict[str, float]:
@@ -137,7 +141,7 @@ def _crossed(device: Device, axis: int, values: Values) -> Device:
     mixing = device.sensor.orientation.copy()
     mixing[axis, (axis + 1) % 3] += values["from_next"]
     mixing[axis, (axis + 2) % 3] += values["from_after_next"]
-    return _sensed(device, orientation=mixing)
+    return _sensed(device, replace(device.sensor, orientation=mixing))
 
 
 def _draw_offset(at: Circumstances) -> dict[str, float]:
@@ -145,7 +149,7 @@ def _draw_offset(at: Circumstances) -> dict[str, float]:
 
 
 def _offset(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, offset=_in_channel(device.sensor.offset, axis, values["offset"]))
+    return _sensed(device, replace(device.sensor, offset=_in_channel(device.sensor.offset, axis, values["offset"])))
 
 
 def _draw_logger(at: Circumstances) -> dict[str, float]:
@@ -153,7 +157,7 @@ def _draw_logger(at: Circumstances) -> dict[str, float]:
 
 
 def _logger(device: Device, axis: int, values: Values) -> Device:
-    return _sensed(device, late_s=values["offset"])
+    return _sensed(device, replace(device.sensor, late_s=values["offset"]))
 
 
 EFFECTS = (
