@@ -12,6 +12,7 @@ from analysis.diagnosis.hypothesis import NOTHING
 from analysis.diagnosis.output_error import Fitted, evaluated, fit
 from analysis.diagnosis.parsimony import plainest_first
 from analysis.diagnosis.rivalry import Arena, Contender, contest, refine, sensitivity_at
+from analysis.diagnosis.same_within_errors import excess
 from analysis.diagnosis.screening import screen
 from equalizer.effects.effect import Effect
 
@@ -21,12 +22,10 @@ CLEAN = 1.05
 """Errors of so many times the noise, in the worst channel, count as noise alone;"""
 MORE = 1.12
 """and of so many, as no reason to look for a further effect: laws of real physics are never exact."""
-WORTHWHILE = 0.4
-"""Share of what is left over that an effect must take to be added,"""
-PLENTY = 1.6
-"""or this in mean log error power, four fifths of it: devices whose noise is small beside all physics leave much;"""
-NOTICED = 0.06
-"""and what a further one must take in mean log error power."""
+WORTHWHILE = 0.15
+"""Share of what is left above the noise that an effect must take to be added,"""
+NOTICED = 0.008
+"""and so much in mean log error power."""
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share of all that is done."""
@@ -57,6 +56,51 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Ex
     steps: list[Contender] = []
     while len(rounds) < MOST_EFFECTS and base.standing.seen > (MORE if rounds else CLEAN):
         step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+        contenders = _next(arena, catalogue, base.fitted, step)
+        if not contenders or not _worthwhile(base, contenders[0]):
+            rounds.append(contenders)
+            break
+        rounds.append(contenders)
+        base = contenders[0]
+        steps.append(base)
+    ends = [arena.confirmed(one) for one in (arena.contender(before), arena.contender(retuned), base)]
+    return Explanation(*ends, tuple(rounds), tuple(steps))
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A stretch of the work, as it is shown."""
+
+    what: str
+    begun: float
+    progress: Progress
+
+    def at(self, share: float) -> None:
+        self.progress(self.what, self.begun + 0.3 * share)
+
+
+def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[Contender, ...]:
+    step.at(0.0)
+    held = base.hypothesis.claims
+    evidence = gather_evidence(arena.measure, arena.tuning, base)
+    suggested = [
+        one
+        for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
+        if not any(excludes(claim, one.claims[0]) for claim in held)
+    ]
+    known = sensitivity_at(arena, base.deviations, base.hypothesis)
+    step.at(0.2)
+    screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
+    step.at(0.6)
+    return plainest_first(contest(arena, base, known, screened))
+
+
+def _worthwhile(base: Contender, better: Contender) -> bool:
+    gained = base.standing.chosen_by - better.standing.chosen_by
+    return gained > max(WORTHWHILE * excess(base), NOTICED)
+
+
+_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         contenders = _next(arena, catalogue, base.fitted, step)
         if not contenders or not _worthwhile(base, contenders[0]):
             rounds.append(contenders)

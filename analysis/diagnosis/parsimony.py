@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 
 from analysis.diagnosis.rivalry import Contender
-from analysis.diagnosis.same_within_errors import inseparable
+from analysis.diagnosis.same_within_errors import excess, inseparable
 
-REFINED = 0.12
+REFINED = 0.006
 """Mean log error power that a refined law must gain over the plain one that it contains,"""
 REFINED_SHARE = 0.35
-"""or as a share of what the plain law leaves,"""
-HALVED = 0.7
-"""or this: half of the power, which no plainness makes up for."""
+"""or as a share of what the plain law leaves above the noise: where both are wrong, the richer one errs less."""
 
 
 def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:

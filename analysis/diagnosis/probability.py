@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.rivalry import Contender
 
-SCALE = 0.03
+SCALE = 0.002
 """Difference of mean log error power that makes a contender e times less likely."""
 ELSEWHERE = 0.02
 """That none of them is right."""

@@ -2,12 +2,20 @@
 
 from analysis.diagnosis.rivalry import Contender
 
-CLOSE = 0.03
-"""Difference of mean log error power below which explanations are as good as each other,"""
+NOISE_ITSELF = 0.01
+"""Mean log error power that the best of models may leave: a noise is not known better."""
+CLOSE = 0.0015
+"""Difference of mean log error power below which explanations are as good as each other: a hundred times what chance
+brings in a minute of six channels, for no simulation is exact to more;"""
 CLOSE_SHARE = 0.1
-"""or as a share of what the better one still leaves."""
+"""or as a share of what the better one still leaves above the noise."""
+
+
+def excess(contender: Contender) -> float:
+    """Mean log error power above the noise."""
+    return max(contender.standing.chosen_by - NOISE_ITSELF, 0.0)
 
 
 def inseparable(best: Contender, other: Contender) -> bool:
     worse = other.standing.chosen_by - best.standing.chosen_by
-    return worse <= max(CLOSE, CLOSE_SHARE * best.standing.chosen_by)
+    return worse <= max(CLOSE, CLOSE_SHARE * excess(best))

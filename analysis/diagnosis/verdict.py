@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.explain import CLEAN, Explanation
 from analysis.diagnosis.rivalry import Contender
+from analysis.diagnosis.same_within_errors import excess
 
 EXPLAINED = 1.12
 """In the worst channel, errors of so many times the noise are as good as none: laws of real physics are never exact."""
@@ -48,5 +49,5 @@ def judge(found: Explanation) -> Judgement:
 
 def share_of_mismatch(without: Contender, with_it: Contender) -> float:
     """Between 0 and 1: how far the errors came down from where they were to the noise, in logarithms of power."""
-    whole = without.standing.chosen_by
-    return min(max(1 - with_it.standing.chosen_by / whole, 0.0), 1.0) if whole > 0 else 0.0
+    whole = excess(without)
+    return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
