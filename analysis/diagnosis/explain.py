@@ -100,49 +100,4 @@ def _worthwhile(base: Contender, better: Contender) -> bool:
     return gained > max(WORTHWHILE * excess(base), NOTICED)
 
 
-_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
-        contenders = _next(arena, catalogue, base.fitted, step)
-        if not contenders or not _worthwhile(base, contenders[0]):
-            rounds.append(contenders)
-            break
-        rounds.append(contenders)
-        base = contenders[0]
-        steps.append(base)
-    ends = [arena.confirmed(one) for one in (arena.contender(before), arena.contender(retuned), base)]
-    return Explanation(*ends, tuple(rounds), tuple(steps))
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """A stretch of the work, as it is shown."""
-
-    what: str
-    begun: float
-    progress: Progress
-
-    def at(self, share: float) -> None:
-        self.progress(self.what, self.begun + 0.3 * share)
-
-
-def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[Contender, ...]:
-    step.at(0.0)
-    held = base.hypothesis.claims
-    evidence = gather_evidence(arena.measure, arena.tuning, base)
-    suggested = [
-        one
-        for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
-        if not any(excludes(claim, one.claims[0]) for claim in held)
-    ]
-    known = sensitivity_at(arena, base.deviations, base.hypothesis)
-    step.at(0.2)
-    screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
-    step.at(0.6)
-    return plainest_first(contest(arena, base, known, screened))
-
-
-def _worthwhile(base: Contender, better: Contender) -> bool:
-    left, then = base.standing.chosen_by, better.standing.chosen_by
-    return left - then > max(min(WORTHWHILE * left, PLENTY), NOTICED if base.fitted.hypothesis.claims else 0.0)
-
-
 _COUNTED = ("first", "second", "third")

@@ -8,7 +8,9 @@ from analysis.diagnosis.same_within_errors import excess, inseparable
 REFINED = 0.006
 """Mean log error power that a refined law must gain over the plain one that it contains,"""
 REFINED_SHARE = 0.35
-"""or as a share of what the plain law leaves above the noise: where both are wrong, the richer one errs less."""
+"""or as a share of what the plain law leaves above the noise: where both are wrong, the richer one errs less;"""
+HALVED = 0.7
+"""but never more than this, half of the power, which no plainness makes up for."""
 
 
 def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
@@ -39,5 +41,5 @@ def _contained(one: Contender, other: Contender) -> bool:
 def _good_enough(plain: Contender, refined: Contender) -> bool:
     if not _contained(plain, refined):
         return inseparable(refined, plain)
-    left = plain.standing.chosen_by
-    return left - refined.standing.chosen_by <= max(REFINED, min(REFINED_SHARE * left, HALVED))
+    gained = plain.standing.chosen_by - refined.standing.chosen_by
+    return gained <= max(REFINED, min(REFINED_SHARE * excess(plain), HALVED))
