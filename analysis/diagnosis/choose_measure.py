@@ -37,8 +37,9 @@ DIES_OUT = 1 / 3
 UNKNOWN_NOISE = 1e-3
 """Share of the signal that is taken for noise where a recording cannot tell."""
 AT_REST = 0.5
-"""Of a channel's rms: what it may start with. A sensor may have an offset, hence as it changes later."""
+"""Of a channel's rms, what it may start with, and of its usual changes,"""
 RESTING_S = 0.02
+"""what it may change by in the first such time: an offset alone is no motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +137,11 @@ def _begins_moving(record: Observed) -> bool:
     known = record.measured[np.isfinite(record.measured).all(axis=1)]
     if len(known) < 4 * first:
         return False
-    size = known.std(axis=0)
-    return bool(np.any(np.abs(np.median(known[:first], axis=0)) > AT_REST * size) and _drive(record)[:first].any())
-
-
-def _drive(record: Observed) -> FloatArray:
-    return np.asarray(np.abs(record.command).max(axis=1) > 0, dtype=np.float64)
+    means = known[: len(known) // first * first].reshape(-1, first, known.shape[1]).mean(axis=1)
+    changes = np.diff(means, axis=0)
+    away = np.abs(means[0]) > AT_REST * known.std(axis=0)
+    moves = np.abs(changes[0]) > AT_REST * np.sqrt(np.mean(changes**2, axis=0))
+    return bool(np.any(away & moves))
 
 
 def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:

@@ -16,6 +16,8 @@ NEIGHBOURS_HZ = 3.0
 ROUNDS = 4
 BLOCKS, STEADY = 12, 0.8
 """Parts of a recording in which a tone must have the same amplitude and phase, and how nearly."""
+PLAYED = 0.1
+"""Of a command's rms, that a tone in it must have to be meant."""
 
 
 def _hummed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
@@ -42,9 +44,23 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
             continue
         tone = _tone(residual[:, channel], evidence, float(lines_hz[top]))
         steady = _steadiness(residual[:, _loudest(residual, evidence, top)], evidence, tone["frequency"])
-        if steady > STEADY and not any(abs(tone["frequency"] - other["frequency"]) < lines_hz[1] for other in found):
+        if (
+            steady > STEADY
+            and not _played(evidence, tone["frequency"])
+            and not any(abs(tone["frequency"] - other["frequency"]) < lines_hz[1] for other in found)
+        ):
             found.append(tone)
     return tuple(found)
+
+
+def _played(evidence: Evidence, frequency_hz: float) -> bool:
+    """Whether a command holds the tone throughout: then it is no hum."""
+    turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(evidence.command)) / evidence.sample_rate_hz)
+    share = (
+        np.abs(turn @ evidence.command) / len(turn) / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
+    )
+    steady = [_steadiness(command, evidence, frequency_hz) for command in evidence.command.T]
+    return any(one > PLAYED and two > STEADY for one, two in zip(share, steady, strict=True))
 
 
 def _loudest(residual: FloatArray, evidence: Evidence, line: int) -> int:

@@ -7,6 +7,9 @@ from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, nearest
 
+SHORT = 2
+"""Letters of a channel's name that say no more than quantity and axis."""
+
 
 class PlacingError(ValueError):
     """An effect that cannot be placed in this model. Says which and why."""
@@ -35,9 +38,10 @@ def model_effects(
 
 
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
-    """'x' of 'fx' where no two channels end alike, else the channel's whole name."""
+    """'x' of 'fx' where no two channels end alike and none has a word for a name, else the channel's whole name."""
     ends = [name[-1:] for name in channels]
-    return channel[-1:] if len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel
+    short = all(len(name) <= SHORT or name[-1:] in "xyz" for name in channels)
+    return channel[-1:] if short and len(set(ends)) == len(ends) and all(end.isalpha() for end in ends) else channel
 
 
 def _axes(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:

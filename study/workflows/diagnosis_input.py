@@ -12,6 +12,8 @@ from analysis.diagnosis.belonging import (
     require_model_of,
     require_something,
 )
+from analysis.diagnosis.force_driven import all_force_driven
+from analysis.diagnosis.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.identification.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -22,6 +24,10 @@ from study.store.recording_file import read_recording
 from study.workflows.session_as_recordings import session_recordings
 
 FITTED_NAME = "fitted to these recordings"
+RIGID_SAID = (
+    "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
+    "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +52,7 @@ def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
         session = session_recordings(folders[0], seed)
         found = DiagnosisInput(session.recordings, session.names, session.parents, session.remarks, session.simulated)
     else:
-        read = tuple(read_recording(source) for source in sources)
+        read = all_force_driven([read_recording(source) for source in sources])
         found = DiagnosisInput(read, _names(sources), tuple(sources), ())
     try:
         require_alike(found.recordings, found.names)
@@ -76,9 +82,13 @@ def fitted_model(
     found: DiagnosisInput, on_progress: Callable[[float], None]
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear one, and what must be known of it. Raises StudyError where the recordings do not carry one."""
+    if wants_rigid_model(found.recordings) and (rigid := _rigid(found.recordings)) is not None:
+        return rigid, (RIGID_SAID,)
     try:
         fit = fit_mechanical_model(found.recordings, on_progress=on_progress, name=FITTED_NAME)
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+        if (rigid := _rigid(found.recordings)) is not None:
+            return rigid, (RIGID_SAID,)
         raise nothing_to_diagnose(
             (f"no model was given, and none can be fitted: {refusal}",),
             "Give a model with --model, or a recording that carries one.",
@@ -90,6 +100,16 @@ def fitted_model(
         "is not missing from it any more, and is not named."
     )
     return fit.model, (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
+
+
+def _rigid(recordings: Sequence[Recording]) -> MechanicalModel | None:
+    """None where the recordings do not carry one."""
+    if not can_be_rigid(recordings):
+        return None
+    try:
+        return rigid_model(recordings, FITTED_NAME)
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return None
 
 
 def nothing_to_diagnose(problems: Sequence[str], do_now: str = "Correct them, or record again.") -> StudyError:

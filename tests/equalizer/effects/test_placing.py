@@ -75,7 +75,8 @@ def test_an_effect_beyond_the_channels_cannot_be_written(bench):
 
 
 @pytest.mark.parametrize(
-    ("channels", "letter"), [(("fx", "fy"), "y"), (("f1", "f2"), "f2"), (("left x", "right x"), "right x")]
+    ("channels", "letter"),
+    [(("fx", "fy"), "y"), (("f1", "f2"), "f2"), (("left x", "right x"), "right x"), (("rate", "force"), "force")],
 )
 def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter):
     assert axis_letter(channels[1], channels) == letter

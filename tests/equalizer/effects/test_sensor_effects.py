@@ -120,6 +120,15 @@ def test_a_tone_is_found_outside_the_mains_as_well(bench, command):
     assert any(start["frequency"] == pytest.approx(133.31, abs=1e-3) for start in found)
 
 
+def test_a_tone_that_is_commanded_throughout_is_no_hum(bench, command):
+    model = bench.three_axes()
+    steady = 0.4 * np.sin(2 * np.pi * 50.0 * np.arange(len(command)) / 1000.0)
+    tone = {"amplitude": 0.1, "frequency": 50.0, "phase": 1.0}
+    for driven, hums in ((command, True), (np.tile(steady[:, None], (1, command.shape[1])), False)):
+        seen = bench.measured(model, bench.placed("mains_hum", tone, 0), driven, seed=2)
+        assert bool(EFFECTS["mains_hum"].starts(bench.evidence(model, seen), 0)) is hums
+
+
 def test_what_friction_adds_to_a_driven_line_is_no_tone(bench, command):
     """It comes and goes with the excitation, and with another phase."""
     model = bench.three_axes()
