@@ -40,6 +40,6 @@ def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values,
 
 
 def _faint(effect: Effect, values: Values) -> Values:
-    """Where the data show nothing of it: a hundredth of what another axis shows."""
+    """Where the data show nothing of it: a tenth of what another axis shows."""
     main = effect.parameters[0]
-    return {**values, main.name: values[main.name] / 100 if main.none == 0 else values[main.name]}
+    return {**values, main.name: values[main.name] / 10 if main.none == 0 else values[main.name]}

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.explain import CLEAN, Explanation
 from analysis.diagnosis.rivalry import Contender
@@ -9,7 +11,7 @@ from analysis.diagnosis.same_within_errors import excess
 
 EXPLAINED = 1.12
 """In the worst channel, errors of so many times the noise are as good as none: laws of real physics are never exact."""
-CONVINCING, CONVINCED = 0.93, 1.5
+CONVINCING, CONVINCED = 0.93, 1.3
 """So are errors of so many times the noise (second) where the explanation takes so much of the mismatch (first), in
 logarithms of power: a force that flips its sign leaves a blow where the real one is a little rounder."""
 NEARLY = 3.0
@@ -21,6 +23,12 @@ BULK = 1.6
 exact enough for the former."""
 
 
+CONFIRMED = 0.3
+"""Share of the mismatch, in logarithms, that must fall on samples that nothing was fitted to or chosen by;"""
+UNSEEN = 0.05
+"""unless it hardly shows in them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Judgement:
     verdict: Verdict
@@ -29,13 +37,12 @@ class Judgement:
 
 
 def judge(found: Explanation) -> Judgement:
-    """By what decisions may see; the test samples only confirm."""
+    """By what decisions may see; the sealed samples can only take a name away."""
     if found.before.standing.seen <= CLEAN:
         return Judgement("no_mismatch", False)
     if found.retuned.standing.seen <= CLEAN:
         return Judgement("parameters", False)
-    claims = found.after.fitted.hypothesis.claims
-    if not claims:
+    if not found.after.fitted.hypothesis.claims or not _confirmed(found):
         return Judgement("unexplained", False)
     worst = found.after.standing.seen
     share = share_of_mismatch(found.retuned, found.after)
@@ -45,6 +52,15 @@ def judge(found: Explanation) -> Judgement:
     if worst <= NEARLY or share >= MOSTLY or taken >= BULK:
         return Judgement("partly_explained", True)
     return Judgement("unexplained", False)
+
+
+def _confirmed(found: Explanation) -> bool:
+    """Whether the sealed samples agree that something was explained; yes where nothing was sealed."""
+    without, with_it = (np.log(one.standing.test) for one in (found.retuned, found.after))
+    whole, left = float(np.mean(without)), float(np.mean(with_it))
+    if not np.isfinite(whole):
+        return True
+    return whole <= UNSEEN or whole - left >= CONFIRMED * whole
 
 
 def share_of_mismatch(without: Contender, with_it: Contender) -> float:

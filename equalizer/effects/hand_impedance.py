@@ -43,9 +43,10 @@ EFFECT = Effect(
     signature="the device is heavier, more damped and stiffer than the model along every axis, at every level; nothing "
     "appears at silent lines",
     parameters=(
-        Parameter("mass", 1e-9, 1e6, none=0.0),
-        Parameter("damping", 1e-9, 1e6, none=0.0),
-        Parameter("stiffness", 1e-6, 1e9, none=0.0),
+        # The response is all but linear in them, so that a fit may step right to zero and back.
+        Parameter("mass", 0.0, 1e6, none=0.0, scale="signed"),
+        Parameter("damping", 0.0, 1e6, none=0.0, scale="signed"),
+        Parameter("stiffness", 0.0, 1e9, none=0.0, scale="signed"),
     ),
     acts=Structure(_change),
     starts=_starts,
