@@ -25,6 +25,7 @@ from analysis.diagnosis.measured_motion import has_motion
 from analysis.diagnosis.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.observed import Observed, noise_in_units
 from analysis.diagnosis.observed_parts import observed_parts
+from analysis.diagnosis.rounding import rounding_step
 from analysis.diagnosis.windows import windows_of
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -34,6 +35,8 @@ Measure = Literal["free simulation", "windows", "predicted force"]
 
 DIES_OUT = 1 / 3
 """Share of the longest record within which a plant that holds itself comes to rest."""
+DITHER = 0.02
+"""Steps of a converter: with less noise than that before it, repeats do not show it."""
 UNKNOWN_NOISE = 1e-3
 """Share of the signal that is taken for noise where a recording cannot tell."""
 AT_REST = 0.5
@@ -148,8 +151,20 @@ def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatAr
     """(c,): the quietest recording's, rms."""
     count = records[0].measured.shape[1]
     rows = [
-        np.concatenate([f.response_rms, f.position_rms if f.position_rms is not None else []])[:count] for f in floors
+        np.concatenate([_unrounded(f, one), f.position_rms if f.position_rms is not None else []])[:count]
+        for f, one in zip(floors, records, strict=True)
     ]
     signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
     quietest = np.fmin.reduce(rows)
     return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE * signal))
+
+
+def _unrounded(floor: NoiseFloor, record: Observed) -> FloatArray:
+    """(p,): the response's rms noise before a converter rounded it, for that is physics that a model may lack; what
+    rounds a position is known of every encoder. Of repeats alone: elsewhere rounding and noise cannot be told apart."""
+    noise = floor.response_rms
+    if floor.how != "repeats":
+        return noise
+    steps = np.array([rounding_step(record.measured[:, c]) for c in range(len(noise))])
+    left = np.asarray(np.sqrt(np.maximum(noise**2 - steps**2 / 12, 0.0)))
+    return np.where(left > DITHER * steps, left, noise)
