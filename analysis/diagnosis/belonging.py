@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analysis.diagnosis.answering import SURE, answer
+from analysis.diagnosis.growth import GROWTH, growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -14,8 +15,6 @@ LEAST_SAMPLES = 256
 """With a response, in all recordings together: fewer carry neither a fit nor a test."""
 LEAST_CYCLES = 3.0
 """Of the commands' middle frequency, in all recordings together."""
-GROWTH = 1.0
-"""e-foldings over the longest recording by which a model may grow by itself: rounding alone stays far below."""
 
 
 class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
@@ -138,14 +137,7 @@ def _turning(recording: Recording) -> bool | None:
 
 
 def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
-    n = model.coordinates
-    motion = np.block(
-        [
-            [np.zeros((n, n)), np.eye(n)],
-            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
-        ]
-    )
-    fastest = float(np.linalg.eigvals(motion).real.max())
+    fastest = growth_rate(model)
     longest_s = max(len(one) / one.sample_rate_hz for one in recordings)
     if fastest * longest_s > GROWTH:
         yield (

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.growth import runs_away
 from analysis.diagnosis.hypothesis import Hypothesis
 from analysis.diagnosis.tuning import Tuning
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -18,8 +19,8 @@ BOUND = 4.0
 """Standard deviations of the calibration within which the model's own numbers may be re-tuned."""
 MOVED = 0.1
 """Standard deviations that a number is moved by to see what it does."""
-LARGEST_STEP = 1.0
-"""Of a hypothesis's number: a factor of e on a log scale."""
+LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
+"""Of a hypothesis's number, by its scale: a factor of e, so many times its start, none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,9 +59,17 @@ def sensitivity(
     base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
 
     def moved(number: int) -> FloatArray:
-        there = at.copy()
-        there[number] += MOVED
-        return (base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))) / MOVED
+        for move in (MOVED, -MOVED):
+            there = at.copy()
+            there[number] += move
+            try:
+                change = base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))
+            except (MechanicalModelError, np.linalg.LinAlgError):
+                continue
+            if np.isfinite(change).all():
+                return np.asarray(change / move)
+        # Neither way is a model: the number stays where it is.
+        return np.zeros_like(base)
 
     columns = np.array(list(map_(moved, range(len(at)))))  # type: ignore[operator]
     columns = columns.reshape(len(at), len(base))
@@ -108,12 +117,18 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
         step[t:] = np.clip(step[t:], -_longest(from_.hypothesis), _longest(from_.hypothesis))
         there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
         try:
+            if runs_away(tuning.tuned(from_.deviations + step[:t]), _longest_s(measure)):
+                continue
             tried = evaluated(measure, tuning, from_.deviations + step[:t], there)
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
         if tried.cost < from_.cost * (1 - 1e-9):
             return tried
     return None
+
+
+def _longest_s(measure: ErrorMeasure) -> float:
+    return max(len(one.command) / one.recording.sample_rate_hz for one in measure.records)
 
 
 def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
@@ -134,7 +149,7 @@ def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]
 
 
 def _longest(hypothesis: Hypothesis) -> FloatArray:
-    return np.array([np.inf if number.parameter.scale == "linear" else LARGEST_STEP for number in hypothesis.numbers])
+    return np.array([LARGEST_STEPS[number.parameter.scale] for number in hypothesis.numbers])
 
 
 def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

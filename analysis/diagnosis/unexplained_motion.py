@@ -26,8 +26,8 @@ def evidence_of(
     rate_hz, p = record.recording.sample_rate_hz, model.outputs
     expected = EXPECTED * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
     missing = missing_force(model, residuals, unit, rate_hz, expected)
-    predicted = record.measured - left * unit
-    seen = record.measured.shape[1] > p
+    measured, predicted = without_gaps(record.measured, left * unit, played)
+    seen = measured.shape[1] > p
     return Evidence(
         model=model,
         sample_rate_hz=rate_hz,
@@ -35,11 +35,20 @@ def evidence_of(
         axis_position=played.axis_position + missing.position,
         axis_velocity=played.axis_velocity + missing.velocity,
         axis_force=missing.force,
-        response=record.measured[:, :p],
+        response=measured[:, :p],
         predicted=predicted[:, :p],
         noise=noise[:p],
         used=(record.fit | record.choose).astype(np.float64),
-        position=record.measured[:, p:] if seen else None,
+        position=measured[:, p:] if seen else None,
         predicted_position=predicted[:, p:] if seen else None,
         position_noise=noise[p:] if seen else None,
     )
+
+
+def without_gaps(measured: FloatArray, left: FloatArray, played: Played) -> tuple[FloatArray, FloatArray]:
+    """Measured and predicted, (n, c) each. Estimators look at whole courses: where nothing was measured, what was
+    played stands for both, so that nothing differs."""
+    known = np.isfinite(measured)
+    course = np.hstack([played.response, played.position])[:, : measured.shape[1]]
+    predicted = np.where(known, measured - left, course)
+    return np.where(known, measured, predicted), predicted

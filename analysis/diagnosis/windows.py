@@ -11,6 +11,7 @@ import numpy as np
 from analysis.diagnosis.free_simulation import channels
 from analysis.diagnosis.motion_smoother import SmoothedMotion, smoothed_motion
 from analysis.diagnosis.observed import Observed
+from analysis.diagnosis.unexplained_motion import without_gaps
 from equalizer.effects.along_motion import entered_force
 from equalizer.effects.bodies import Restarts, bodies_of
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
@@ -106,7 +107,8 @@ class Windows:
         recording, p = record.recording, model.outputs
         entered = entered_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
         found = smoothed_motion(model, record, entered + played.axis_force, self.unit)
-        predicted, seen = record.measured - left * self.unit, record.measured.shape[1] > p
+        measured, predicted = without_gaps(record.measured, left * self.unit, played)
+        seen = measured.shape[1] > p
         return Evidence(
             model=model,
             sample_rate_hz=recording.sample_rate_hz,
@@ -114,11 +116,11 @@ class Windows:
             axis_position=found.axis_position,
             axis_velocity=found.axis_velocity,
             axis_force=found.missing_force,
-            response=record.measured[:, :p],
+            response=measured[:, :p],
             predicted=predicted[:, :p],
             noise=self.noise[:p],
             used=(record.fit | record.choose).astype(np.float64),
-            position=record.measured[:, p:] if seen else None,
+            position=measured[:, p:] if seen else None,
             predicted_position=predicted[:, p:] if seen else None,
             position_noise=self.noise[p:] if seen else None,
         )

@@ -1,0 +1,25 @@
+"""How fast a model moves away from rest by itself."""
+
+import numpy as np
+
+from equalizer.plant.mechanical_model import MechanicalModel
+
+GROWTH = 1.0
+"""e-foldings over the longest recording by which a model may grow by itself: rounding alone stays far below."""
+
+
+def growth_rate(model: MechanicalModel) -> float:
+    """Of its fastest growing or slowest dying motion, 1/s; negative where all motion dies out."""
+    n = model.coordinates
+    motion = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
+        ]
+    )
+    return float(np.linalg.eigvals(motion).real.max())
+
+
+def runs_away(model: MechanicalModel, longest_s: float) -> bool:
+    """Whether undisturbed motion grows noticeably within the longest recording."""
+    return growth_rate(model) * longest_s > GROWTH
