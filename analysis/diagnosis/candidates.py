@@ -7,7 +7,7 @@ from equalizer.effects.effect import ALL_SITES, Effect, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
-STARTS = 3
+STARTS = 4
 """At most so many values of each claim are tried."""
 
 

@@ -11,6 +11,10 @@ from equalizer.effects.slew_kernel import follow
 from equalizer.signals.signal import FloatArray
 
 
+SELDOM = (0.3, 0.5, 0.75)
+"""Of the command's fastest change."""
+
+
 def _followed(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
     return np.asarray(_both(commands, step_s, of["rate"])[0])
 
@@ -39,7 +43,9 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         list(np.geomspace(0.01 * fastest, fastest, 12)),
         True,
     )
-    return () if rate is None else ({"rate": rate},)
+    likeliest = () if rate is None else ({"rate": rate},)
+    # Seldom exceeded, a limit hides in what re-tuning did: then it must be tried.
+    return likeliest + tuple({"rate": share * fastest} for share in (SELDOM if axis == ALL_SITES else SELDOM[1:2]))
 
 
 EFFECT = Effect(
