@@ -10,7 +10,6 @@ from equalizer.effects.evidence import Evidence
 from equalizer.effects.slew_kernel import follow
 from equalizer.signals.signal import FloatArray
 
-
 SELDOM = (0.3, 0.5, 0.75)
 """Of the command's fastest change."""
 
