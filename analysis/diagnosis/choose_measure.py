@@ -8,11 +8,12 @@ Free simulation, from rest by the commands alone, is the strictest: nothing meas
 * a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
   error grows without end. It is simulated in windows of 1 s, each from a state estimated from the measured motion, or,
   where no state can be estimated, compared by forces;
-* a recording that does not begin at rest: windows, too.
+* a recording that does not begin at rest: what its beginning left behind dies out, so its first seconds are left out;
+  where that would be more than a quarter of it, windows, too.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -37,6 +38,8 @@ DIES_OUT = 1 / 3
 """Share of the longest record within which a plant that holds itself comes to rest."""
 DITHER = 0.02
 """Steps of a converter: with less noise than that before it, repeats do not show it."""
+GONE, SPARED = 5.0, 0.25
+"""Time constants after which a motion is gone, and the share of a recording that may be left out until then."""
 UNKNOWN_NOISE = 1e-3
 """Share of the signal that is taken for noise where a recording cannot tell."""
 AT_REST = 0.5
@@ -62,7 +65,7 @@ class Chosen:
 
 def measure_of(recordings: Sequence[Recording], model: MechanicalModel) -> Chosen:
     """The error measure that the rule chooses, of every part of the recordings."""
-    records = observed_parts(recordings, model.outputs)
+    records = tuple(_settled(one, model) for one in observed_parts(recordings, model.outputs))
     floors = tuple(noise_floor(one.recording) for one in records)
     noise = _noise(floors, records)
     unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
@@ -91,13 +94,33 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
         return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
     if not holds:
         return Choice("windows", DRIFTS)
-    if any(_begins_moving(one) for one in records):
+    if any(_begins_moving(one) and _settling(one, model) > SPARED * len(one.command) for one in records):
         return Choice("windows", NOT_AT_REST)
     return Choice("free simulation", "")
 
 
 def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
     """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
+    return _slowest(model) * DIES_OUT * longest_s > 1
+
+
+def _settled(record: Observed, model: MechanicalModel) -> Observed:
+    """Without the beginning, where that is in motion and short."""
+    after = _settling(record, model)
+    if after > SPARED * len(record.command) or not _begins_moving(record):
+        return record
+    later = np.arange(len(record.command)) >= after
+    return replace(record, fit=record.fit & later, choose=record.choose & later, test=record.test & later)
+
+
+def _settling(record: Observed, model: MechanicalModel) -> float:
+    """Samples until what was at first is gone."""
+    slowest = _slowest(model)
+    return GONE / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
+
+
+def _slowest(model: MechanicalModel) -> float:
+    """Rate at which the slowest motion dies out, 1/s; below zero for one that grows."""
     n = model.coordinates
     motion = np.block(
         [
@@ -105,8 +128,7 @@ def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
             [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
         ]
     )
-    slowest = -float(np.linalg.eigvals(motion).real.max())
-    return slowest * DIES_OUT * longest_s > 1
+    return -float(np.linalg.eigvals(motion).real.max())
 
 
 IMPOSED = (

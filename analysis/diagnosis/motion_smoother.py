@@ -7,7 +7,6 @@ Friis 2021). Unlike deconvolution it bears plants that drift.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from analysis.diagnosis.observed import Observed
 from analysis.diagnosis.smoother_kernel import smooth
@@ -24,6 +23,7 @@ _LEAK = 1e-5
 """Share of the state that is forgotten per sample: where sensors see no drift, a filter without it does not exist."""
 _STIRRED = 1e-12
 """Variance that all states gain per sample, in their own size: an equation of exact states has no stable solution."""
+_DOUBLINGS = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,10 +90,27 @@ def _large(steps: LinearSteps, expected: FloatArray) -> FloatArray:
 def _gains(advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Of the filter, (s, c), and of the way back, (s, s). look: of channels in units of their noise. Solved in units in
     which the states are alike large."""
-    scaled, seeing, eye = advance * large[None, :] / large[:, None], look * large[None, :], np.eye(len(look))
+    eye = np.eye(len(look))
+    scaled, seeing = advance * large[None, :] / large[:, None], look * large[None, :]
     stirred = np.diag(walk / large**2) + _STIRRED * np.eye(len(advance))
-    foreseen = solve_discrete_are(scaled.T, seeing.T, stirred, eye)
+    foreseen = _steady_covariance(scaled, seeing, stirred)
     gain = np.linalg.solve(seeing @ foreseen @ seeing.T + eye, seeing @ foreseen).T
     found = foreseen - gain @ seeing @ foreseen
-    back = np.linalg.solve(foreseen, scaled @ found).T
+    back = np.linalg.lstsq(foreseen, scaled @ found, rcond=1e-13)[0].T
     return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
+
+
+def _steady_covariance(advance: FloatArray, seeing: FloatArray, stirred: FloatArray) -> FloatArray:
+    """Of what is foreseen, by doubling the time that the filter has run (Anderson 1978; noise of the channels is 1).
+    Raises numpy.linalg.LinAlgError where it does not settle."""
+    along, told, found = advance.T, seeing.T @ seeing, stirred
+    for _ in range(_DOUBLINGS):
+        through = np.linalg.solve(np.eye(len(along)) + told @ found, np.hstack([along, told]))
+        one, other = through[:, : len(along)], through[:, len(along) :]
+        more = along.T @ found @ one
+        along, told, found = along @ one, told + along @ other @ along.T, found + (more + more.T) / 2
+        if not np.isfinite(found).all():
+            break
+        if np.abs(more).max() <= 1e-10 * np.abs(found).max():
+            return np.asarray(found)
+    raise np.linalg.LinAlgError("a filter for the motion does not settle")

@@ -3,10 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from analysis.diagnosis.observed import Mask, Observed, measured_of, roles
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
+MOST_PERIODS = 4
+"""Of a segment, that decisions are made by: more of them repeat what is known, and take time."""
 LEAST_SAMPLES = 32
 """Of a part that is worth comparing."""
 
@@ -24,12 +28,23 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     found: list[Observed] = []
     for one in recordings:
         measured, known = measured_of(one, responses)
-        masks = tuple(mask & known for mask in roles(one.segments, len(one), tested))
+        fit, choose, test = roles(one.segments, len(one), tested)
+        new = ~_repeated(one)
+        masks = tuple(mask & known for mask in (fit & new, choose & new, test))
         for start, stop in parts_of(one):
             cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
             part = part_of(one, start, stop)
             found.append(Observed(part, part.command.samples, measured[start:stop], *cut))
     return tuple(found)
+
+
+def _repeated(recording: Recording) -> Mask:
+    """(n,): what comes after enough periods of a segment."""
+    mask = np.zeros(len(recording), dtype=np.bool_)
+    for segment in recording.segments:
+        if segment.period > 0:
+            mask[segment.start + MOST_PERIODS * segment.period : segment.stop] = True
+    return mask
 
 
 def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:

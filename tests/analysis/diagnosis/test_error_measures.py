@@ -282,3 +282,20 @@ def test_no_rigid_model_is_asked_of_accelerations_alone(held: Recording) -> None
     assert not can_be_rigid([felt])
     with pytest.raises(MechanicalModelError, match="neither positions nor velocities"):
         rigid_model([felt], "fitted")
+
+
+def test_what_a_beginning_in_motion_left_behind_is_left_out_where_it_dies_out_soon(drifting: Recording) -> None:
+    late = replace(
+        drifting, command=drifting.command.part(900, 5900), response=drifting.response.part(900, 5900), segments=()
+    )
+    stiff = replace(model(stiffness=400.0), damping=np.array([[60.0]]))
+    chosen = measure_of([late], stiff)
+    assert chosen.measure.name == "free simulation"
+    first = np.flatnonzero(chosen.measure.records[0].fit)[0]
+    assert 0.3 * RATE_HZ < first < 2.0 * RATE_HZ
+
+
+def test_decisions_are_made_by_the_first_periods_of_many(drifting: Recording) -> None:
+    repeated = replace(drifting, segments=(Segment(0, 6000, "multisine", 1.0, 500, "fit"),))
+    (record,) = observed_parts([repeated], 1)
+    assert np.flatnonzero(record.fit | record.choose)[-1] < 4 * 500
