@@ -82,24 +82,26 @@ def refine(arena: Arena, fitted: Fitted) -> Fitted:
     return there if there.cost < here.cost else here
 
 
-def sensitivity_at(arena: Arena, deviations: np.ndarray, hypothesis: Hypothesis) -> Sensitivity:
-    """Of the model's own numbers. Forces that depend on the motion are left out of it: they are small beside what
-    moves, and simulations without them are quick."""
-    linear = hypothesis
+def sensitivity_at(
+    arena: Arena, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
+) -> Sensitivity:
+    """Of the model's own numbers. Without forces that depend on the motion simulations are quick, and where those are
+    small beside what moves, they hardly matter to it."""
+    kept = hypothesis
     for number in reversed(range(len(hypothesis.claims))):
-        if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
-            linear = without_claim(linear, number)
-    return sensitivity(arena.measure, arena.tuning, deviations, linear, arena.map_)
+        if not with_forces and isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
+            kept = without_claim(kept, number)
+    return sensitivity(arena.measure, arena.tuning, deviations, kept, arena.map_)
 
 
 def _refined_from(arena: Arena, fitted: Fitted) -> Fitted:
     best = fitted
-    for _ in range(MOST_REFRESHED):
-        there = sensitivity_at(arena, best.deviations, best.hypothesis)
+    for time in range(MOST_REFRESHED):
+        there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=time > 0)
         better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
-        settled = better.cost > (1 - SETTLED) * best.cost
+        settled = better.cost > (1 - SETTLED) * best.cost and time > 0
         best = better
-        if settled:
+        if settled or arena.contender(best).standing.seen <= NEARLY_CLEAN:
             break
     return best
 
