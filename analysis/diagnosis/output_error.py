@@ -85,7 +85,7 @@ def fit(measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity
             return best
         gained = best.cost - better.cost
         best = better
-        if gained < 1e-3 * best.cost:
+        if gained < 1e-4 * best.cost:
             break
     return best
 
@@ -111,10 +111,11 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
         # Some number moved the model to where it runs away.
         return None
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
-    low, high = _bounds(from_.hypothesis, t)
+    low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
+    longest = _longest(from_.hypothesis)
+    low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
     for damping in (1e-9, 1e-3, 0.1, 3.0):
-        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low - now, high - now)
-        step[t:] = np.clip(step[t:], -_longest(from_.hypothesis), _longest(from_.hypothesis))
+        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low, high)
         there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
         try:
             if runs_away(tuning.tuned(from_.deviations + step[:t]), _longest_s(measure)):

@@ -1,4 +1,4 @@
-"""Of explanations that are about as good, the plainest: fewer numbers, and the law that the other one only refines."""
+"""Of explanations that are about as good, the plainest: few numbers, a calibration that was right, a law not refined."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,13 @@ def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
 
 
 def _is_plainer(one: Contender, other: Contender) -> bool:
-    return len(one.fitted.hypothesis.point) < len(other.fitted.hypothesis.point) or only_refines(other, one)
+    return _price(one) < _price(other) or only_refines(other, one)
+
+
+def _price(contender: Contender) -> float:
+    """Akaike's (1974): two for each number, and what it costs the calibration to be so far off."""
+    deviations = contender.fitted.deviations
+    return 2.0 * len(contender.fitted.hypothesis.point) + float(deviations @ deviations)
 
 
 def only_refines(other: Contender, one: Contender) -> bool:

@@ -22,7 +22,7 @@ MOST_REFINED = 3
 WORTH_REFINING = 0.5
 """where they gained such a share of what the best one gained."""
 FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
-MOST_REFRESHED, SETTLED = 3, 0.02
+MOST_REFRESHED, SETTLED = 4, 0.0005
 """What the model's numbers do is recomputed so often, or until that gains no more than such a share."""
 NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
@@ -99,9 +99,9 @@ def _refined_from(arena: Arena, fitted: Fitted) -> Fitted:
     for time in range(MOST_REFRESHED):
         there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=time > 0)
         better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
-        settled = better.cost > (1 - SETTLED) * best.cost and time > 0
+        settled = better.cost > (1 - SETTLED) * best.cost
         best = better
-        if settled or arena.contender(best).standing.seen <= NEARLY_CLEAN:
+        if settled and (time > 0 or arena.contender(best).standing.seen <= NEARLY_CLEAN):
             break
     return best
 
