@@ -1,4 +1,4 @@
-"""Of explanations that are about as good, the plainest: few numbers, a calibration that was right, a law not refined."""
+"""Of explanations about as good, the plainest: few numbers, a calibration that was right, a law not refined."""
 
 from collections.abc import Sequence
 
