@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,3 +87,43 @@ class InventedDevice:
 @pytest.fixture
 def device() -> Callable[..., InventedDevice]:
     return InventedDevice
+
+
+@pytest.fixture(scope="session")
+def arena_of(diagnosed) -> Callable[..., Any]:
+    """What the engine's parts share, over the recording of a small simulated device; see `tests/diagnosed.py`. Imported
+    late: it compiles."""
+    from analysis.diagnosis.choose_measure import measure_of
+    from analysis.diagnosis.rivalry import Arena
+    from analysis.diagnosis.tuning import tuning_of
+
+    def arena(effects=(), given=None, axes=1, seed=4):
+        recording = diagnosed.recorded(axes, effects, seed)
+        model = diagnosed.device(axes) if given is None else given
+        measure = measure_of([recording], model).measure
+        return Arena(measure.shortened(), measure, tuning_of(model, recording.command.channels), map)
+
+    return arena
+
+
+@pytest.fixture(scope="session")
+def standing_at() -> Callable[..., Any]:
+    """A contender with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
+    one."""
+    from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed, together
+    from analysis.diagnosis.output_error import Fitted
+    from analysis.diagnosis.rivalry import Contender
+    from analysis.diagnosis.standing import Standing
+    from equalizer.effects.catalogue import EFFECTS
+
+    def contender(seen, *names, test=None, sites=(0,)):
+        whole = NOTHING
+        for name in names:
+            effect = EFFECTS[name]
+            values = {p.name: min(max(1.0, p.lower), p.upper) for p in effect.parameters}
+            whole = together(whole, claimed(Claim(effect, "one", sites), [values]))
+        errors = np.atleast_1d(np.asarray(seen, dtype=float))
+        sealed = errors if test is None else np.atleast_1d(np.asarray(test, dtype=float))
+        return Contender(Fitted(whole, np.zeros(0), (), 0.0), Standing(errors, errors, sealed))
+
+    return contender
