@@ -14,7 +14,7 @@ from analysis.diagnosis.findings import Course, Findings, Signature
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import without_claim
 from analysis.diagnosis.intervals import standard_errors
-from analysis.diagnosis.mismatch_maps import maps_of, whole_mismatch
+from analysis.diagnosis.mismatch_maps import Maps, maps_of, whole_mismatch
 from analysis.diagnosis.mismatch_rows import mismatch_rows
 from analysis.diagnosis.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.noise_floor import NoiseFloor
@@ -43,21 +43,7 @@ def assembled(
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
     maps = maps_of(measure, found, floors)
-    document = Diagnosis(
-        verdict=judged.verdict,
-        mismatch=mismatch_rows(maps.cells["before"])
-        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
-        effects=named_effects(found, _errors(arena, found), said) if judged.named else (),
-        retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
-        remainder=()
-        if judged.verdict not in ("partly_explained", "unexplained")
-        else mismatch_rows(maps.cells["after"]) or whole_mismatch(measure, found.after),
-        fit=errors_of(measure, found),
-        error=measure.name,
-        next_experiment=proposed_experiment(arena, found)
-        if judged.named and measure.name == "free simulation"
-        else None,
-    )
+    document = _document(arena, found, judged, maps)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
@@ -81,6 +67,26 @@ def assembled(
             part: sum(int(getattr(r, part).sum()) for r in measure.records) / recording.sample_rate_hz
             for part in ("fit", "choose", "test")
         },
+    )
+
+
+def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps) -> Diagnosis:
+    measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
+    said = said_of(measure.records[0].recording, tuning.model)
+    return Diagnosis(
+        verdict=judged.verdict,
+        mismatch=mismatch_rows(maps.cells["before"])
+        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
+        effects=named_effects(found, _errors(arena, found), said) if judged.named else (),
+        retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
+        remainder=()
+        if judged.verdict not in ("partly_explained", "unexplained")
+        else mismatch_rows(maps.cells["after"]) or whole_mismatch(measure, found.after),
+        fit=errors_of(measure, found),
+        error=measure.name,
+        next_experiment=proposed_experiment(arena, found)
+        if judged.named and measure.name == "free simulation"
+        else None,
     )
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 from analysis.diagnosis.assemble_findings import assembled
 from analysis.diagnosis.choose_measure import measure_of
-from analysis.diagnosis.explain import Progress, explain
+from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.observed_parts import names_of_parts
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.screening import Mapper
+from analysis.diagnosis.search import searched
 from analysis.diagnosis.tuning import tuning_of
-from analysis.diagnosis.verdict import judge
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -37,9 +37,8 @@ def diagnose(
     chosen = measure_of(recordings, model)
     tuning = tuning_of(model, recordings[0].command.channels)
     arena = Arena(chosen.measure.shortened(), chosen.measure, tuning, map_)
-    found = explain(arena, [one for one in CATALOGUE if one.name not in settings.without], progress)
+    seen = searched(arena, [one for one in CATALOGUE if one.name not in settings.without], progress)
     progress("writing down what was found", 0.95)
-    judged = judge(found)
-    named = found if judged.named else replace(found, after=found.retuned)
-    whole = assembled(arena, named, judged, chosen.floors, names_of_parts(recordings, settings.names))
-    return replace(whole, remarks=(*chosen.remarks, *whole.remarks))
+    found = seen.found if seen.judged.named else replace(seen.found, after=seen.found.retuned)
+    whole = assembled(seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names))
+    return replace(whole, remarks=(*chosen.remarks, *seen.remarks, *whole.remarks))

@@ -33,6 +33,9 @@ class ErrorMeasure(Protocol):
     def unit(self) -> FloatArray:
         """(c,): what 1 in a residual is in each channel's own unit."""
 
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        """The same records, with samples that count for something else."""
+
     def shortened(self) -> Self:
         """Without the samples behind the last that decisions may see."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -23,6 +24,9 @@ class FreeSimulation:
     noise: FloatArray
     """(c,): rms"""
     name: str = "free simulation"
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
 
     def shortened(self) -> "FreeSimulation":
         kept = [one for one in self.records if (one.fit | one.choose).any()]

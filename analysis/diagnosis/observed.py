@@ -1,7 +1,7 @@
 """What was observed, ready to be compared with a prediction: signals in units of their noise, and which samples count
 for what."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,17 @@ class Observed:
     """that explanations are chosen by,"""
     test: Mask
     """and that are only looked at in the end."""
+
+    def unsealed(self) -> "Observed":
+        """With the first half of each sealed stretch to fit and to choose by, the second still sealed."""
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
+        fit, choose, test = self.fit.copy(), self.choose.copy(), self.test.copy()
+        for start, stop in edges.tolist():
+            third, half = start + (stop - start) // 3, start + (stop - start) // 2
+            fit[start:third] = True
+            choose[third:half] = True
+            test[start:half] = False
+        return replace(self, fit=fit, choose=choose, test=test)
 
     def shortened(self) -> "Observed":
         """Up to the last sample to fit or to choose by; the recording itself stays whole."""

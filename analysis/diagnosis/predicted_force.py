@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -32,6 +33,9 @@ class PredictedForce:
     """(m,): rms of what the noise of the motion makes in the force."""
     band_hz: float
     name: str = "predicted force"
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
 
     def shortened(self) -> "PredictedForce":
         kept = [

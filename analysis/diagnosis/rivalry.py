@@ -1,7 +1,7 @@
 """Fits of the hypotheses that a screen left over, the best first."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,11 @@ class Arena:
     tuning: Tuning
     map_: Mapper
 
+    def half_opened(self) -> "Arena":
+        """With the first half of every sealed stretch to fit and to choose by."""
+        whole = self.whole.with_records(tuple(one.unsealed() for one in self.whole.records))
+        return replace(self, measure=whole.shortened(), whole=whole)
+
     def contender(self, fitted: Fitted) -> Contender:
         """As decisions see it; its `test` is NaN."""
         return Contender(fitted, standing(self.measure, fitted.residuals))
@@ -67,7 +72,10 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
     gained = [base.cost - one.cost for one in fits]
     worth = [one for one, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
     refined = [refine(arena, one) for one in worth[:MOST_REFINED]]
-    contenders = [arena.contender(one) for one in [*refined, *fits[len(refined) :]]]
+    rest = fits[len(refined) :]
+    plain = [one for one in rest if any(_holds(richer, one) for richer in refined[:1])][:1]
+    refined += [refine(arena, one) for one in plain]
+    contenders = [arena.contender(one) for one in [*refined, *(one for one in rest if one not in plain)]]
     return tuple(sorted(contenders, key=lambda one: one.standing.chosen_by))
 
 
@@ -104,6 +112,12 @@ def _refined_from(arena: Arena, fitted: Fitted) -> Fitted:
         if settled and (time > 0 or arena.contender(best).standing.seen <= NEARLY_CLEAN):
             break
     return best
+
+
+def _holds(richer: Fitted, plain: Fitted) -> bool:
+    """Whether the last claim of one holds the other's as a special case: then both must be fitted as well."""
+    last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
+    return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)
 
 
 def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:

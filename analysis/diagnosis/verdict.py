@@ -38,12 +38,10 @@ class Judgement:
 
 def judge(found: Explanation) -> Judgement:
     """By what decisions may see; the sealed samples can only take a name away."""
-    if found.before.standing.seen <= CLEAN:
-        return Judgement("no_mismatch", False)
-    if found.retuned.standing.seen <= CLEAN:
-        return Judgement("parameters", False)
     if not found.after.fitted.hypothesis.claims or not _confirmed(found):
-        return Judgement("unexplained", False)
+        if found.before.standing.seen <= CLEAN:
+            return Judgement("no_mismatch", False)
+        return Judgement("parameters" if found.retuned.standing.seen <= CLEAN else "unexplained", False)
     worst = found.after.standing.seen
     share = share_of_mismatch(found.retuned, found.after)
     if worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING):

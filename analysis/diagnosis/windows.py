@@ -5,6 +5,7 @@ What is left of an error in the state is fitted to each window, and does not cou
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -40,6 +41,9 @@ class Windows:
     @property
     def name(self) -> str:
         return f"windows of {self.window_s:g} s"
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
 
     def shortened(self) -> "Windows":
         kept = [

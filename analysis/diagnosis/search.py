@@ -1,0 +1,48 @@
+"""The search for what is missing, and once more with half of the sealed samples where they alone show something."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.explain import Explanation, Progress, explain
+from analysis.diagnosis.rivalry import Arena
+from analysis.diagnosis.verdict import Judgement, judge
+from equalizer.effects.effect import Effect
+
+SHOWN = 1.25
+"""Errors of so many times the noise on sealed samples cannot be passed over,"""
+MORE_THAN_SEEN = 1.5
+"""and so many times larger than on all others, they come from something that the others do not hold."""
+OPENED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
+    "such stretch was used to find it, the second half to confirm it."
+)
+NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    arena: Arena
+    """With the samples as they were used in the end."""
+    found: Explanation
+    judged: Judgement
+    remarks: tuple[str, ...] = ()
+
+
+def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Searched:
+    found = explain(arena, catalogue, progress)
+    judged = judge(found)
+    if judged.named or not _sealed_alone(found):
+        return Searched(arena, found, judged)
+    half = arena.half_opened()
+    again = explain(half, catalogue, progress)
+    second = judge(again)
+    if second.named:
+        return Searched(half, again, second, (OPENED,))
+    return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN,))
+
+
+def _sealed_alone(found: Explanation) -> bool:
+    shown = float(np.nanmax(found.retuned.standing.test, initial=0.0))
+    return shown > SHOWN and shown > MORE_THAN_SEEN * found.retuned.standing.seen
