@@ -37,8 +37,8 @@ class DetectionLines:
 
 
 def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
-    """excitation: (lines, inputs), line k in row k - 1. held: samples that each value of the command is held for; above half
-    its own rate there are its images only. None where nothing is driven."""
+    """excitation: (lines, inputs), line k in row k - 1. held: samples that each value of the command is held for; above
+    half its own rate there are its images only. None where nothing is driven."""
     size = np.abs(excitation)
     size[(len(size) + 1) // held :] = 0
     strongest = size.max()

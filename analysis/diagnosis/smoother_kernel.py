@@ -21,8 +21,7 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
 ) -> None:
     """out (n, s): the states. advance (s, s), look (c, s), gain (s, c), back (s, s): see `motion_smoother`. pushed
     (n, s): what is added over the step that begins there. seen (n, c): NaN where nothing was."""
-    n, s = out.shape
-    c = look.shape[0]
+    n, s, c = out.shape[0], out.shape[1], look.shape[0]
     foreseen = np.empty((n, s))
     state = out[0].copy()
     for k in range(n):
