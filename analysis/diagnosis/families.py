@@ -2,16 +2,18 @@
 
 from analysis.diagnosis.hypothesis import Claim
 
+DRY_FRICTION = frozenset(
+    {
+        "coulomb_friction",
+        "asymmetric_friction",
+        "stribeck_friction",
+        "presliding_hysteresis",
+        "position_dependent_friction",
+    }
+)
+
 FAMILIES: tuple[frozenset[str], ...] = (
-    frozenset(
-        {
-            "coulomb_friction",
-            "asymmetric_friction",
-            "stribeck_friction",
-            "presliding_hysteresis",
-            "position_dependent_friction",
-        }
-    ),
+    DRY_FRICTION,
     frozenset({"amplifier_lag", "transport_delay"}),
     frozenset({"clock_drift", "logger_offset"}),
     frozenset({"sensor_misalignment", "cross_axis_sensitivity"}),

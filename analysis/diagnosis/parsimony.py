@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from analysis.diagnosis.families import DRY_FRICTION
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.same_within_errors import excess, inseparable
 
@@ -9,6 +10,9 @@ REFINED = 0.006
 """Mean log error power that a refined law must gain over the plain one that it contains,"""
 REFINED_SHARE = 0.35
 """or as a share of what the plain law leaves above the noise: where both are wrong, the richer one errs less;"""
+RUBBED_SHARE = 0.7
+"""(dry friction: what happens while it turns round differs from device to device, and any further number takes some of
+it);"""
 HALVED = 0.7
 """but never more than this, half of the power, which no plainness makes up for."""
 
@@ -48,4 +52,6 @@ def _good_enough(plain: Contender, refined: Contender) -> bool:
     if not _contained(plain, refined):
         return inseparable(refined, plain)
     gained = plain.standing.chosen_by - refined.standing.chosen_by
-    return gained <= max(REFINED, min(REFINED_SHARE * excess(plain), HALVED))
+    rubs = plain.fitted.hypothesis.claims[-1].effect.name in DRY_FRICTION
+    share = RUBBED_SHARE if rubs else REFINED_SHARE
+    return gained <= max(REFINED, min(share * excess(plain), HALVED))
