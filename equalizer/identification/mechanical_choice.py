@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from equalizer.identification.mechanical_fit_result import MechanicalFitSettings, OrderTried
 from equalizer.identification.mechanical_misfit import LineGroup
-from equalizer.identification.mechanical_order import LEAST_GAIN, by_stages, simplest
+from equalizer.identification.mechanical_order import LEAST_GAIN, across_a_joint, by_stages, simplest
 from equalizer.identification.mechanical_refinement import Refined
 from equalizer.identification.mechanical_structure import Structure
 from equalizer.identification.modal_order import choose_modes
@@ -32,6 +32,8 @@ def choose(
     """Oscillators on the driven axes, if they explain the lines; else what sees each mode in a way of its own, if that
     explains more. starts: fits of the driven axes alone to the first of `stages`, from several beginnings."""
     best = simplest(starts)
+    if settings.joint:
+        return Chosen(*across_a_joint(groups, best, band_hz, settings, on_progress))
     if settings.sensors_elsewhere:
         return _elsewhere(groups, best, band_hz, settings, on_progress)
     here = Chosen(*by_stages(groups, best, band_hz, settings, lambda share: on_progress(share / 2)))

@@ -22,6 +22,9 @@ class MechanicalFitSettings:
     sensors_elsewhere: bool | None = None
     """Whether response i may move otherwise than what command i pushes (a cable or a joint lies between). None: where
     the left-out lines say so."""
+    joint: bool = False
+    """Whether what sensors and oscillators sit on hangs on the driven axes by an elastic joint, such as cables. Taken
+    where it is known of the device; `sensors_elsewhere` is not asked then."""
     fit_delay: bool = True
     """Whether a delay may be added where the left-out lines ask for it."""
     floor: float = 0.02

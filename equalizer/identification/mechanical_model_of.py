@@ -24,7 +24,7 @@ def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
     if isinstance(fit.structure, ModalStructure):
         model = at_driven_axes(model)
     else:
-        model = _absolute(model, fit.structure.inputs)
+        model = _absolute(model, fit.structure.inputs, fit.structure.joint)
     return replace(model, tolerance=tolerance_of(fit))
 
 
@@ -56,10 +56,7 @@ def _of_oscillators(structure: Structure, fit: AnyFit) -> Tolerance:
 
 def _driven_axes(structure: Structure, unknowns: FloatArray) -> FloatArray:
     """(3 m,): masses, damping and stiffness to the ground at each."""
-    model, m = structure.model(unknowns), structure.inputs
-    own = structure.oscillators(unknowns)[2]
-    masses = np.diag(model.mass)[:m] - np.sum(own**2, axis=0)
-    return np.concatenate([masses, np.diag(model.damping)[:m], np.diag(model.stiffness)[:m]])
+    return np.concatenate([np.diag(part) for part in structure.grounded_parts(unknowns)])
 
 
 def _covariance(fit: AnyFit) -> FloatArray:
@@ -70,16 +67,16 @@ def _covariance(fit: AnyFit) -> FloatArray:
     return np.asarray(left * inverse / np.outer(size, size))
 
 
-def _absolute(model: MechanicalModel, m: int) -> MechanicalModel:
+def _absolute(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
     """e = |L| (z - hᵀ x): z is where an oscillator of mass |L|² is, along its direction h."""
-    n = model.coordinates
-    participation = model.mass[m:, :m]
+    n, carrier, rest = model.coordinates, slice(m, 2 * m) if joint else slice(0, m), slice(2 * m if joint else m, None)
+    participation = model.mass[rest, carrier]
     roots = np.linalg.norm(participation, axis=1)
-    if not n - m or roots.min() < 1e-6 * np.sqrt(model.mass[:m, :m].max()):
+    if not len(roots) or roots.min() < 1e-6 * np.sqrt(model.mass[carrier, carrier].max()):
         return model
     change = np.eye(n)
-    change[m:, m:], change[m:, :m] = np.diag(roots), -participation
+    change[rest, rest], change[rest, carrier] = np.diag(roots), -participation
     mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
     # What the change makes zero is zero but for rounding.
-    mass[m:, :m] = mass[:m, m:] = 0.0
+    mass[rest, carrier] = mass[carrier, rest] = 0.0
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness, output=model.output @ change)

@@ -9,7 +9,7 @@ from equalizer.identification.mechanical_fit_result import MechanicalFitSettings
 from equalizer.identification.mechanical_misfit import LineGroup
 from equalizer.identification.mechanical_refinement import Refined, refined
 from equalizer.identification.mechanical_start import mode_starts
-from equalizer.identification.mechanical_structure import Structure
+from equalizer.identification.mechanical_structure import Structure, begun_joint
 
 LEAST_GAIN = 0.08
 """Of the left-out squares: less is not worth a mode on a device that no linear model fits."""
@@ -23,6 +23,14 @@ CLEAR_DELAY = 4.0
 """Times smaller must the left-out squares be for a delay to be taken before any mode is."""
 SIMPLER = 1.02
 """So much worse may the left-out squares be without springs to the ground."""
+BELOW_JOINT = 0.5
+"""Of the band: where a joint above it is not looked for yet."""
+ALLOWED = (
+    "What is left on lines that were not fitted is no more than noise, what differs between levels, and the share that "
+    "no linear model is expected to explain."
+)
+JOINT_BEGUN = (1.1, 1.6)
+"""Times the band's end: where its resonance is sought from."""
 
 
 def by_stages(
@@ -31,8 +39,10 @@ def by_stages(
     band_hz: tuple[float, float],
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
+    whole: bool = True,
 ) -> tuple[Refined[Structure], tuple[OrderTried, ...], str]:
-    """The band grows upwards, for what is fitted below tells where what lies above begins."""
+    """The band grows upwards, for what is fitted below tells where what lies above begins. whole: at its end also small
+    things beside modes are tried."""
     tried = [_tried("the driven axes alone", best, best.structure, True)]
     ends = stages(band_hz)
     for number, end in enumerate(ends):
@@ -43,14 +53,16 @@ def by_stages(
         if number == 0 and best.structure.grounded:
             best = _without_ground(lower, best, band, tried)
         last = number == len(ends) - 1
-        best, reason = _grown(lower, best, band, _Limits(settings.most_modes, settings.fit_delay, last), tried)
+        best, reason = _grown(
+            lower, best, band, _Limits(settings.most_modes, settings.fit_delay, whole and last), tried
+        )
     return best, tuple(tried), reason
 
 
 @dataclass(frozen=True, slots=True)
 class _Limits:
     most_modes: int
-    delay: bool
+    fit_delay: bool
     whole_band: bool
 
 
@@ -94,7 +106,33 @@ def _grown(
                 f"{allowed}othing more explains {LEAST_GAIN:.0%} of what is left on lines that were not fitted, and "
                 "more than noise does."
             )
-    return best, "What is left on lines that were not fitted is what noise allows."
+    return best, ALLOWED
+
+
+def across_a_joint(
+    groups: Sequence[LineGroup],
+    best: Refined[Structure],
+    band_hz: tuple[float, float],
+    settings: MechanicalFitSettings,
+    on_progress: Callable[[float], None],
+) -> tuple[Refined[Structure], tuple[OrderTried, ...], str]:
+    """Below half of the band a joint hardly shows, and oscillators are found without it."""
+    half = max(BELOW_JOINT * band_hz[1], stages(band_hz)[0])
+    lower = [part for group in groups if len((part := group.of(group.frequency_hz <= half)).frequency_hz)]
+    below, tried, _ = by_stages(lower, best, (band_hz[0], half), settings, lambda s: on_progress(0.5 * s), whole=False)
+    structure = replace(below.structure, joint=True)
+    found = list(tried)
+    fits = []
+    for number, times in enumerate(JOINT_BEGUN):
+        begun = begun_joint(structure, below.structure.carried_over(below.unknowns, structure), times * band_hz[1])
+        fits.append(refined(groups, structure, begun, band_hz))
+        on_progress(0.5 + 0.1 * (number + 1))
+        found.append(_tried(f"with a joint begun at {times * band_hz[1]:.3g} Hz", fits[-1], structure, True))
+    joined = min(fits, key=lambda one: one.left_out)
+    grown, reason = _grown(
+        groups, joined, band_hz, _Limits(settings.most_modes, fit_delay=False, whole_band=False), found
+    )
+    return grown, tuple(found), reason
 
 
 def simplest(starts: Sequence[Refined[Structure]]) -> Refined[Structure]:
@@ -126,7 +164,7 @@ def _larger(
     small: list[tuple[str, Structure]] = []
     if structure.modes and not structure.shared:
         small.append(("with sensors that see the modes too", replace(structure, shared=True)))
-    if limits.delay and not structure.delayed:
+    if limits.fit_delay and not structure.delayed:
         small.append(("with a delay", replace(structure, delayed=True)))
     if structure.inputs > 1 and not structure.turned:
         small.append(("with a turned sensor", replace(structure, turned=True)))

@@ -2,7 +2,8 @@
 
 M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
 (root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses see the
-driven axes through `output` rows, the oscillators through rows of their own.
+driven axes through `output` rows, the oscillators through rows of their own. An elastic joint may lie between the
+driven axes and what sensors and oscillators sit on; see `mechanical_joint`.
 """
 
 from dataclasses import dataclass, field, replace
@@ -11,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from equalizer.identification.mechanical_joint import DRIVEN_SHARE, across_joint
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.signal import FloatArray
 
@@ -19,6 +21,8 @@ _FARTHEST_MODE = 4.0
 """Times the band's end, or a part of its beginning."""
 _LARGEST_TURN = 0.3
 _MOST_DELAY_SAMPLES = 200.0
+_WIDEST_JOINT_LOG = 2.5
+_JOINT_LOSS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +45,8 @@ class Structure:
     """Whether the sensor's axes may be turned against the commands' by a small angle."""
     shared: bool = False
     """Whether the driven axes' own sensors see a part of the oscillators' motion beside them."""
+    joint: bool = False
+    """Whether an elastic joint, such as cables, lies between the driven axes and all else."""
     delayed: bool = False
     step_s: float = 1e-3
     sensor: SensorLimits = field(default_factory=SensorLimits)
@@ -55,7 +61,8 @@ class Structure:
         sizes = {
             "mass": pairs, "damping": pairs, "stiffness": pairs if self.grounded else 0,
             "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.turned else 0,
-            "delay": 1 if self.delayed else 0, "modes": self.modes * (2 + m + seen),
+            "joint": pairs + 1 if self.joint else 0, "delay": 1 if self.delayed else 0,
+            "modes": self.modes * (2 + m + seen),
         }  # fmt: skip
         ends = np.cumsum(list(sizes.values()))
         return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
@@ -66,7 +73,7 @@ class Structure:
 
     @property
     def coordinates(self) -> int:
-        return self.inputs + self.modes
+        return (2 if self.joint else 1) * self.inputs + self.modes
 
     @property
     def units(self) -> tuple[float, float, float]:
@@ -97,15 +104,11 @@ class Structure:
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """In relative coordinates. Raises MechanicalModelError for what is no mass."""
         m, part = self.inputs, self.slices
-        units = self.units
-        lower = _lower(unknowns[part["mass"]], m)
-        mass = units[0] * lower @ lower.T
-        damping = units[1] * _square(unknowns[part["damping"]], m)
-        stiffness = units[2] * _square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        mass, damping, stiffness = self.grounded_parts(unknowns)
         frequency, ratio, participation, seen = self.oscillators(unknowns)
         own = np.diag(self.signs) @ _turn(unknowns[part["turn"]], m)
         rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
-        return MechanicalModel(
+        whole = MechanicalModel(
             name=name,
             quantity=self.quantity,
             mass=_joined(mass + participation.T @ participation, participation, np.ones(self.modes)),
@@ -117,6 +120,18 @@ class Structure:
             actuator=replace(self.actuator, delay_s=self.delay_s(unknowns)),
             rotational=self.rotational,
         )
+        if not self.joint:
+            return whole
+        joint = unknowns[part["joint"]]
+        lower = _lower(joint[:-1], m)
+        return across_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
+
+    def grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mass without that of oscillators, damping and stiffness at the driven axes, (m, m) each."""
+        m, part, units = self.inputs, self.slices, self.units
+        lower = _lower(unknowns[part["mass"]], m)
+        stiffness = units[2] * _square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        return units[0] * lower @ lower.T, units[1] * _square(unknowns[part["damping"]], m), stiffness
 
     def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Within which unknowns are sought: no negative damper or spring, modes about the band."""
@@ -126,6 +141,11 @@ class Structure:
             if part[name].stop > part[name].start:
                 low[part[name].start + diagonal] = 0.0
         low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_WIDEST_LOG, _WIDEST_LOG
+        if self.joint:
+            first = part["joint"].start + diagonal
+            at = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
+            low[first], high[first] = at - _WIDEST_JOINT_LOG, at + _WIDEST_JOINT_LOG
+            low[part["joint"].stop - 1], high[part["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
         low[part["turn"]], high[part["turn"]] = -_LARGEST_TURN, _LARGEST_TURN
         low[part["delay"]], high[part["delay"]] = 0.0, _MOST_DELAY_SAMPLES
         if self.modes:
@@ -162,6 +182,19 @@ def packed_mass(mass: FloatArray) -> FloatArray:
 def packed_square(matrix: FloatArray) -> FloatArray:
     """Likewise of a damping or stiffness: as its root, so that none can feed a motion. matrix: positive definite."""
     return np.asarray(np.linalg.cholesky(matrix)[np.tril_indices(len(matrix))])
+
+
+def begun_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
+    """The unknowns with a joint alike along all axes, whose resonance lies there."""
+    mass = structure.grounded_parts(unknowns)[0]
+    m, part = structure.inputs, structure.slices["joint"]
+    shared = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
+    begun = unknowns.copy()
+    begun[part] = 0.0
+    root = 2 * np.pi * frequency_hz * np.sqrt(shared / structure.units[2])
+    begun[part.start + diagonal_places(m)] = np.log(root)
+    begun[part.stop - 1] = np.log(_JOINT_LOSS * structure.speed_scale / (2 * np.pi * frequency_hz))
+    return begun
 
 
 def diagonal_places(m: int) -> npt.NDArray[np.intp]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from equalizer.identification.mechanical_fit_result import MechanicalFitSettings, OrderTried
 from equalizer.identification.mechanical_misfit import LineGroup
+from equalizer.identification.mechanical_order import ALLOWED
 from equalizer.identification.mechanical_refinement import Refined, refined
 from equalizer.identification.mechanical_structure import Structure
 from equalizer.identification.modal_search import FoundModes, ModalSearch
@@ -55,7 +56,7 @@ def _one_after_the_other(
     for number in range(1, most):
         on_progress(number / most)
         if _error(best) < 1:
-            return best, tried, "What is left on lines that were not fitted is what noise allows."
+            return best, tried, ALLOWED
         more = search.with_one_more(best)
         better = more.left_out < (1 - LEAST_GAIN) * best.left_out
         tried.append(_tried(more, structure, better))

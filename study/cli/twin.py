@@ -17,11 +17,12 @@ def twin(
     protocol: Annotated[
         str, typer.Option(help="Recording protocol with multisines along x, y and z, or a file.")
     ] = "multisine",
-    band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (1.0, 150.0),
+    band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (3.0, 60.0),
     as_json: JsonOption = False,
 ) -> None:
-    """Excite the device well above its friction at two levels, fit masses, dampers, springs and modes from the command
-    to the acceleration, and write them with their tolerances. Nobody may hold the handle."""
+    """Excite the device well above its friction at two levels, fit masses, dampers, cables and modes from the command
+    to the acceleration, take off the damping that is friction's, and write the rest with its tolerances. Nobody may
+    hold the handle."""
     from study.cli.progress import late_bar
     from study.cli.record import announce
     from study.workflows.twin_summary import twin_lines, twin_summary

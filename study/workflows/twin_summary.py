@@ -19,6 +19,7 @@ def twin_summary(written: WrittenTwin) -> dict[str, Any]:
             "up_to_hz": written.piece.up_to_hz,
             "mass_kg": written.piece.mass.tolist(),
             "damping_n_s_per_m": written.piece.damping.tolist(),
+            "of_friction_n_s_per_m": written.piece.of_friction.tolist(),
         },
         "modes_hz": _modes_hz(written),
         "tolerance": None
@@ -45,7 +46,8 @@ def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
     piece = written.piece
     lines = [
         f"As one piece, up to {piece.up_to_hz:.3g} Hz: mass {_words(piece.mass)} kg{_about(tolerance, 'mass_kg')}, "
-        f"damping {_words(piece.damping)} N s/m{_about(tolerance, 'damping_n_s_per_m')}",
+        f"damping {_words(piece.damping)} N s/m, {_words(piece.of_friction)} N s/m of it friction's and taken off"
+        f"{_about(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes := _modes_hz(written):
         swing = ", ".join(f"{each:.3g}" for each in modes)

@@ -66,11 +66,24 @@ def test_the_model_predicts_what_was_kept_for_a_test(twin):
     assert model.sensor.bandwidth_hz == 500.0
 
 
-def test_the_tolerance_of_the_damping_tells_of_friction(twin):
-    tolerance = twin[1].model.tolerance
-    assert tolerance is not None and tolerance.damping_n_s_per_m is not None
-    assert tolerance.damping_n_s_per_m > 1.0
-    assert any("friction" in note.lower() for note in twin[1].notes)
+def test_what_friction_put_into_the_damping_is_taken_off_and_said(twin):
+    written = twin[1]
+    # The device's own, with its friction apart: 10.2 N s/m.
+    left = np.diag(written.fit.model.damping - written.model.damping)[:3]
+    np.testing.assert_allclose(left, written.piece.of_friction)
+    assert (written.piece.of_friction > 4.0).all()
+    np.testing.assert_allclose(written.piece.damping - written.piece.of_friction, 10.2, rtol=0.4)
+    assert any("were friction's, and were taken off" in note for note in written.notes)
+
+
+def test_the_model_is_a_few_bodies_with_tolerances_as_a_laboratory_states_them(twin):
+    model = twin[1].model
+    assert model.coordinates <= 12
+    carried = model.mass[:3, :3] + model.mass[3:6, 3:6]
+    np.testing.assert_allclose(np.diag(carried), 0.282, rtol=0.12)
+    tolerance = model.tolerance
+    assert tolerance is not None and tolerance.mass_kg is not None and tolerance.stiffness_n_per_m is not None
+    assert tolerance.mass_kg < 0.03 and tolerance.stiffness_n_per_m < 50.0
 
 
 def test_the_spring_is_said_to_be_in_the_command(twin):
