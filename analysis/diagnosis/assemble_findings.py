@@ -57,7 +57,9 @@ def assembled(
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
         signatures=_signatures(arena, found, said),
-        black_box=black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
+        black_box=None
+        if found.statistic is not None
+        else black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
         remarks=tuple(dict.fromkeys(remark for floor in floors for remark in floor.remarks)),
         maps=maps.cells,
         floor=floors[0],
@@ -85,7 +87,7 @@ def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps) -
         fit=errors_of(measure, found),
         error=measure.name,
         next_experiment=proposed_experiment(arena, found)
-        if judged.named and measure.name == "free simulation"
+        if judged.named and measure.name == "free simulation" and found.statistic is None
         else None,
     )
 
@@ -97,6 +99,8 @@ def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
 
 
 def _errors(arena: Arena, found: Explanation) -> FloatArray:
+    if found.statistic is not None:
+        return found.statistic.errors
     fitted = found.steps[-1].fitted
     known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
     return standard_errors(arena.measure, arena.tuning, fitted, known)[len(fitted.deviations) :]

@@ -7,11 +7,14 @@ from analysis.diagnosis.assemble_findings import assembled
 from analysis.diagnosis.choose_measure import measure_of
 from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.impact_wording import IMPACTS_COMPARED
+from analysis.diagnosis.impacts import rattling
 from analysis.diagnosis.observed_parts import names_of_parts
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.screening import Mapper
-from analysis.diagnosis.search import searched
+from analysis.diagnosis.search import Searched, searched
 from analysis.diagnosis.tuning import tuning_of
+from analysis.diagnosis.verdict import judge
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -37,7 +40,12 @@ def diagnose(
     chosen = measure_of(recordings, model)
     tuning = tuning_of(model, recordings[0].command.channels)
     arena = Arena(chosen.measure.shortened(), chosen.measure, tuning, map_)
-    seen = searched(arena, [one for one in CATALOGUE if one.name not in settings.without], progress)
+    catalogue = [one for one in CATALOGUE if one.name not in settings.without]
+    seen = searched(arena, catalogue, progress)
+    if seen.judged.verdict in ("unexplained", "partly_explained"):
+        progress("looking for play that rattles", 0.9)
+        rattled = rattling(seen.arena, seen.found, chosen.floors, catalogue)
+        seen = seen if rattled is None else Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,))
     progress("writing down what was found", 0.95)
     found = seen.found if seen.judged.named else replace(seen.found, after=seen.found.retuned)
     whole = assembled(seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names))

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.error_measure import ErrorMeasure
-from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.explain import Explanation, Statistic
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.standing import rms_over
 
@@ -14,6 +14,8 @@ from analysis.diagnosis.standing import rms_over
 def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
     """Root mean square over the channels of each one's rms error over its rms signal. "fit" holds the samples to choose
     by, too."""
+    if found.statistic is not None:
+        return Fit(*(_by_statistic(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
     return Fit(_errors(measure, found, ("fit", "choose")), _errors(measure, found, ("test",)))
 
 
@@ -23,6 +25,18 @@ def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, M
     return {
         stage: dict(zip(names, contender.standing.test.tolist(), strict=True)) for stage, contender in stages.items()
     }
+
+
+def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
+    """Root mean square over the channels of the logarithm that a prediction is off by."""
+
+    def one(contender: Contender) -> float | None:
+        off = np.array([getattr(contender.standing, part) for part in parts]) * statistic.chance
+        whole = float(np.sqrt(np.mean(off**2)))
+        return whole if np.isfinite(whole) else None
+
+    chance = float(np.sqrt(np.mean(statistic.chance**2)))
+    return Errors(one(found.before), one(found.retuned), one(found.after), chance)
 
 
 def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:

@@ -15,6 +15,7 @@ from analysis.diagnosis.rivalry import Arena, Contender, contest, refine, sensit
 from analysis.diagnosis.same_within_errors import excess
 from analysis.diagnosis.screening import screen
 from equalizer.effects.effect import Effect
+from equalizer.signals.signal import FloatArray
 
 RETUNING_ROUNDS = 4
 MOST_EFFECTS = 3
@@ -34,6 +35,17 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Statistic:
+    """What contenders were compared by where waveforms cannot be predicted."""
+
+    words: str
+    chance: FloatArray
+    """(c,): its usual difference between two courses of one model, which stands where noise does otherwise."""
+    errors: FloatArray
+    """(numbers,): standard errors of the final hypothesis's point."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
     before: Contender
     """The model as given,"""
@@ -45,6 +57,8 @@ class Explanation:
     """The contenders for the first effect, the second, …; the best first. The last may have brought nothing."""
     steps: tuple[Contender, ...]
     """What stood after each effect that was added."""
+    statistic: Statistic | None = None
+    """None where samples were compared, in units of their noise."""
 
 
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Explanation:

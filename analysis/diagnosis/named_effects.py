@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.document import Estimate, NamedEffect, Rival
 from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.hypothesis import Claim, Hypothesis
+from analysis.diagnosis.impact_wording import BY_CHANCE, BY_NOISE
 from analysis.diagnosis.parsimony import only_refines
 from analysis.diagnosis.probability import probabilities
 from analysis.diagnosis.rivalry import Contender
@@ -78,30 +79,33 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
     chances = probabilities(contenders)
     best = contenders[0]
     rivals: dict[str, Rival] = {}
+    unit = BY_NOISE if found.statistic is None else BY_CHANCE
     for other, chance in list(zip(contenders, chances, strict=True))[1:]:
         claim = other.fitted.hypothesis.claims[-1]
         if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
             continue
         same = inseparable(best, other) and not only_refines(other, best)
-        rivals[claim.effect.name] = Rival(claim.effect.name, chance, same, _why_not(best, other, same, said))
+        rivals[claim.effect.name] = Rival(claim.effect.name, chance, same, _why_not(best, other, same, (said, unit)))
         if len(rivals) == RIVALS:
             break
     return tuple(rivals.values()), chances[0]
 
 
-def _why_not(best: Contender, other: Contender, same: bool, said: Said) -> str:
+def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, str]) -> str:
+    """words: of the device, and what errors are counted in."""
+    said, unit = words
     worst, least = other.standing.seen, best.standing.seen
     claim = other.fitted.hypothesis.claims[-1]
     axis = axis_of(claim, said)
     where = f" ({axis})" if axis else ""
     if only_refines(other, best):
         return (
-            f"it holds the named law and more numbers beside it{where}, which bring too little: {worst:.3g} times the "
-            f"noise in the worst channel instead of {least:.3g}"
+            f"it holds the named law and more numbers beside it{where}, which bring too little: {worst:.3g} times "
+            f"{unit} in the worst channel instead of {least:.3g}"
         )
     if same:
-        return f"as good{where}: it leaves {worst:.2f} times the noise in the worst channel, the named one {least:.2f}"
-    return f"at its best{where} it leaves {worst:.3g} times the noise in the worst channel, the named one {least:.3g}"
+        return f"as good{where}: it leaves {worst:.2f} times {unit} in the worst channel, the named one {least:.2f}"
+    return f"at its best{where} it leaves {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
 
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Said) -> dict[str, Estimate]:

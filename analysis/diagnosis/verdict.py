@@ -22,7 +22,9 @@ BULK = 1.6
 """or takes so much of the logarithm of its power, four fifths of it: where noise is small beside all physics, no law is
 exact enough for the former."""
 
-
+BY_CHANCE = 2.5
+"""With a statistic instead of samples, errors of so many times what chance makes of it are as good as none: no law of a
+contact is exact."""
 CONFIRMED = 0.3
 """Share of the mismatch, in logarithms, that must fall on samples that nothing was fitted to or chosen by;"""
 UNSEEN = 0.05
@@ -43,6 +45,8 @@ def judge(found: Explanation) -> Judgement:
             return Judgement("no_mismatch", False)
         return Judgement("parameters" if found.retuned.standing.seen <= CLEAN else "unexplained", False)
     worst = found.after.standing.seen
+    if found.statistic is not None:
+        return Judgement("explained" if worst <= BY_CHANCE else "partly_explained", True)
     share = share_of_mismatch(found.retuned, found.after)
     if worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING):
         return Judgement("explained", True)

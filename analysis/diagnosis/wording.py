@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words
 from analysis.diagnosis.findings import BlackBox, Findings
+from analysis.diagnosis.impact_wording import impact_sentence
 from analysis.diagnosis.plausibility import implausible_sentences
 from analysis.diagnosis.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
 from analysis.wording import listed, p_text
@@ -50,6 +51,14 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), si
         "Model and device disagree, and no effect of the catalogue explains it. "
         f"{capital(_one_error('re-tuned', errors.retuned, errors))}."
     )
+
+
+def answer_of(found: Findings) -> str:
+    """The verdict's sentence."""
+    diagnosis, single = found.diagnosis, found.given.inputs == 1
+    if found.explanation.statistic is not None:
+        return impact_sentence(diagnosis, listed([effect_title(effect, single) for effect in diagnosis.effects]))
+    return verdict_sentence(diagnosis, moved_of(found) if diagnosis.verdict == "parameters" else (), single)
 
 
 _AFTER = ("after", "with it")
@@ -169,7 +178,7 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
     """The diagnosis in a few sentences, the verdict first."""
     diagnosis, single = found.diagnosis, found.given.inputs == 1
     moved = moved_of(found)
-    lines = [verdict_sentence(diagnosis, moved if diagnosis.verdict == "parameters" else (), single)]
+    lines = [answer_of(found)]
     signatures = signature_texts(found)
     for effect in diagnosis.effects:
         lines += [effect_sentence(effect, signatures.get(effect.effect, ""), single), inseparable_sentence(effect)]

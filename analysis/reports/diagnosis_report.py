@@ -7,6 +7,7 @@ from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.plausibility import implausible_sentences
 from analysis.diagnosis.retuned_numbers import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.wording import (
+    answer_of,
     black_box_beats,
     black_box_sentence,
     capital,
@@ -20,7 +21,6 @@ from analysis.diagnosis.wording import (
     rival_sentences,
     share_sentence,
     signature_texts,
-    verdict_sentence,
 )
 from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_method import method_paragraphs
@@ -40,7 +40,6 @@ def render_diagnosis_report(
 ) -> str:
     """HTML. pictures: of `analysis.figures.diagnosis_pictures`, for the same findings."""
     diagnosis = found.diagnosis
-    moved = moved_of(found) if diagnosis.verdict == "parameters" else ()
     sections = [
         *_answer(found),
         _where(found, pictures),
@@ -57,7 +56,7 @@ def render_diagnosis_report(
     return render_page(
         Page(
             title=f"Diagnosis of {found.given.name}",
-            summary=verdict_sentence(diagnosis, moved, _single(found)),
+            summary=answer_of(found),
             banner=_banner(found),
             sections=tuple(sections),
             generated_utc=generated_utc,

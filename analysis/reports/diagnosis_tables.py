@@ -54,11 +54,14 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
     """In each channel's unit, with the multiple of the noise; None where no course tells the channels."""
     if not found.courses:
         return None
-    names, units = found.courses[0].channels, found.courses[0].units
+    names, units, noises = found.courses[0].channels, found.courses[0].units, found.noise_rms
+    statistic, what = found.explanation.statistic, "noise"
+    if statistic is not None:
+        units, noises, what = ("1",) * len(names), dict(zip(names, statistic.chance.tolist(), strict=True)), "chance"
     stands = {stage: getattr(getattr(found.explanation, stage).standing, part) for stage, _ in _STAGES}
     rows = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-        noise = found.noise_rms.get(name)
+        noise = noises.get(name)
         if noise is None:
             continue
         ratios = [
@@ -67,7 +70,7 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
         ]
         rows.append((name, *(f"{value_text(ratio * noise, unit)} ({_times(ratio)})" for ratio in ratios),
                      value_text(noise, unit)))  # fmt: skip
-    header = ("Channel", *(f"{words} (× noise)" for _, words in _STAGES), "Noise")
+    header = ("Channel", *(f"{words} (× {what})" for _, words in _STAGES), capital(what))
     return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
 
 

@@ -1,0 +1,31 @@
+"""What is said where impacts were compared by the band powers of the response instead of sample by sample."""
+
+import math
+
+from analysis.diagnosis.document import Diagnosis
+
+IMPACTS_COMPARED = (
+    "The device rattles, and no simulation predicts the course of blows for long: two that differ by a billionth part "
+    "soon. Instead of samples, the power of each channel in each half octave of each segment was compared. The errors "
+    "are root-mean-square logarithms of the ratio of amplitudes, and what two simulations of the same play differ by, "
+    "at least 5 %, stands where the noise stands otherwise. No black box was fitted beside: it would have to predict "
+    "the course."
+)
+BY_CHANCE = "what chance makes of it"
+BY_NOISE = "the noise"
+
+
+def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
+    """The whole answer, first thing to be read. named: the effects."""
+    errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
+    rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
+    off = [errors.retuned, errors.after, errors.noise]
+    factors = [f"{math.exp(one):.3g}" for one in off if one is not None]
+    said = "how far its amplitudes are off is not known"
+    if len(factors) == len(off):
+        without, with_it, chance = factors
+        said = (
+            f"how strong they are, can: by half octaves, amplitudes are off by a factor of {without} without it and "
+            f"of {with_it} with it, and chance alone makes {chance} of it"
+        )
+    return f"The model lacks {named}{rest}. Its blows cannot be predicted one by one; {said}."
