@@ -7,8 +7,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Small matrices: threads of a linear algebra library would wait for each other longer than they work.
 export OPENBLAS_NUM_THREADS ?= 1
 
+DIAGNOSIS := tests/stories/test_missing_physics_is_named.py tests/stories/test_a_bank_of_concealed_physics.py
+CASES ?= 60
+
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove-study prove-equalizer docs clean
+.PHONY: help study test check fix bench prove-study prove-equalizer prove-diagnosis docs clean
 
 help: ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -41,10 +44,13 @@ bench: $(VENV)/.installed-test ## Ours against the same work done plainly and ag
 	@missed=0; for file in tests/benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || missed=1; done; exit $$missed
 
 prove-study: $(VENV)/.installed-test ## The slow proof of the study: 100 sessions killed at random
-	$(BIN)/python -m pytest -m slow tests/study tests/stories
+	$(BIN)/python -m pytest -m slow tests/study tests/stories $(DIAGNOSIS:%=--ignore=%)
 
 prove-equalizer: $(VENV)/.installed-test ## The slow proofs of the equalizer: many noise seeds, worst case
 	$(BIN)/python -m pytest -m slow -s tests/equalizer tests/stories/test_the_device_is_equalized.py
+
+prove-diagnosis: $(VENV)/.installed-test ## The slow proof of the diagnosis: a bank of concealed physics (CASES=60)
+	CASES=$(CASES) $(BIN)/python -m pytest -m slow $(DIAGNOSIS)
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
 	$(BIN)/python -m study.workflows.format_docs docs
