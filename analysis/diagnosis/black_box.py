@@ -16,6 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 SEEN = 20_000
 """Samples that terms are chosen by, evenly taken from those to fit; all that are fitted to weigh in the end."""
+_SEEN_AT_ALL = 1e-6
+"""Rms of a term on the samples to fit; over all samples it is about 1."""
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -24,17 +26,25 @@ def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: 
     if physics is None or not any(record.test.any() for record in measure.records):
         return None
     terms = [
-        _terms(record.command, record.measured - left * measure.unit)
+        # Where nothing was measured, nothing is fitted or tested either.
+        _terms(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
     fitted = [record.fit for record in measure.records]
     rows = np.vstack([one[mask] for one, mask in zip(terms, fitted, strict=True)])
     left = np.vstack([one[mask] for one, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
-    scale = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), _TINY)
+    scale = _scale(rows)
     weights = np.stack([_chosen(rows / scale, left[:, c], numbers) for c in range(left.shape[1])], axis=1)
     corrected = tuple(one - each / scale @ weights for one, each in zip(retuned.fitted.residuals, terms, strict=True))
     error = _normalised(measure, corrected, [record.test for record in measure.records])
     return BlackBox("polynomial of the model's signals", numbers * left.shape[1], error, physics)
+
+
+def _scale(rows: FloatArray) -> FloatArray:
+    """(terms,): rms; infinite for terms that are next to nothing where they are fitted, such as products of commands
+    that are never played together: elsewhere they would be anything."""
+    rms = np.sqrt(np.mean(rows**2, axis=0))
+    return np.where(rms > _SEEN_AT_ALL, rms, np.inf)
 
 
 def _terms(command: FloatArray, predicted: FloatArray) -> FloatArray:

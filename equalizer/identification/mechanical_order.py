@@ -9,7 +9,7 @@ from equalizer.identification.mechanical_fit_result import MechanicalFitSettings
 from equalizer.identification.mechanical_misfit import LineGroup
 from equalizer.identification.mechanical_refinement import Refined, refined
 from equalizer.identification.mechanical_start import mode_starts
-from equalizer.identification.mechanical_structure import Structure, begun_joint
+from equalizer.identification.mechanical_structure import Structure, begun_joint, without_mode
 
 LEAST_GAIN = 0.08
 """Of the left-out squares: less is not worth a mode on a device that no linear model fits."""
@@ -128,11 +128,24 @@ def across_a_joint(
         fits.append(refined(groups, structure, begun, band_hz))
         on_progress(0.5 + 0.1 * (number + 1))
         found.append(_tried(f"with a joint begun at {times * band_hz[1]:.3g} Hz", fits[-1], structure, True))
-    joined = min(fits, key=lambda one: one.left_out)
+    joined = _needed(groups, min(fits, key=lambda one: one.left_out), band_hz, found)
     grown, reason = _grown(
         groups, joined, band_hz, _Limits(settings.most_modes, fit_delay=False, whole_band=False), found
     )
     return grown, tuple(found), reason
+
+
+def _needed(
+    groups: Sequence[LineGroup], now: Refined[Structure], band_hz: tuple[float, float], tried: list[OrderTried]
+) -> Refined[Structure]:
+    """Without oscillators that stood in for the joint."""
+    for mode in reversed(range(now.structure.modes)):
+        fewer, unknowns = without_mode(now.structure, now.unknowns, mode)
+        fit = refined(groups, fewer, unknowns, band_hz)
+        simpler = not earns_its_place(fit, now)
+        tried.append(_tried(f"without mode {mode + 1}", fit, fewer, simpler))
+        now = fit if simpler else now
+    return now
 
 
 def simplest(starts: Sequence[Refined[Structure]]) -> Refined[Structure]:

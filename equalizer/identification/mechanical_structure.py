@@ -197,6 +197,12 @@ def begun_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float)
     return begun
 
 
+def without_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
+    part = structure.slices["modes"]
+    rows = np.delete(unknowns[part].reshape(structure.modes, -1), number, axis=0)
+    return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: part.start], rows.ravel()])
+
+
 def diagonal_places(m: int) -> npt.NDArray[np.intp]:
     """Which of the unknowns of a symmetric matrix stand on its diagonal."""
     rows, columns = np.tril_indices(m)
