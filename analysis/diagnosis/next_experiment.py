@@ -15,12 +15,14 @@ from analysis.diagnosis.hypothesis import Hypothesis
 from analysis.diagnosis.output_error import MOVED, Fitted
 from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.simulator import simulate_mechanism
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 TELLING = 10.0
 """Gain in log likelihood below which rivals stay as good as each other."""
+RETUNED = 3
+"""Steps of the rival towards the named one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,10 +76,34 @@ def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, one: Ex
         point = rival.hypothesis.point.copy()
         point[number] += of.move
         columns.append((_predicted(bench, rival.deviations, rival.hypothesis, point, one) - base) / of.move)
-    moves = np.array(columns)
+    return _left(bench, rival, known, (one, differs, np.array(columns))) / 2
+
+
+def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]) -> float:
+    """Squares that stay when the rival re-tunes, by steps that are tried out: what numbers do is no straight line.
+    seen: the experiment, the difference to be tuned away, and what each of the rival's numbers does to it."""
+    one, differs, moves = seen
+    tuned, t = np.zeros(len(known)), len(rival.deviations)
+    wanted = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, one) + differs
+    whole, least, rest = float(differs @ differs), np.inf, differs
     pull = moves @ differs
-    tuned_away = float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
-    return max(float(differs @ differs) - tuned_away, 0.0) / 2
+    straight = whole - float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
+    for _ in range(RETUNED):
+        step = np.linalg.lstsq(moves @ moves.T + known, moves @ rest - known @ tuned, rcond=None)[0]
+        tuned = tuned + step
+        try:
+            there = _predicted(
+                bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], one
+            )
+        except (MechanicalModelError, np.linalg.LinAlgError):
+            break
+        rest = wanted - there
+        squares = float(rest @ rest + tuned @ known @ tuned)
+        if not squares < least:
+            break
+        least = squares
+    # Where the steps led away, what a straight line foresees: rather too little is promised.
+    return least if least < whole else max(straight, 0.0)
 
 
 def _predicted(

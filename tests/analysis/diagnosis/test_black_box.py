@@ -1,0 +1,87 @@
+"""A correction without physics beats wrong physics, and loses to right physics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.black_box import black_box
+from analysis.diagnosis.error_table import errors_of
+from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.rivalry import refine
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+
+@pytest.fixture(scope="module")
+def bent(arena_of):
+    """A sensor with a curve: a polynomial can say that, too."""
+    effect = EFFECTS["sensor_nonlinearity"]
+    values = {p.name: -2e-3 if p.name == effect.parameters[0].name else 0.0 for p in effect.parameters}
+    return arena_of((PlacedEffect(effect, (0,), values),)), values
+
+
+def compared(arena, name, values):
+    """The black box beside one effect, fitted to the end."""
+    zero = np.zeros(len(arena.tuning.names))
+    whole = claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+    bare = evaluated(arena.measure, arena.tuning, zero, NOTHING)
+    known = sensitivity(arena.measure, arena.tuning, zero, NOTHING)
+    start = evaluated(arena.measure, arena.tuning, zero, whole)
+    after = refine(arena, fit(arena.measure, arena.tuning, start, known, 4))
+    retuned, ended = (arena.confirmed(arena.contender(one)) for one in (bare, after))
+    found = Explanation(retuned, retuned, ended, (), ())
+    physics = errors_of(arena.whole, found).test.after
+    return black_box(arena.whole, retuned, len(whole.point), physics), errors_of(arena.whole, found).test
+
+
+def test_right_physics_beats_the_black_box(bent):
+    arena, values = bent
+    box, errors = compared(arena, "sensor_nonlinearity", values)
+    assert box.physics == errors.after == pytest.approx(errors.noise, rel=0.05)
+    assert box.physics < box.test
+
+
+def test_the_black_box_beats_wrong_physics(bent):
+    arena, _ = bent
+    box, errors = compared(arena, "coulomb_friction", {"level": 0.05})
+    assert box.test < 0.9 * box.physics
+    assert box.test < errors.retuned
+
+
+def test_the_black_box_has_as_many_numbers_per_channel_as_physics(bent):
+    arena, values = bent
+    box, _ = compared(arena, "sensor_nonlinearity", values)
+    channels = arena.whole.records[0].measured.shape[1]
+    free = sum(not p.fixed for p in EFFECTS["sensor_nonlinearity"].parameters)
+    assert box.numbers == free * channels
+
+
+def test_where_nothing_is_missing_the_black_box_finds_nothing(arena_of):
+    arena = arena_of()
+    bare = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    retuned = arena.confirmed(arena.contender(bare))
+    error = errors_of(arena.whole, Explanation(retuned, retuned, retuned, (), ())).test.after
+    assert black_box(arena.whole, retuned, 3, error).test == pytest.approx(error, rel=0.01)
+
+
+def test_without_sealed_samples_there_is_nothing_to_compare_on(arena_of):
+    arena = arena_of()
+    bare = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    retuned = arena.contender(bare)
+    assert black_box(arena.measure, retuned, 3, 0.1) is None
+    assert black_box(arena.whole, replace(retuned), 3, None) is None
+
+
+def test_commands_that_are_never_played_together_where_it_is_fitted_do_not_break_it(arena_of):
+    arena = arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),), axes=2)
+    record = arena.whole.records[0]
+    command = record.command.copy()
+    command[record.test] += 1.0
+    whole = arena.whole.with_records((replace(record, command=command),))
+    bare = evaluated(arena.whole, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    box = black_box(whole, arena.confirmed(arena.contender(bare)), 2, 0.02)
+    assert np.isfinite(box.test)
+    assert box.test < 10
