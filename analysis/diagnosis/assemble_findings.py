@@ -14,6 +14,7 @@ from analysis.diagnosis.findings import Course, Findings, Signature
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import without_claim
 from analysis.diagnosis.intervals import standard_errors
+from analysis.diagnosis.localisation import Localisation, localised
 from analysis.diagnosis.mismatch_maps import Maps, maps_of, whole_mismatch
 from analysis.diagnosis.mismatch_rows import mismatch_rows
 from analysis.diagnosis.named_effects import Said, named_effects, said_of
@@ -43,7 +44,8 @@ def assembled(
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
     maps = maps_of(measure, found, floors)
-    document = _document(arena, found, judged, maps)
+    local = localised(measure, tuning, found, floors, maps.cells)
+    document = _document(arena, found, judged, maps, local)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
@@ -62,6 +64,7 @@ def assembled(
         else black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
         remarks=tuple(dict.fromkeys(remark for floor in floors for remark in floor.remarks)),
         maps=maps.cells,
+        local=local,
         floor=floors[0],
         tuning=tuning,
         axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
@@ -72,18 +75,18 @@ def assembled(
     )
 
 
-def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps) -> Diagnosis:
+def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps, local: Localisation) -> Diagnosis:
     measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
     said = said_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
-        mismatch=mismatch_rows(maps.cells["before"])
+        mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
         effects=named_effects(found, _errors(arena, found), said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
-        else mismatch_rows(maps.cells["after"]) or whole_mismatch(measure, found.after),
+        else mismatch_rows(maps.cells["after"], local.states["after"]) or whole_mismatch(measure, found.after),
         fit=errors_of(measure, found),
         error=measure.name,
         next_experiment=proposed_experiment(arena, found)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from analysis.diagnosis.document import Diagnosis, Mismatch
 from analysis.diagnosis.explain import Explanation
+from analysis.diagnosis.localisation import Localisation
 from analysis.diagnosis.mismatch_cells import MismatchCell
 from analysis.diagnosis.noise_floor import NoiseFloor
 from analysis.diagnosis.tuning import Tuning
@@ -86,6 +87,8 @@ class Findings:
     """Sentences that a reader must know: what was assumed, what is weak, what is not sensible physically."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
     """By "before", "retuned", "after": every cell of the map, in units of the noise."""
+    local: Localisation = field(default_factory=Localisation)
+    """In which states it sits, through what it enters, of which kind it is."""
     floor: NoiseFloor | None = None
     """Of the first recording: how the noise was measured, and its spectrum."""
     tuning: Tuning | None = None

@@ -115,12 +115,12 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
 
 
 def place_of(mismatch: Mismatch) -> str:
-    """ "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % (p < 0.0001)"."""
+    """ "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001)"."""
     low, high = mismatch.band_hz
     level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
     state = f", {mismatch.state}" if mismatch.state else ""
     driven = f", driven by {mismatch.input}{level}" if mismatch.input else ""
-    share = f"{100 * mismatch.share:.2g} %"
+    share = f"{100 * mismatch.share:.2g} % of {'the mismatch' if mismatch.state else 'the signal'}"
     return f"{mismatch.output} at {low:g} to {high:g} Hz{driven}{state}: {share} ({p_text(mismatch.p_value)})"
 
 

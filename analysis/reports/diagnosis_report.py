@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.localisation_words import localisation_sentences
 from analysis.diagnosis.plausibility import implausible_sentences
 from analysis.diagnosis.retuned_numbers import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.wording import (
@@ -23,6 +24,7 @@ from analysis.diagnosis.wording import (
     signature_texts,
 )
 from analysis.figures.picture import Picture
+from analysis.reports.diagnosis_distortion import distortion_sections
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_tables import (
     channel_table,
@@ -43,6 +45,7 @@ def render_diagnosis_report(
     sections = [
         *_answer(found),
         _where(found, pictures),
+        *distortion_sections(found),
         *(_effect(found, number, pictures) for number in range(len(diagnosis.effects))),
         *_tried(pictures),
         _errors(found, pictures),
@@ -86,8 +89,11 @@ def _answer(found: Findings) -> list[Section]:
     return [Section("What the model lacks", points=(*points, *filter(None, after)))]
 
 
+_NO_MAP = "There is no map: the noise of this recording is not known."
+
+
 def _where(found: Findings, pictures: Sequence[Picture]) -> Section:
-    said = () if found.maps else ("There is no map: the noise of this recording is not known.",)
+    said = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
     listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch)
     return Section(
         "Where model and device disagree", paragraphs=said, pictures=_named(pictures, "mismatch-map"), tables=(listed,)

@@ -178,7 +178,9 @@ def test_what_is_left_is_named_by_its_worst_places():
     assert remainder_sentence(diagnosis("explained", (DRY,))) == "Nothing significant is left unexplained."
     places = tuple(replace(PLACE, share=share) for share in (0.1, 0.8, 0.3, 0.2, 0.05))
     said = remainder_sentence(diagnosis("partly_explained", (DRY,), remainder=places))
-    assert said.startswith("Still unexplained: ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % (p < 0.0001); ")
+    assert said.startswith(
+        "Still unexplained: ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001); "
+    )
     assert said.endswith("; and 2 smaller places.")
 
 

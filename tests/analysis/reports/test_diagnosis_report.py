@@ -52,7 +52,8 @@ def page(friction_found, friction_pictures):
 
 def test_the_verdict_comes_first_then_the_map_then_a_section_per_effect(page):
     assert page[1].found == [
-        "Diagnosis of small", "What the model lacks", "Where model and device disagree", "Dry friction on the x drive",
+        "Diagnosis of small", "What the model lacks", "Where model and device disagree",
+        "What kind of distortion the device shows", "Dry friction on the x drive",
         "What else was tried", "How well it predicts", "What is still unexplained", "The model's own numbers",
         "A black box beside it", "The next recording", "Remarks", "How this was done", "Where this comes from",
     ]  # fmt: skip

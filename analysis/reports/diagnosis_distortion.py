@@ -1,0 +1,120 @@
+"""What kind of distortion the device shows, per channel, input and level, without any model."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.diagnosis.distortion import Distortion, Kind
+from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.level_trends import PRESENT, LevelTrend, level_trends
+from analysis.reports.page import Section, Table
+from analysis.wording import NONE, listed
+
+_KINDS: tuple[Kind, ...] = ("odd", "even", "either", "varying")
+_WORDS: Mapping[Kind, str] = {
+    "odd": "Odd",
+    "even": "Even",
+    "either": "Odd or even",
+    "varying": "Varying between periods",
+}
+_COURSES = {
+    "falls": "falls as the level rises",
+    "rises": "rises with the level",
+    "rises from nothing": "is there only at higher levels",
+    "stays": "keeps its share at all levels",
+    "": "is there, at too few levels to say how it grows",
+}
+_HEARD = 0.1
+"""Of the loudest response of its quantity to an input at that level: what hears less has no row."""
+
+
+def distortion_sections(found: Findings) -> list[Section]:
+    """Empty where nothing was asked."""
+    seen = found.local.distortions
+    if not seen.cells and not seen.remarks:
+        return []
+    table = _table(found)
+    return [
+        Section(
+            "What kind of distortion the device shows",
+            paragraphs=(*_said(seen.cells), *seen.remarks),
+            tables=(table,) if table is not None else (),
+        )
+    ]
+
+
+def _said(cells: Sequence[Distortion]) -> tuple[str, ...]:
+    if not cells:
+        return ()
+    heard = [cell for cell in cells if cell.whole_band and _is_heard(cell, cells)]
+    groups: dict[tuple[Kind, str], list[LevelTrend]] = {}
+    for trend in level_trends(heard):
+        if trend.present:
+            groups.setdefault((trend.kind, trend.course), []).append(trend)
+    if not groups:
+        return ("No distortion stands out of the noise: from repeats and silent lines the device looks linear.",)
+    return tuple(
+        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_COURSES[course]}: "
+        f"{listed([f'{one.output} driven by {one.input}' for one in trends])}."
+        for (kind, course), trends in groups.items()
+    )
+
+
+def _table(found: Findings) -> Table | None:
+    cells = [one for one in found.local.distortions.cells if one.whole_band]
+    heard = [one for one in cells if _is_heard(one, cells)]
+    kinds = [kind for kind in _KINDS if any(one.kind == kind for one in heard)]
+    rows: dict[tuple[str, str, str, float], dict[Kind, Distortion]] = {}
+    for one in heard:
+        rows.setdefault((one.output, one.quantity, one.input, one.amplitude), {})[one.kind] = one
+    if not rows:
+        return None
+    noise = _noise(found)
+    return Table(
+        "Noise and distortion, per cent of the response there",
+        ("Channel", "Driven by", "Level", "Noise", *(_WORDS[kind] for kind in kinds)),
+        tuple(
+            (
+                output,
+                input_,
+                f"{level:g}",
+                _share(noise.get((output, quantity)), next(iter(mine.values())).signal_rms),
+                *(_cell(mine.get(kind)) for kind in kinds),
+            )
+            for (output, quantity, input_, level), mine in rows.items()
+        ),
+        (
+            "Root-mean-square over the driven band. <: not seen, and less than this would not have been. Channels "
+            "that hear less than a tenth of the loudest are left out.",
+        ),
+        folded=True,
+    )
+
+
+def _is_heard(cell: Distortion, cells: Sequence[Distortion]) -> bool:
+    beside = [
+        one.signal_rms
+        for one in cells
+        if (one.quantity, one.input, one.amplitude, one.whole_band)
+        == (cell.quantity, cell.input, cell.amplitude, cell.whole_band)
+    ]
+    return cell.signal_rms > _HEARD * max(beside)
+
+
+def _noise(found: Findings) -> dict[tuple[str, str], float]:
+    """Rms by channel and quantity."""
+    if found.floor is None or not found.courses:
+        return {}
+    rms = [*found.floor.response_rms, *(() if found.floor.position_rms is None else found.floor.position_rms)]
+    keys = dict.fromkeys((one.output, one.quantity) for one in found.local.distortions.cells)
+    return {key: float(value) for key, value in zip(keys, rms, strict=False)}
+
+
+def _share(rms: float | None, signal: float) -> str:
+    return NONE if rms is None or not signal > 0 else f"{100 * rms / signal:.2g} %"
+
+
+def _cell(cell: Distortion | None) -> str:
+    if cell is None:
+        return NONE
+    if cell.p_value < PRESENT:
+        return _share(cell.rms, cell.signal_rms)
+    return f"< {_share(cell.limit_rms, cell.signal_rms)}"
