@@ -46,13 +46,13 @@ total_cap_n = 4.5
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("twin") / "short.toml"
-    path.write_text(SHORT + "".join(SEGMENT.format(along=a, to_hz=40.0, seed=i) for i, a in enumerate("xyz")))
+    path.write_text(SHORT + "".join(SEGMENT.format(along=a, to_hz=60.0, seed=i) for i, a in enumerate("xyz")))
     return path
 
 
 @pytest.fixture(scope="module")
 def twin(protocol):
-    plan = TwinPlan(protocol.parent / "twin.toml", protocol=str(protocol), band_hz=(1.0, 40.0))
+    plan = TwinPlan(protocol.parent / "twin.toml", protocol=str(protocol), band_hz=(3.0, 60.0))
     shares: list[float] = []
     return plan, write_twin(plan, shares.append), shares
 
@@ -125,7 +125,7 @@ def test_a_band_without_lines_is_refused_and_nothing_is_written(protocol, tmp_pa
 
 def test_the_command_writes_a_model_and_says_what_it_is(protocol, tmp_path, capsys):
     out = tmp_path / "m.toml"
-    arguments = ["twin", "--out", str(out), "--protocol", str(protocol), "--band", "1", "20", "--seed", "2", "--json"]
+    arguments = ["twin", "--out", str(out), "--protocol", str(protocol), "--band", "2", "25", "--seed", "2", "--json"]
     assert main(arguments) == ExitCode.DONE
     said = json.loads(capsys.readouterr().out)
     assert said["held_out"] < 0.5 and len(said["channels"]) == 3
