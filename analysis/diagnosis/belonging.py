@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.answering import SURE, answer
 from analysis.diagnosis.growth import GROWTH, growth_rate
+from equalizer.effects.placing import PlacingError, placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -15,6 +16,8 @@ LEAST_SAMPLES = 256
 """With a response, in all recordings together: fewer carry neither a fit nor a test."""
 LEAST_CYCLES = 3.0
 """Of the commands' middle frequency, in all recordings together."""
+LARGEST = 1e12
+"""SI; far beyond any device, and so that powers of it are still numbers."""
 
 
 class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
@@ -45,6 +48,7 @@ def require_alike(recordings: Sequence[Recording], names: Sequence[str]) -> None
 def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> None:
     """A command throughout, and responses that move, for long enough. Raises NothingToDiagnose."""
     problems = [problem for one, name in zip(recordings, names, strict=True) for problem in _gaps(one.command, name)]
+    problems += [problem for one, name in zip(recordings, names, strict=True) for problem in _absurd(one, name)]
     problems += _never(recordings)
     if not problems:
         known = sum(int(np.isfinite(one.response.samples).all(axis=1).sum()) for one in recordings)
@@ -67,7 +71,10 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
     """recordings: alike. Raises NothingToDiagnose where the model cannot be of their device."""
-    problems = (*_size(model, recordings[0]), *_kind(model, recordings[0]), *_runaway(model, recordings))
+    first = recordings[0]
+    problems = (*_size(model, first), *_kind(model, first), *_absurd_model(model))
+    if not problems:
+        problems = (*_idle(model, first), *_runaway(model, recordings), *_effects(model, first))
     if problems:
         raise NothingToDiagnose(problems)
 
@@ -80,6 +87,19 @@ def _gaps(command: Signal, name: str) -> Iterator[str]:
             f"{name} misses the command in {missing} samples (the first is {first}), so nobody can say what the device "
             "was told; cut the recording there"
         )
+
+
+def _absurd(recording: Recording, name: str) -> Iterator[str]:
+    for side in ("command", "response", "position"):
+        signal: Signal | None = getattr(recording, side)
+        for channel in range(0 if signal is None else len(signal.channels)):
+            assert signal is not None
+            size = float(np.nanmax(np.abs(signal.samples[:, channel]), initial=0.0))
+            if size > LARGEST:
+                yield (
+                    f"{name} holds values up to {size:.3g} {signal.units[channel]} in {side} "
+                    f"{signal.channels[channel]}, which no device reaches"
+                )
 
 
 def _never(recordings: Sequence[Recording]) -> Iterator[str]:
@@ -136,6 +156,30 @@ def _turning(recording: Recording) -> bool | None:
     return False if any(unit.split("/")[0] == "m" for unit in units) else None
 
 
+def _absurd_model(model: MechanicalModel) -> Iterator[str]:
+    for name in ("mass", "damping", "stiffness", "input", "output"):
+        size = float(np.abs(getattr(model, name)).max())
+        if size > LARGEST:
+            yield f"the model's {name} holds {size:.3g}, which no device has"
+    if (lightest := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST:
+        yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
+
+
+def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """What drives or sees nothing."""
+    idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
+    blind = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
+    if idle:
+        yield f"the model's input lets {', '.join(idle)} drive nothing"
+    elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
+        yield (
+            f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so nobody can "
+            "tell them apart; make one command of those that push the same"
+        )
+    if blind:
+        yield f"the model's output lets {', '.join(blind)} see nothing"
+
+
 def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
     fastest = growth_rate(model)
     longest_s = max(len(one) / one.sample_rate_hz for one in recordings)
@@ -144,6 +188,13 @@ def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterato
             f"the model is unstable: undisturbed it grows e-fold in {1 / fastest:.3g} s; damping and stiffness must "
             "not be negative"
         )
+
+
+def _effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    try:
+        placed_effects(model, recording.command.channels, recording.response.channels)
+    except PlacingError as problem:
+        yield str(problem)
 
 
 def _words(signal: Signal) -> str:

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.closed_loop import in_closed_loop
+from analysis.diagnosis.effect_words import EFFECT_WORDS
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.force_views import force_views
 from analysis.diagnosis.free_simulation import FreeSimulation
@@ -28,6 +29,8 @@ from analysis.diagnosis.observed import Observed, noise_in_units
 from analysis.diagnosis.observed_parts import observed_parts
 from analysis.diagnosis.rounding import rounding_step
 from analysis.diagnosis.windows import windows_of
+from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.placing import placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -70,18 +73,27 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel) -> Chose
     noise = _noise(floors, records)
     unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
     choice = choose_measure(records, model)
-    remarks = (choice.why,) if choice.why else ()
+    known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
     if choice.measure == "free simulation":
-        return Chosen(FreeSimulation(records, unit, noise), floors, remarks)
+        return Chosen(FreeSimulation(records, unit, noise, known=known), floors, remarks)
     if choice.measure == "windows":
         try:
-            return Chosen(windows_of(records, model, (unit, noise)), floors, remarks)
+            windows = replace(windows_of(records, model, (unit, noise)), known=known)
+            return Chosen(windows, floors, remarks)
         except np.linalg.LinAlgError:
             if not all(has_motion(one.recording, model) for one in records):
-                return Chosen(FreeSimulation(records, unit, noise), floors, (NO_STATE,))
+                return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
     views = force_views(records, model, floors)
     said = f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
-    return Chosen(views.measure, views.floors, (*remarks, said))
+    return Chosen(replace(views.measure, known=known), views.floors, (*remarks, said))
+
+
+def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
+    if not known:
+        return ()
+    kinds = ", ".join(dict.fromkeys(EFFECT_WORDS[one.effect.name].noun for one in known))
+    return (f"The model names effects of its own, which are part of every simulation: {kinds}.",)
 
 
 def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:

@@ -24,6 +24,8 @@ class FreeSimulation:
     noise: FloatArray
     """(c,): rms"""
     name: str = "free simulation"
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -48,7 +50,7 @@ class FreeSimulation:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         seen = Seen(record.measured[:, :p], self.noise[:p], position)
-        return simulate(model, record.command, signals.sample_rate_hz, effects, signals.hold, seen)
+        return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]

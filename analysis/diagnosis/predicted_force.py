@@ -33,6 +33,8 @@ class PredictedForce:
     """(m,): rms of what the noise of the motion makes in the force."""
     band_hz: float
     name: str = "predicted force"
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -59,7 +61,7 @@ class PredictedForce:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
-            self._balance(model, effects, record, motion).left / self.unit
+            self._balance(model, (*self.known, *effects), record, motion).left / self.unit
             for record, motion in zip(self.records, self.motions, strict=True)
         )
 
@@ -67,7 +69,7 @@ class PredictedForce:
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         return tuple(
-            self._evidence(model, effects, record, motion)
+            self._evidence(model, (*self.known, *effects), record, motion)
             for record, motion in zip(self.records, self.motions, strict=True)
         )
 

@@ -37,6 +37,8 @@ class Windows:
     unit: FloatArray
     noise: FloatArray
     window_s: float = 1.0
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
 
     @property
     def name(self) -> str:
@@ -57,13 +59,14 @@ class Windows:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        return tuple(self._seen(model, effects, *one)[1] for one in zip(self.records, self.states, strict=True))
+        every = (*self.known, *effects)
+        return tuple(self._seen(model, every, *one)[1] for one in zip(self.records, self.states, strict=True))
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
         return tuple(
-            self._evidence(model, effects, record, states)
+            self._evidence(model, (*self.known, *effects), record, states)
             for record, states in zip(self.records, self.states, strict=True)
         )
 

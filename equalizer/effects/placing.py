@@ -60,6 +60,10 @@ def _placed(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ..
         raise PlacingError(
             f"no simulation plays '{effect.kind}'{nearest(effect.kind, tuple(EFFECTS))}; it plays {', '.join(EFFECTS)}"
         )
+    for parameter in entry.parameters:
+        value = effect.parameters.get(parameter.name, 0.0)
+        if parameter.scale == "log" and value < 0:
+            raise PlacingError(f"{effect.kind}.{parameter.name} is {value:g}; it must not be negative")
     return PlacedEffect(entry, _sites(effect, outputs if _is_sensors(effect.kind) else inputs), effect.parameters)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.belonging import NothingToDiagnose, require_alike, require_model_of, require_something
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -119,3 +119,41 @@ def test_a_translational_model_is_not_compared_with_turning():
 
 def test_a_model_that_drifts_freely_is_no_unstable_one():
     require_model_of(model(axes=3, damping=0.0, stiffness=0.0), [recording(samples=100_000, axes=3)])
+
+
+def test_numbers_that_no_device_reaches_are_refused():
+    one = recording()
+    for side in ("command", "response"):
+        high = with_samples(one, side, getattr(one, side).samples * 1e150)
+        assert f"in {side}" in refusal(require_something, [high], ["a"])
+        assert "which no device reaches" in refusal(require_something, [high], ["a"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"mass": [[1e-300]]}, "the model's lightest motion has a mass of 1e-300, which no device has"),
+        ({"stiffness": [[1e300]]}, "the model's stiffness holds 1e+300, which no device has"),
+        ({"input": [[0.0]]}, "the model's input lets fx drive nothing"),
+        ({"output": [[0.0]]}, "the model's output lets ax see nothing"),
+    ],
+    ids=["mass", "stiffness", "input", "output"],
+)
+def test_a_model_of_no_device_is_refused(changes, words):
+    assert words in refusal(require_model_of, replace(model(), **changes), [recording()])
+
+
+def test_two_actuators_of_one_motion_are_refused():
+    eye = np.eye(2)
+    both = MechanicalModel("m", "acceleration", eye, eye, eye, np.ones((2, 2)), eye)
+    assert "2 inputs drive only 1 motion, so nobody can tell" in refusal(require_model_of, both, [recording(axes=2)])
+
+
+@pytest.mark.parametrize(
+    ("axis", "level", "words"),
+    [("z", 0.2, "the axis 'z' is none of fx"), ("x", -0.2, "coulomb_friction.level is -0.2; it must not be negative")],
+    ids=["axis", "level"],
+)
+def test_an_effect_of_the_models_own_must_be_possible(axis, level, words):
+    rubbing = replace(model(), effects=(ModelEffect("coulomb_friction", axis, {"level": level}),))
+    assert words in refusal(require_model_of, rubbing, [recording()])

@@ -13,7 +13,7 @@ from analysis.diagnosis.observed_parts import names_of_parts, observed_parts
 from analysis.diagnosis.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, ModelEffect, Tolerance
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import Signal
@@ -299,3 +299,14 @@ def test_decisions_are_made_by_the_first_periods_of_many(drifting: Recording) ->
     repeated = replace(drifting, segments=(Segment(0, 6000, "multisine", 1.0, 500, "fit"),))
     (record,) = observed_parts([repeated], 1)
     assert np.flatnonzero(record.fit | record.choose)[-1] < 4 * 500
+
+
+@pytest.mark.parametrize("which", ["held", "drifting"])
+def test_what_the_models_own_file_names_is_part_of_every_prediction(which: str, request: pytest.FixtureRequest) -> None:
+    one = request.getfixturevalue(which)
+    rubbing = replace(model(), effects=(ModelEffect("coulomb_friction", None, {"level": LEVEL}),))
+    chosen = measure_of([one], rubbing)
+    placed = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": LEVEL}),)
+    (beside,) = measure_of([one], model()).measure.residuals(model(), placed)
+    assert np.array_equal(chosen.measure.residuals(rubbing, ())[0], beside)
+    assert "are part of every simulation: dry friction." in chosen.remarks[-2 if which == "held" else -1]
