@@ -16,6 +16,7 @@ from analysis.diagnosis.force_driven import all_force_driven
 from analysis.diagnosis.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.identification.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
+from equalizer.identification.open_tolerance import opened
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
@@ -96,10 +97,11 @@ def fitted_model(
     tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
     said = (
         f"No model was given. A linear one was fitted to these recordings first, with an error of "
-        f"{100 * fit.error:.1f} %{tested}; what it could take on itself, such as friction at one level as damping, "
-        "is not missing from it any more, and is not named."
+        f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
+        "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
+        "is not named."
     )
-    return fit.model, (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
+    return opened(fit.model), (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
 
 
 def _rigid(recordings: Sequence[Recording]) -> MechanicalModel | None:
