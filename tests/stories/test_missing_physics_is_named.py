@@ -22,6 +22,8 @@ FRICTION = {"coulomb_friction": {"level": 0.1}}
 SATURATION = {"force_saturation": {"limit": 2.1}}
 AMONG = ("coulomb_friction", "viscous_damping", "hardening_stiffness", "force_gain", "constant_force")
 """Where not the whole catalogue is asked, for the time that it takes."""
+SLOW = ("stribeck_friction", "presliding_hysteresis", "position_dependent_friction", "loose_joint", "backlash")
+"""Near to friction, and so fitted to it at length; the bank asks for them, too."""
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +54,8 @@ def all_but(*names):
     ids=lambda given: next(iter(given)) if isinstance(given, dict) else "",
 )
 def test_what_is_missing_is_named_with_its_number(short, concealed, main):
-    found = found_in(short(SEED, concealed))
     ((name, values),) = concealed.items()
+    found = found_in(short(SEED, concealed), without=SLOW if name == "coulomb_friction" else ())
     assert found.verdict == "explained"
     assert [(one.effect, one.axis) for one in found.effects] == [(name, "x")]
     assert found.effects[0].parameters[main].value == pytest.approx(values[main], rel=0.01)
