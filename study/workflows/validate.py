@@ -13,8 +13,8 @@ from study.workflows.session_recognisers import SESSION_RECOGNISERS
 
 KNOWN = (
     "known are recordings and identified models (HDF5), mechanical models, protocols and import maps (TOML), "
-    "trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and version, and "
-    "session folders"
+    "trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and version, "
+    "and session folders"
 )
 
 
