@@ -103,15 +103,17 @@ def _split(model: MechanicalModel) -> _Split:
     basis = axes
     frequency = np.zeros(0)
     if inside.shape[1]:
-        stiffness, mass = inside.T @ model.stiffness @ inside, inside.T @ model.mass @ inside
-        squares, shapes = eigh((stiffness + stiffness.T) / 2, mass)
+        held, carrying = inside.T @ model.stiffness @ inside, inside.T @ model.mass @ inside
+        squares, shapes = eigh((held + held.T) / 2, carrying)
         frequency = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-        carried = -np.linalg.lstsq(stiffness, inside.T @ model.stiffness @ axes, rcond=None)[0]
+        carried = -np.linalg.lstsq(held, inside.T @ model.stiffness @ axes, rcond=None)[0]
         basis = np.hstack([axes + inside @ carried, inside @ shapes])
-    parts = [np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)]
+    mass, damping, stiffness = (
+        np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)
+    )
     # What is left between driven axes and modes in the stiffness is rounding alone.
-    parts[2][:m, m:] = parts[2][m:, :m] = 0.0
-    return _Split(*parts, np.linalg.inv(basis), frequency)
+    stiffness[:m, m:] = stiffness[m:, :m] = 0.0
+    return _Split(mass, damping, stiffness, np.linalg.inv(basis), frequency)
 
 
 def _tuned(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
