@@ -47,8 +47,9 @@ def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None
     motion is looked at; the driven axes where none are given."""
     n, m = model.coordinates, model.inputs
     axes = driven_axes(model) if ports is None else ports
-    inputs: FloatArray = np.linalg.solve(model.mass, np.hstack([model.input, axes]))
-    from_state: FloatArray = -np.linalg.solve(model.mass, np.hstack([model.stiffness, model.damping]))
+    inputs = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
+    held = np.hstack([model.stiffness, model.damping])
+    from_state = -np.asarray(np.linalg.solve(model.mass, held), dtype=np.float64)
     size, inward = 2 * n, m + axes.shape[1]
     continuous = np.zeros((size + inward, size + inward))
     continuous[:n, n:size] = np.eye(n)
