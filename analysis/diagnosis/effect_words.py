@@ -89,6 +89,10 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
 }
 
 
+OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
+"""Faults of the whole sensor or logger, which need no place where all channels share them."""
+
+
 def noun_of(effect: str) -> str:
     """What people call it; its own name with spaces where there is no word for it."""
     known = EFFECT_WORDS.get(effect)

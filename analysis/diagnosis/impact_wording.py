@@ -28,4 +28,4 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
             f"how strong they are, can: by half octaves, amplitudes are off by a factor of {without} without it and "
             f"of {with_it} with it, and chance alone makes {chance} of it"
         )
-    return f"The model lacks {named}{rest}. Its blows cannot be predicted one by one; {said}."
+    return f"Missing in the model: {named}{rest}. Its blows cannot be predicted one by one; {said}."

@@ -26,7 +26,7 @@ def entry_sentence(entry: EntryPoint | None) -> str:
         return ""
     best = entry.ranking[0]
     kind = "" if best.place == "sensor" else f" ({_FORCES if best.axis is None else _FORCE})"
-    explained = f"it accounts for {_percent(best)} of it at the median of {entry.lines} frequency lines"
+    explained = f"{_percent(best)} of it, at the median of {entry.lines} frequency lines"
     return " ".join(
         filter(None, (f"What re-tuning leaves enters as {best.name}{kind}: {explained}{_next(entry)}.", _rule(entry)))
     )

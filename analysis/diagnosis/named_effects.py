@@ -21,6 +21,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 RIVALS = 6
+_TELLING = 0.005
+"""Errors that differ by less are the same to a reader."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,18 +79,29 @@ def axis_of(claim: Claim, said: Said) -> str | None:
 def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
     contenders = found.rounds[number]
     chances = probabilities(contenders)
-    best = contenders[0]
+    best, by_name = contenders[0], _chances_of_names(contenders, chances)
     rivals: dict[str, Rival] = {}
     unit = BY_NOISE if found.statistic is None else BY_CHANCE
-    for other, chance in list(zip(contenders, chances, strict=True))[1:]:
+    for other in contenders[1:]:
         claim = other.fitted.hypothesis.claims[-1]
         if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
             continue
         same = inseparable(best, other) and not only_refines(other, best)
-        rivals[claim.effect.name] = Rival(claim.effect.name, chance, same, _why_not(best, other, same, (said, unit)))
+        rivals[claim.effect.name] = Rival(
+            claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (said, unit))
+        )
         if len(rivals) == RIVALS:
             break
-    return tuple(rivals.values()), chances[0]
+    return tuple(rivals.values()), by_name[best.fitted.hypothesis.claims[-1].effect.name]
+
+
+def _chances_of_names(contenders: Sequence[Contender], chances: Sequence[float]) -> dict[str, float]:
+    """An effect may contend several times, at other axes or from another start: the name is one."""
+    found: dict[str, float] = {}
+    for one, chance in zip(contenders, chances, strict=True):
+        name = one.fitted.hypothesis.claims[-1].effect.name
+        found[name] = min(1.0, found.get(name, 0.0) + chance)
+    return found
 
 
 def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, str]) -> str:
@@ -99,10 +112,8 @@ def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, s
     axis = axis_of(claim, said)
     where = f" ({axis})" if axis else ""
     if only_refines(other, best):
-        return (
-            f"it holds the named law and more numbers beside it{where}, which bring too little: {worst:.3g} times "
-            f"{unit} in the worst channel instead of {least:.3g}"
-        )
+        gain = "too little" if worst < (1 - _TELLING) * least else "nothing"
+        return f"it holds the named law and more numbers beside it{where}, which bring {gain}: {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
     if same:
         return f"as good{where}: it leaves {worst:.2f} times {unit} in the worst channel, the named one {least:.2f}"
     return f"at its best{where} it leaves {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"

@@ -87,6 +87,8 @@ def _corrected(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tupl
 
 
 def _says_something(region: StateRegion) -> bool:
+    if region.words.startswith("at middling"):
+        return False
     return region.by == "sign" or region.share > _CROWDED * region.occupied
 
 

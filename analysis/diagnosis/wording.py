@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
-from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words
+from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
 from analysis.diagnosis.findings import BlackBox, Findings
 from analysis.diagnosis.impact_wording import impact_sentence
 from analysis.diagnosis.plausibility import implausible_sentences
@@ -19,6 +19,8 @@ _CONFIRMED = 1.25
 
 def effect_title(effect: NamedEffect, single: bool = False) -> str:
     """ "dry friction on the x drive". single: the device has one axis."""
+    if effect.effect in OF_THE_WHOLE and effect.axis is None:
+        return noun_of(effect.effect)
     return f"{noun_of(effect.effect)} {place_words(effect.place, effect.axis, single)}"
 
 
@@ -41,10 +43,10 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), si
             f"{capital(_fall(errors, ('before', 'as given'), ('retuned', 're-tuned')))}."
         )
     if diagnosis.verdict == "explained":
-        return f"The model lacks {named}. {capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}."
+        return f"Missing in the model: {named}. {capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}."
     if diagnosis.verdict == "partly_explained":
         return (
-            f"The model lacks {named}, but that is not all. "
+            f"Missing in the model: {named}, but that is not all. "
             f"{capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}, and a mismatch remains."
         )
     return (

@@ -40,7 +40,7 @@ def test_distortion_is_told_per_channel_and_level(friction_found):
 def test_the_entry_is_said_with_what_comes_next():
     assert entry_sentence(EntryPoint((ALONG_X, ALONG_ALL, OF_AX), MOVED, 1200)) == (
         "What re-tuning leaves enters as a force along x (the drive, the mechanism and a hand all push there, and "
-        "these channels cannot tell which does): it accounts for 90 % of it at the median of 1200 frequency lines; "
+        "these channels cannot tell which does): 90 % of it, at the median of 1200 frequency lines; "
         "next comes an error of the ax channel with 40 % (p < 0.0001 that it is as good). The position shows it, too: "
         "the device itself moves otherwise, and no sensor of the response is at fault."
     )
@@ -52,7 +52,7 @@ def test_the_entry_is_said_with_what_comes_next():
 
 def test_a_sensor_is_said_to_be_one():
     said = entry_sentence(EntryPoint((OF_AX, ALONG_X), AT_SENSOR, 60))
-    assert said.startswith("What re-tuning leaves enters as an error of the ax channel: it accounts for 40 %")
+    assert said.startswith("What re-tuning leaves enters as an error of the ax channel: 40 % of it")
     assert said.endswith("the fault is in how the response is measured, not in how the device moves.")
 
 

@@ -108,14 +108,14 @@ def test_a_share_of_samples_is_read_as_per_cent():
 
 def test_the_verdict_names_what_is_missing_and_what_it_brings():
     assert verdict_sentence(diagnosis("explained", (DRY,))) == (
-        "The model lacks dry friction on the x drive. The error on held-out data falls from 36 % of the signal "
+        "Missing in the model: dry friction on the x drive. The error on held-out data falls from 36 % of the signal "
         "(re-tuned without it) to 2.66 % (with it), 1.00 times what noise alone would leave (2.65 %)."
     )
 
 
 def test_the_verdict_says_where_more_is_missing():
     said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)))
-    assert said.startswith("The model lacks dry friction on the x drive, but that is not all.")
+    assert said.startswith("Missing in the model: dry friction on the x drive, but that is not all.")
     assert said.endswith("and a mismatch remains.")
 
 
@@ -237,3 +237,11 @@ def test_a_relative_change_is_read_as_per_cent():
 
 def test_the_title_of_an_effect_stands_alone():
     assert effect_title(DRY) == "dry friction on the x drive"
+
+
+def test_faults_of_a_whole_sensor_need_no_place():
+    turned = NamedEffect("sensor_misalignment", "sensor", None, 1.0, 0.98, {"degrees": Estimate(8.7, "deg")})
+    assert effect_title(turned) == "a turned sensor"
+    assert effect_title(replace(turned, effect="sensor_gain", parameters={"gain": Estimate(1.1, "1")})) == (
+        "a wrong sensor gain in all channels"
+    )

@@ -57,7 +57,7 @@ def test_the_verdict_comes_first_then_the_map_then_a_section_per_effect(page):
         "What else was tried", "How well it predicts", "What is still unexplained", "The model's own numbers",
         "A black box beside it", "The next recording", "Remarks", "How this was done", "Where this comes from",
     ]  # fmt: skip
-    assert page[0].index("The model lacks dry friction on the x drive. The error") < page[0].index("<h2")
+    assert page[0].index("Missing in the model: dry friction on the x drive. The error") < page[0].index("<h2")
 
 
 def test_an_effect_has_its_equation_source_numbers_figure_and_rivals(page):
@@ -167,7 +167,7 @@ def test_the_method_says_how_the_time_was_split_and_the_noise_found(friction_fou
 
 def test_the_summary_begins_with_the_verdict_and_ends_with_the_remarks(friction_found):
     lines = summary_lines(friction_found)
-    assert lines[0].startswith("The model lacks dry friction on the x drive.")
+    assert lines[0].startswith("Missing in the model: dry friction on the x drive.")
     assert lines[1].startswith("Dry friction on the x drive, 0.")
     assert lines[-1] == "A remark."
 

@@ -42,7 +42,7 @@ def given(files, out, *more):
 def test_friction_is_named_on_stdout_and_the_folder_is_written(run, files, tmp_path):
     code, out, err = run(*given(files, tmp_path / "out"))
     assert (code, err) == (0, "")
-    assert out.startswith("The model lacks dry friction on the x drive.")
+    assert out.startswith("Missing in the model: dry friction on the x drive.")
     assert f"Report: {tmp_path / 'out' / 'report.html'}" in out
     assert (tmp_path / "out" / "improved.toml").is_file()
 

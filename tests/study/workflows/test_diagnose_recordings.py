@@ -104,7 +104,7 @@ def test_it_knows_where_it_comes_from(done):
 
 def test_the_summary_begins_with_the_verdict_and_ends_with_the_files(done):
     lines = diagnosed_lines(done)
-    assert lines[0].startswith("The model lacks dry friction on the x drive.")
+    assert lines[0].startswith("Missing in the model: dry friction on the x drive.")
     assert lines[-2:] == (f"Report: {done.out}/report.html", f"Improved model: {done.out}/improved.toml")
     assert any(line.startswith("  held out  as given") for line in lines)
     document = summary(done)

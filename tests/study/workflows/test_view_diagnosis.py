@@ -42,7 +42,7 @@ def view(tmp_path):
 
 
 def test_each_effect_is_a_sentence_with_its_interval(view):
-    assert view.verdict.startswith("The model lacks dry friction on the x drive, but that is not all.")
+    assert view.verdict.startswith("Missing in the model: dry friction on the x drive, but that is not all.")
     assert view.sentences[0].startswith("Dry friction on the x drive, 0.21")
     assert view.sentences[0].endswith("It explains 90 % of the mismatch left after re-tuning (probability 0.97).")
 
