@@ -22,8 +22,15 @@ FRICTION = {"coulomb_friction": {"level": 0.1}}
 SATURATION = {"force_saturation": {"limit": 2.1}}
 AMONG = ("coulomb_friction", "viscous_damping", "hardening_stiffness", "force_gain", "constant_force")
 """Where not the whole catalogue is asked, for the time that it takes."""
-SLOW = ("stribeck_friction", "presliding_hysteresis", "position_dependent_friction", "loose_joint", "backlash")
-"""Near to friction, and so fitted to it at length; the bank asks for them, too."""
+SLOW = (
+    "stribeck_friction",
+    "presliding_hysteresis",
+    "position_dependent_friction",
+    "loose_joint",
+    "backlash",
+    "end_stop",
+)
+"""Fitted at length where something rubs; the bank asks for them, too."""
 
 
 @pytest.fixture(scope="module")
