@@ -37,7 +37,11 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), si
     if diagnosis.verdict == "no_mismatch":
         return f"The model answers as the device does: {_one_error('as it was given', errors.before, errors)}."
     if diagnosis.verdict == "parameters":
-        off = f": {listed([one.text for one in moved])}" if moved else ""
+        off = (
+            f": {listed([one.text for one in moved])}"
+            if moved
+            else ", each within its calibration's standard deviation"
+        )
         return (
             f"No physics is missing; numbers of the model are off{off}. "
             f"{capital(_fall(errors, ('before', 'as given'), ('retuned', 're-tuned')))}."

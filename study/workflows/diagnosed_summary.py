@@ -20,16 +20,17 @@ def diagnosed_lines(done: DiagnosedRecordings) -> tuple[str, ...]:
         *summary_lines(done.findings),
         "",
         f"Errors, normalised over the channels, measured by {found.error}:",
-        _errors("fitted", found.fit.fit),
-        _errors("held out", found.fit.test),
+        _errors("fitted", found.fit.fit, bool(found.effects)),
+        _errors("held out", found.fit.test, bool(found.effects)),
         "",
         f"Report: {done.out / PAGE_NAME}",
         f"Improved model: {done.out / MODEL_NAME}",
     )
 
 
-def _errors(which: str, errors: Errors) -> str:
+def _errors(which: str, errors: Errors, named: bool) -> str:
+    after = f", with the effects {error_text(errors.after)}" if named else ""
     return (
-        f"  {which:<9} as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}, "
-        f"with the effects {error_text(errors.after)}; noise alone {error_text(errors.noise)}"
+        f"  {which:<9} as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}"
+        f"{after}; noise alone {error_text(errors.noise)}"
     )

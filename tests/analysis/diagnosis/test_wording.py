@@ -245,3 +245,10 @@ def test_faults_of_a_whole_sensor_need_no_place():
     assert effect_title(replace(turned, effect="sensor_gain", parameters={"gain": Estimate(1.1, "1")})) == (
         "a wrong sensor gain in all channels"
     )
+
+
+def test_numbers_that_are_off_by_little_are_said_to_be():
+    said = verdict_sentence(diagnosis("parameters"))
+    assert said.startswith(
+        "No physics is missing; numbers of the model are off, each within its calibration's standard deviation. The"
+    )
