@@ -20,6 +20,12 @@ MOVES, WIDEST = (0.02, 0.2), 12.0
 """Least and most that a logarithm is moved by; and so many times its usual move."""
 LONGEST_STEP = 0.5
 """Of a logarithm, and so many moves of what has either sign."""
+MOST_BY_CHANCE = 0.8
+"""Of what columns seem to know, the largest share that is taken for chance."""
+LEAST_KNOWN = 1e-6
+"""Information on a combination of numbers that nothing moves."""
+SHARES = (1.0, 0.3)
+"""Of a step that are tried."""
 FLOOR = 0.04
 """Of the logarithm of an amplitude: no simulation foresees it better."""
 TRUSTED = 2.0
@@ -130,10 +136,28 @@ def _stepped(view: View, at: Foreseen) -> Foreseen:
     products += 1e-9 * np.diag(np.maximum(np.diagonal(products), 1e-9))
     low, high = _reach(at, t)
     step = bounded_step(products, pull, low, high)
-    deviations = at.deviations + step[:t] if t else at.deviations
-    there = foreseen(view, deviations, replace(at.hypothesis, point=at.hypothesis.point + step[t:]))
-    spread = np.linalg.inv(products) * max(at.cost, 1.0)
-    return replace(there, errors=np.sqrt(np.diagonal(spread))[t:])
+    there = at
+    for share in SHARES:
+        deviations = at.deviations + share * step[:t] if t else at.deviations
+        there = foreseen(view, deviations, replace(at.hypothesis, point=at.hypothesis.point + share * step[t:]))
+        if there.cost < at.cost:
+            break
+    return replace(there, errors=_errors(view, at, products))
+
+
+def _errors(view: View, at: Foreseen, products: FloatArray) -> FloatArray:
+    """(numbers,): standard errors, by the information that is left without what chance put into the columns."""
+    numbers = at.hypothesis.numbers
+    first = len(products) - len(numbers)
+    chance = _weighed(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
+    information = products.copy()
+    for k, one in enumerate(numbers, start=first):
+        by_chance = float(chance @ chance) / (2 * _move(one) ** 2)
+        information[k, k] -= min(by_chance, MOST_BY_CHANCE * products[k, k])
+    values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_KNOWN))
+    spread = (vectors**2 / values).sum(axis=1) * max(at.cost, 1.0)
+    return np.asarray(np.sqrt(spread[first:]))
 
 
 def _reach(at: Foreseen, t: int) -> tuple[FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ from analysis.diagnosis.output_error import evaluated
 from analysis.diagnosis.rivalry import Arena, Contender
 from analysis.diagnosis.shaken_axis import shaken_along
 from analysis.diagnosis.standing import Standing
-from equalizer.effects.effect import Effect
+from equalizer.effects.effect import Effect, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
@@ -36,6 +36,8 @@ CALM = 0.01
 TAKEN, NEAR = 0.6, 3.0
 """Least share of the linear model's misfit that is taken away, and most times chance that is left, on average over the
 channels, of what is chosen by and of what was sealed."""
+WIDTHS = np.geomspace(0.02, 5.0, 13)
+"""Of a gap, over that which is guessed."""
 FIRST_ROUNDS, ROUNDS = 5, 3
 RIVAL = "loose_joint"
 
@@ -70,9 +72,13 @@ def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
     assert isinstance(measure, FreeSimulation)
     near = View(BandPower(shaken_along(measure, claim.sites[0])), view.tuning, view.map_)
     given = np.zeros(len(view.tuning.names))
-    tried = [
-        foreseen(near, given, claimed(claim, [values])) for values in claim.effect.starts(evidence, claim.sites[0])
-    ]
+    starts = claim.effect.starts(evidence, claim.sites[0])[:1]
+    net = [{**values, "gap": float(wide * values["gap"])} for values in starts for wide in WIDTHS]
+
+    def at(values: Values) -> Foreseen:
+        return foreseen(near, given, claimed(claim, [values]))
+
+    tried: list[Foreseen] = list(near.map_(at, net))  # type: ignore[arg-type]
     best = fitted(near, min(tried, key=lambda one: one.cost), FIRST_ROUNDS) if tried else None
     return foreseen(view, given, NOTHING if best is None else best.hypothesis)
 
