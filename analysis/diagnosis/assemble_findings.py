@@ -68,11 +68,17 @@ def assembled(
         floor=floors[0],
         tuning=tuning,
         axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
-        split_s={
-            part: sum(int(getattr(r, part).sum()) for r in measure.records) / recording.sample_rate_hz
-            for part in ("fit", "choose", "test")
-        },
+        split_s=_split_s(measure),
     )
+
+
+def _split_s(measure: ErrorMeasure) -> dict[str, float]:
+    """Seconds to fit, to choose and to test by."""
+    rate_hz = measure.records[0].recording.sample_rate_hz
+    return {
+        part: sum(int(getattr(record, part).sum()) for record in measure.records) / rate_hz
+        for part in ("fit", "choose", "test")
+    }
 
 
 def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps, local: Localisation) -> Diagnosis:
