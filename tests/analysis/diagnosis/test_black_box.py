@@ -73,15 +73,3 @@ def test_without_sealed_samples_there_is_nothing_to_compare_on(arena_of):
     retuned = arena.contender(bare)
     assert black_box(arena.measure, retuned, 3, 0.1) is None
     assert black_box(arena.whole, replace(retuned), 3, None) is None
-
-
-def test_commands_that_are_never_played_together_where_it_is_fitted_do_not_break_it(arena_of):
-    arena = arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),), axes=2)
-    record = arena.whole.records[0]
-    command = record.command.copy()
-    command[record.test] += 1.0
-    whole = arena.whole.with_records((replace(record, command=command),))
-    bare = evaluated(arena.whole, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
-    box = black_box(whole, arena.confirmed(arena.contender(bare)), 2, 0.02)
-    assert np.isfinite(box.test)
-    assert box.test < 10
