@@ -12,6 +12,8 @@ from equalizer.signals.signal import FloatArray
 
 SELDOM = (0.3, 0.5, 0.75)
 """Of the command's fastest change."""
+ERRS = 1.05
+"""Times its noise that a channel must err by for a guess to be tried."""
 
 
 def _followed(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
@@ -43,8 +45,16 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         True,
     )
     likeliest = () if rate is None else ({"rate": rate},)
+    if not _unexplained(evidence):
+        return likeliest
     # Seldom exceeded, a limit hides in what re-tuning did: then it must be tried.
     return likeliest + tuple({"rate": share * fastest} for share in (SELDOM if axis == ALL_SITES else SELDOM[1:2]))
+
+
+def _unexplained(evidence: Evidence) -> bool:
+    """Whether any channel errs by more than its noise."""
+    left = (evidence.response - evidence.predicted)[evidence.used > 0]
+    return bool((np.sqrt(np.nanmean(left**2, axis=0)) > ERRS * evidence.noise).any())
 
 
 EFFECT = Effect(
