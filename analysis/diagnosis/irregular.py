@@ -18,8 +18,10 @@ PEAKED = 10.0
 def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
     if any(one.how == "repeats" for one in floors):
         return any(_varies(channel) for one in floors for channel in (one.response, one.position) if channel)
-    masks = [record.fit | record.choose for record in arena.measure.records]
-    left = np.vstack([row[mask] for row, mask in zip(found.retuned.fitted.residuals, masks, strict=False)])
+    masks = [record.fit | record.choose for record in arena.whole.records]
+    left = np.vstack([row[mask] for row, mask in zip(found.retuned.fitted.residuals, masks, strict=True)])
+    if not len(left):
+        return False
     left = left - left.mean(axis=0)
     power = np.mean(left**2, axis=0)
     return bool(np.any(np.mean(left**4, axis=0) > PEAKED * np.maximum(power, np.finfo(float).tiny) ** 2))

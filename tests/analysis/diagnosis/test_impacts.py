@@ -39,7 +39,8 @@ def searched(real, effects, repeats=True):
     chosen = measure_of([recording], real.device(2))
     arena = Arena(chosen.measure.shortened(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
     given = arena.contender(evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
-    return arena, Explanation(given, given, given, (), ()), chosen.floors
+    whole = arena.confirmed(given)  # as a search hands it over: with the sealed samples
+    return arena, Explanation(whole, whole, whole, (), ()), chosen.floors
 
 
 @pytest.fixture(scope="module")
