@@ -127,7 +127,9 @@ def _stepped(view: View, at: Foreseen) -> Foreseen:
     known = [_weighed(view, column) for column in (() if view.by_deviations is None else view.by_deviations)]
     columns = np.vstack([*known, *own])
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
-    believed = columns * np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
+    trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
+    # Of the model's own numbers little is left to learn; where they leave much, something else is missing.
+    believed = columns * (trust**3 if t else trust)
     pull = believed @ off
     products = believed @ columns.T
     if t:
