@@ -117,9 +117,9 @@ def test_a_diagnosis_is_shown_in_words(run, tmp_path):
     path.write_text(json.dumps(document))
     code, out, _ = run("show", path)
     assert code == 0
-    assert out.startswith("Model and device agree")
+    assert out.startswith("The model answers as the device does")
     assert "repeats allow" in out
-    assert json.loads(run("show", path, "--json")[1])["verdict"].startswith("Model and device agree")
+    assert json.loads(run("show", path, "--json")[1])["verdict"].startswith("The model answers as the device does")
 
 
 def test_a_file_that_is_no_diagnosis_is_an_error_with_words(run, tmp_path):
