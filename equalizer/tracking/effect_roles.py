@@ -18,7 +18,6 @@ LEFT_ALONE = {
     "backlash": "no force jumps a gap",
     "loose_joint": "no force jumps a gap",
     "body_on_actuator": IN_MODEL,
-    "position_dependent_friction": "where along the way it rubs how much is not known ahead of time",
     "end_stop": "a motion that reaches a stop should be made smaller",
     "pose_dependent_inertia": "take a model identified at the place; over a vibration the inertia stays the same",
     "time_varying_grip": "nobody knows the grip ahead of time",

@@ -31,6 +31,11 @@ def _asymmetric_friction(of: Mapping[str, float], x: FloatArray, v: FloatArray, 
     return np.where(v > 0, of["level_positive"], of["level_negative"]) * _sign(v, slip)
 
 
+def _along_the_way(of: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    level = of["level"] * (1 + of["slope_per_m"] * x + of["bend_per_m2"] * x**2)
+    return np.asarray(np.maximum(level, 0.0) * _sign(v, slip))
+
+
 def _stribeck(of: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
     level = of["coulomb"] + (of["static"] - of["coulomb"]) * np.exp(-((v / of["speed"]) ** 2))
     return np.asarray(level * _sign(v, slip))
@@ -60,6 +65,7 @@ def _asymmetric_stiffness(of: Mapping[str, float], x: FloatArray, v: FloatArray,
 LAWS: dict[str, Law] = {
     "coulomb_friction": _coulomb,
     "asymmetric_friction": _asymmetric_friction,
+    "position_dependent_friction": _along_the_way,
     "stribeck_friction": _stribeck,
     "presliding_hysteresis": _presliding,
     "quadratic_damping": _quadratic_damping,

@@ -242,6 +242,10 @@ def test_other_frictions_have_their_shape():
     humped = LAWS["stribeck_friction"]({"coulomb": 0.1, "static": 0.2, "speed": 0.005}, 0 * v, v, 1e-5)
     assert humped[2] == pytest.approx(0.1 + 0.1 * np.exp(-0.04))
     assert humped[3] == pytest.approx(0.1)
+    x = np.array([0.0, 0.01, -0.01, 0.03])
+    along = {"level": 0.1, "slope_per_m": 20.0, "bend_per_m2": -1e3}
+    uneven = LAWS["position_dependent_friction"](along, x, np.full(4, 0.1), 1e-5)
+    np.testing.assert_allclose(uneven, [0.1, 0.11, 0.07, 0.07])
 
 
 def test_a_dead_band_wider_than_the_amplitude_lets_nothing_through():
