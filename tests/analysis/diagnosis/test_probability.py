@@ -5,22 +5,32 @@ import pytest
 from analysis.diagnosis.probability import ELSEWHERE, probabilities
 
 
+def test_nobody_is_likely_among_nobody():
+    assert probabilities(()) == ()
+
+
 def test_what_stands_alone_is_likely_but_not_certain(standing_at):
-    assert probabilities([standing_at(1.0)]) == pytest.approx([1 - ELSEWHERE])
+    assert probabilities([standing_at(1.0, "force_gain")]) == pytest.approx([1 - ELSEWHERE])
 
 
 def test_the_better_one_is_the_likelier_one(standing_at):
-    chances = probabilities([standing_at(1.0), standing_at(1.0005), standing_at(1.5)])
+    names = ("force_gain", "added_mass", "coulomb_friction")
+    chances = probabilities([standing_at(*one) for one in zip((1.0, 1.0005, 1.5), names, strict=True)])
     assert chances[0] > chances[1] > chances[2]
     assert chances[2] < 1e-6
     assert sum(chances) == pytest.approx(1 - ELSEWHERE)
 
 
 def test_equals_share(standing_at):
-    one, other = probabilities([standing_at(2.0), standing_at(2.0)])
+    one, other = probabilities([standing_at(2.0, "force_gain"), standing_at(2.0, "added_mass")])
     assert one == pytest.approx(other) == pytest.approx((1 - ELSEWHERE) / 2)
 
 
-def test_what_is_chosen_by_plainness_is_not_likelier_for_standing_first(standing_at):
-    first, second = probabilities([standing_at(1.001), standing_at(1.0)])
-    assert first < second
+def test_what_is_preferred_for_its_plainness_is_no_less_likely_than_what_errs_a_little_less(standing_at):
+    first, second = probabilities([standing_at(1.0004, "force_gain"), standing_at(1.0, "added_mass")])
+    assert first == pytest.approx(second)
+
+
+def test_what_only_refines_the_named_law_takes_nothing_from_it(standing_at):
+    rubs, richer = standing_at(1.0004, "coulomb_friction"), standing_at(1.0, "stribeck_friction")
+    assert probabilities([rubs, richer]) == pytest.approx([1 - ELSEWHERE, 0.0])
