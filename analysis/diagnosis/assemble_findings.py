@@ -13,6 +13,7 @@ from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.findings import Course, Findings, Signature
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import without_claim
+from analysis.diagnosis.impact_remainder import impact_remainder
 from analysis.diagnosis.intervals import standard_errors
 from analysis.diagnosis.localisation import Localisation, localised
 from analysis.diagnosis.mismatch_maps import Maps, maps_of, whole_mismatch
@@ -92,7 +93,9 @@ def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps, l
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
-        else mismatch_rows(maps.cells["after"], local.states["after"]) or whole_mismatch(measure, found.after),
+        else impact_remainder(measure, found)
+        or mismatch_rows(maps.cells["after"], local.states["after"])
+        or whole_mismatch(measure, found.after),
         fit=errors_of(measure, found),
         error=measure.name,
         next_experiment=proposed_experiment(arena, found)

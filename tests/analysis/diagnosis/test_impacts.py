@@ -11,10 +11,12 @@ from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.hypothesis import NOTHING
+from analysis.diagnosis.impact_remainder import impact_remainder
 from analysis.diagnosis.impacts import rattling
 from analysis.diagnosis.irregular import irregular
 from analysis.diagnosis.output_error import evaluated
 from analysis.diagnosis.rivalry import Arena
+from analysis.diagnosis.standing import Standing
 from analysis.diagnosis.tuning import tuning_of
 from analysis.diagnosis.verdict import judge
 from analysis.diagnosis.wording import summary_lines
@@ -22,6 +24,7 @@ from equalizer.effects.backlash import EFFECT as PLAY
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect
+from study.challenge.draw_case import draw_case
 
 GAP_M, AXIS = 5e-5, 1
 LOOSE = (
@@ -82,6 +85,15 @@ def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sa
     assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
 
 
+def test_what_is_left_is_said_by_channel_and_not_by_the_course_of_blows(loose, told):
+    assert impact_remainder(loose[0].whole, told) == ()
+    further = replace(told, after=replace(told.after, standing=Standing(*np.array([[1, 4, 1, 1.0]] * 3))))
+    (left,) = impact_remainder(loose[0].whole, further)
+    assert (left.output, left.band_hz) == ("ay", (0.0, 500.0))
+    assert left.share == pytest.approx(4 * told.statistic.chance[1])
+    assert judge(further).verdict == "partly_explained"
+
+
 def test_a_device_that_repeats_is_left_alone(diagnosed):
     rubs = searched(diagnosed, (PlacedEffect(DRY, (0,), {"level": 0.2}),))
     assert not irregular(*rubs)
@@ -111,3 +123,23 @@ def test_the_whole_diagnosis_says_what_was_compared(diagnosed):
     lines = " ".join(summary_lines(found))
     assert "Its blows cannot be predicted one by one" in lines
     assert "the power of each channel in each half octave" in lines
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [9002, 9003, 9005])
+def test_play_in_a_simulated_bench_is_named_with_its_gap(seed):
+    case = draw_case(seed, ["backlash"])
+    found = diagnose([case.recording], case.model, DiagnosisSettings(), map, lambda said, share: None)
+    (effect,) = found.diagnosis.effects
+    (truth,) = case.truth
+    assert (effect.effect, effect.axis) == ("backlash", truth.axis)
+    assert effect.parameters["gap"].value == pytest.approx(truth.values["gap"], rel=0.06)
+    assert found.diagnosis.verdict == "explained"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decoy", ["creep", "stiffness_in_time", "crossed_axes", "bending_sensor", "force_hysteresis"])
+def test_what_is_no_play_is_not_taken_for_it(decoy):
+    case = draw_case(9102, [decoy])
+    found = diagnose([case.recording], case.model, DiagnosisSettings(), map, lambda said, share: None)
+    assert "backlash" not in found.diagnosis.returned_set
