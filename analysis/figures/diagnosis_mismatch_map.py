@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from analysis.diagnosis.mismatch_cells import MismatchCell
 from analysis.figures.diagnosis_style import STAGES, Stage
@@ -22,6 +21,10 @@ _MOST_LEVELS = 4
 _NUMBERED = 1.15
 """Below it a cell is as good as noise and stays bare."""
 _SQUARE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
+_UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+_WIDTH_IN = 8.8
+_FINE, _GAP = 4, 0.25
+"""Points per cell, along each side, and cells between panels: a whole number of points."""
 _NUMBERS_FIT = 10
 """Columns of a panel up to which a number can be read in each cell."""
 
@@ -34,6 +37,10 @@ class _Layout:
     levels: tuple[float, ...]
     bands: tuple[tuple[float, float], ...]
     channels: tuple[tuple[str, str], ...]
+
+    def corner(self, row: int, column: int) -> FloatArray:
+        """(2,): x and y of a panel's first cell, in cells."""
+        return np.array([column * (len(self.bands) + _GAP), row * (len(self.channels) + _GAP)])
 
 
 def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
@@ -58,58 +65,95 @@ def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
 
 
 def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
-    """One row of panels per level, one column per stage."""
+    """One row of panels per level, one column per stage; all in one pair of axes, for a pair each takes seconds."""
     layout = _layout(maps, input_)
     if not layout.stages or not layout.bands:
         return say_nothing_to_draw(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
-    rows, columns = len(layout.levels), len(layout.stages)
-    figure = new_figure(8.8, 0.9 + rows * (0.2 + 0.25 * len(layout.channels)))
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    image = None
-    for row, level in enumerate(layout.levels):
-        for column, stage in enumerate(layout.stages):
-            cells = [one for one in maps[stage.name] if one.input == input_ and _level(layout, one) == level]
-            image = _draw_panel(grid[row][column], cells, layout)
-            if row == 0:
-                grid[row][column].set_title(stage.words, fontsize=10, loc="left", pad=4)
-        if level:
-            grid[row][0].set_ylabel(f"at {level:.3g} {unit}", fontsize=10)
-    assert image is not None
-    bar = figure.colorbar(image, ax=grid.ravel().tolist(), location="right", shrink=0.9, pad=0.01, aspect=30)
+    figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (0.2 + 0.25 * len(layout.channels)))
+    axes, beside = _placed_axes(figure, layout)
+    table, frames = _filled(maps, input_, layout)
+    panels = [layout.corner(row, column) for row, column in np.ndindex(len(layout.levels), len(layout.stages))]
+    size = np.array([len(layout.bands), len(layout.channels)])
+    corners = [(panel - 0.5) + _UNIT * size for panel in panels]
+    for order, face, edge in ((0, "#F2F2F2", "none"), (2, "none", GREY)):
+        axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=order))
+    height, width = table.shape
+    extent = (-0.5, width / _FINE - 0.5, height / _FINE - 0.5, -0.5)
+    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, _LOUDEST), aspect="auto",
+                        interpolation="nearest", extent=extent)  # fmt: skip
+    axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
+    if len(layout.bands) <= _NUMBERS_FIT:
+        _write_numbers(axes, table, panels, layout)
+    _label(axes, layout, unit)
+    bar = figure.colorbar(image, cax=beside)
     bar.set_ticks([1, 3, 10, 30, 100, 300], labels=["1", "3", "10", "30", "100", "≥ 300"])
     bar.minorticks_off()
     bar.set_label("residual / noise", fontsize=9)
-    bar.ax.tick_params(labelsize=8)
-    figure.supxlabel("Octave from (Hz)", fontsize=9.5)
+    beside.tick_params(labelsize=8)
     return figure
 
 
-def _draw_panel(axes: Axes, cells: Sequence[MismatchCell], layout: _Layout) -> AxesImage:
-    table = np.full((len(layout.channels), len(layout.bands)), np.nan)
+def _placed_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
+    """The map and the bar of its colours. What stands around them is known, and need not be measured."""
+    figure.set_layout_engine("none")
+    width, height = figure.get_size_inches()
+    longest = max(len(_channel(one, layout)) for one in layout.channels)
+    left = (0.33 if any(layout.levels) else 0.1) + 0.075 * longest
+    bottom, top, right = 0.5 / height, 1 - 0.26 / height, 1 - 1.0 / width
+    axes = figure.add_axes((left / width, bottom, right - left / width, top - bottom))
+    beside = figure.add_axes((right + 0.09 / width, bottom + 0.05 * (top - bottom), 0.22 / width, 0.9 * (top - bottom)))
+    return axes, beside
+
+
+def _filled(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, list[FloatArray]]:
+    """Residual over noise, _FINE squared points to a cell, NaN between panels and where nothing was driven; and the
+    frames of what is significant."""
+    rows, columns = len(layout.levels), len(layout.stages)
+    last = layout.corner(rows - 1, columns - 1)
+    size = last[1] + len(layout.channels), last[0] + len(layout.bands)
+    table = np.full([round(_FINE * cells) for cells in size], np.nan)
     frames: list[FloatArray] = []
-    for cell in cells:
-        at = layout.channels.index((cell.output, cell.quantity)), layout.bands.index(cell.band_hz)
-        table[at] = np.nanmax([table[at], cell.in_noise])
-        if cell.significant:
-            frames.append(np.array(_SQUARE) + np.array([at[1], at[0]]))
-    # One collection, for a patch per cell takes seconds to draw.
-    axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
-    axes.set_facecolor("#F2F2F2")
-    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, _LOUDEST), aspect="auto")
-    if len(layout.bands) <= _NUMBERS_FIT:
-        for (row, column), value in np.ndenumerate(table):
+    for column, stage in enumerate(layout.stages):
+        for cell in (one for one in maps[stage.name] if one.input == input_):
+            corner = layout.corner(_level(layout, cell), column)
+            within = layout.bands.index(cell.band_hz), layout.channels.index((cell.output, cell.quantity))
+            x, y = (round(_FINE * at) for at in corner + within)
+            part = table[y : y + _FINE, x : x + _FINE]
+            part[:] = np.fmax(part, cell.in_noise)
+            if cell.significant:
+                frames.append(np.array(_SQUARE) + corner + within)
+    return table, frames
+
+
+def _write_numbers(axes: Axes, table: FloatArray, panels: Sequence[FloatArray], layout: _Layout) -> None:
+    for corner in panels:
+        for row, column in np.ndindex(len(layout.channels), len(layout.bands)):
+            x, y = float(corner[0]) + column, float(corner[1]) + row
+            value = table[round(_FINE * y), round(_FINE * x)]
             if value >= _NUMBERED:
                 colour = "white" if value > 35 else BLACK
-                text = axes.text(column, row, _short(value), ha="center", va="center", fontsize=6.2, color=colour)
-                # Hundreds of them, all inside the panel: the layout need not measure each.
-                text.set_in_layout(False)
-    axes.set_xticks(range(len(layout.bands)), [f"{low:g}" for low, _ in layout.bands], fontsize=7.5)
-    axes.set_yticks(range(len(layout.channels)), [_channel(one, layout) for one in layout.channels], fontsize=8.5)
+                axes.text(x, y, _short(value), ha="center", va="center", fontsize=6.2, color=colour)
+
+
+def _label(axes: Axes, layout: _Layout, unit: str) -> None:
+    stages, levels = range(len(layout.stages)), range(len(layout.levels))
+    xs = [layout.corner(0, column)[0] + band for column in stages for band in range(len(layout.bands))]
+    ys = [layout.corner(row, 0)[1] + channel for row in levels for channel in range(len(layout.channels))]
+    axes.set_xticks(xs, [f"{low:g}" for low, _ in layout.bands] * len(stages), fontsize=7.5)
+    axes.set_yticks(ys, [_channel(one, layout) for one in layout.channels] * len(levels), fontsize=8.5)
     axes.tick_params(length=0)
-    for spine in axes.spines.values():
-        spine.set_color(GREY)
-        spine.set_linewidth(0.5)
-    return image
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("Octave from (Hz)", fontsize=9.5)
+    for column in stages:
+        axes.annotate(layout.stages[column].words, (float(layout.corner(0, column)[0]) - 0.5, -0.5), xytext=(0, 4),
+                      textcoords="offset points", fontsize=10)  # fmt: skip
+    middle = (len(layout.channels) - 1) / 2
+    for row in levels:
+        if layout.levels[row]:
+            axes.annotate(
+                f"at {layout.levels[row]:.3g} {unit}", (0.02, layout.corner(row, 0)[1] + middle),
+                xycoords=("figure fraction", "data"), rotation="vertical", ha="center", va="center", fontsize=10,
+            )  # fmt: skip
 
 
 def _layout(maps: Maps, input_: str) -> _Layout:
@@ -124,9 +168,9 @@ def _layout(maps: Maps, input_: str) -> _Layout:
     )
 
 
-def _level(layout: _Layout, cell: MismatchCell) -> float:
-    """The group's highest level stands for the group."""
-    return next(level for level in layout.levels if cell.amplitude <= level)
+def _level(layout: _Layout, cell: MismatchCell) -> int:
+    """Number of its group, for which the group's highest level stands."""
+    return next(row for row, level in enumerate(layout.levels) if cell.amplitude <= level)
 
 
 def _channel(channel: tuple[str, str], layout: _Layout) -> str:

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from analysis.diagnosis.remainder_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import written
-from analysis.figures.diagnosis_style import AFTER, RETUNED
+from analysis.figures.diagnosis_style import AFTER, RETUNED, power_of_ten
 from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, new_figure, plain_axes, say_nothing_to_draw
 
@@ -56,9 +56,11 @@ def _draw_panel(axes: Axes, one: RemainderSpectrum) -> None:
         axes.loglog(one.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
     axes.set_title(f"{one.channel} ({written(one.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    # Minor ticks are half of the time that it takes to draw.
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.tick_params(labelsize=8)
 
 

@@ -32,6 +32,8 @@ AFTER = Stage("after", "with what was found", BLUE, "-", 1.4)
 _STEPS = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
 """Decades up to which an axis is divided so finely, and how."""
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 STAGES = (BEFORE, RETUNED, AFTER)
 MEASURED = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
 
@@ -45,3 +47,8 @@ def ratio_ticks(axis: Axis, low: float, high: float) -> None:
     shown = [value for value in values if low <= value <= high]
     axis.set_ticks(shown, labels=[f"{value:.10g}" for value in shown])
     axis.set_ticks([], minor=True)
+
+
+def power_of_ten(value: float) -> str:
+    """0.001 as "10⁻³": written out, because formulas take matplotlib a second."""
+    return "10" + f"{np.log10(value):.0f}".translate(_RAISED) if value > 0 else ""

@@ -3,6 +3,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.text import Annotation
 
 from analysis.diagnosis.mismatch_cells import MismatchCell
 from analysis.diagnosis.remainder_spectrum import remainder_spectra
@@ -11,7 +14,7 @@ from analysis.figures.diagnosis_mismatch_map import draw_mismatch_map, mismatch_
 from analysis.figures.diagnosis_remainder import draw_remainder
 from analysis.figures.diagnosis_rivals import draw_rivals, rivals_pictures, tried_explanations
 from analysis.figures.diagnosis_signature import draw_signature
-from analysis.figures.diagnosis_style import ratio_ticks
+from analysis.figures.diagnosis_style import power_of_ten, ratio_ticks
 from analysis.figures.picture import picture_svg
 from analysis.figures.style import new_figure
 
@@ -38,13 +41,50 @@ def test_a_diagnosis_has_every_picture_and_each_is_told_in_words(friction_pictur
         assert told[labels[1]] == picture.alternative
 
 
+def cells_written(axes):
+    return [text.get_text() for text in axes.texts if not isinstance(text, Annotation)]
+
+
+def around(axes):
+    return [text.get_text() for text in axes.texts if isinstance(text, Annotation)]
+
+
 def test_the_map_has_a_row_of_panels_per_level_and_a_column_per_stage():
     cells = tuple(cell(amplitude=level, low_hz=low) for level in (0.5, 1.5, 3.0) for low in (4.0, 8.0))
-    figure = draw_mismatch_map({"before": cells, "retuned": cells, "after": cells}, "fx", "N")
-    panels = figure.axes[:-1]
-    assert len(panels) == 9
-    assert [axes.get_title(loc="left") for axes in panels[:3]] == ["as given", "re-tuned", "with what was found"]
-    assert [axes.get_ylabel() for axes in panels[::3]] == ["at 0.5 N", "at 1.5 N", "at 3 N"]
+    axes = draw_mismatch_map({"before": cells, "retuned": cells, "after": cells}, "fx", "N").axes[0]
+    panels = next(one for one in axes.collections if isinstance(one, PolyCollection))
+    assert len(panels.get_paths()) == 9
+    assert around(axes) == ["as given", "re-tuned", "with what was found", "at 0.5 N", "at 1.5 N", "at 3 N"]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8"] * 3
+
+
+def test_a_cell_of_the_map_has_its_colour_where_its_channel_octave_level_and_stage_are():
+    loud = cell("ay", low_hz=8.0, amplitude=2.0, in_noise=40.0)
+    quiet = tuple(cell(name, low_hz=low, amplitude=level, in_noise=1.0)
+                  for name in ("ax", "ay") for low in (4.0, 8.0) for level in (1.0, 2.0))  # fmt: skip
+    axes = draw_mismatch_map({"before": quiet, "retuned": (*quiet, loud)}, "fx", "N").axes[0]
+    shown = axes.images[0].get_array().filled(np.nan)
+    left, right, bottom, top = axes.images[0].get_extent()
+    rows, columns = np.nonzero(shown == 40.0)
+    x = left + (right - left) * (columns.mean() + 0.5) / shown.shape[1]
+    y = top + (bottom - top) * (rows.mean() + 0.5) / shown.shape[0]
+    (number,) = [text for text in axes.texts if text.get_text() == "40"]
+    assert (x, y) == pytest.approx(number.get_position())
+    assert dict(zip(axes.get_xticks(), axes.get_xticklabels(), strict=True))[x].get_text() == "8"
+    assert dict(zip(axes.get_yticks(), axes.get_yticklabels(), strict=True))[y].get_text() == "ay"
+    (stage,) = [text for text in axes.texts if text.get_text() == "re-tuned"]
+    assert x - stage.xy[0] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("stages", [("before",), ("before", "retuned", "after")])
+@pytest.mark.parametrize("name", ["ax", "handle_acceleration_x"])
+def test_all_of_the_map_is_inside_the_picture(stages, name):
+    cells = tuple(cell(name, amplitude=level, low_hz=low) for level in (0.5, 3.0) for low in (4.0, 8.0))
+    figure = draw_mismatch_map(dict.fromkeys(stages, cells), "fx", "N")
+    FigureCanvasAgg(figure).draw()
+    whole = figure.get_tightbbox()
+    width, height = figure.get_size_inches()
+    assert whole.x0 >= 0 and whole.y0 >= 0 and whole.x1 <= width and whole.y1 <= height
 
 
 def test_what_is_significant_is_framed_and_what_is_more_than_noise_has_its_number():
@@ -55,8 +95,9 @@ def test_what_is_significant_is_framed_and_what_is_more_than_noise_has_its_numbe
         cell(output="az", in_noise=2400.0),
     )
     axes = draw_mismatch_map({"before": cells}, "fx", "N").axes[0]
-    assert len(axes.collections[0].get_segments()) == 2
-    assert written(axes.figure) == ["5", "1.2", "2.4k"]
+    frames = next(one for one in axes.collections if isinstance(one, LineCollection))
+    assert len(frames.get_segments()) == 2
+    assert cells_written(axes) == ["5", "1.2", "2.4k"]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["ax", "ay", "y", "az"]
 
 
@@ -64,7 +105,7 @@ def test_many_levels_are_drawn_in_groups_of_which_the_worst_is_shown():
     cells = tuple(cell(amplitude=float(level), in_noise=float(level)) for level in range(1, 9))
     (picture,) = mismatch_map_pictures({"before": cells})
     assert "8 levels are drawn in 4 groups" in picture.caption
-    assert written(picture.figure) == ["2", "4", "6", "8"]
+    assert cells_written(picture.figure.axes[0]) == ["2", "4", "6", "8"]
 
 
 def test_each_input_has_a_map_and_all_but_the_worst_are_folded():
@@ -173,6 +214,11 @@ def test_there_is_room_for_every_tick_of_a_ratio(high):
     axes.set_xscale("log")
     ratio_ticks(axes.xaxis, 0.7, high)
     assert 2 <= len(axes.get_xticks()) <= 14
+
+
+@pytest.mark.parametrize(("value", "words"), [(1e-3, "10⁻³"), (1.0, "10⁰"), (1e12, "10¹²"), (0.0, "")])
+def test_powers_of_ten_are_written_out(value, words):
+    assert power_of_ten(value) == words
 
 
 def test_a_map_without_a_known_noise_says_so():
