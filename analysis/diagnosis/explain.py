@@ -1,7 +1,7 @@
 """From a model and what was observed to the physics that the model lacks: re-tune, screen, fit, choose, add, prune."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import NOTHING
 from analysis.diagnosis.output_error import Fitted, evaluated, fit
 from analysis.diagnosis.parsimony import plainest_first
+from analysis.diagnosis.patience import OutOfPatienceError, Patience, always, impatient
 from analysis.diagnosis.rivalry import Arena, Contender, contest, refine, sensitivity_at
 from analysis.diagnosis.same_within_errors import excess
 from analysis.diagnosis.screening import screen
@@ -59,24 +60,30 @@ class Explanation:
     """What stood after each effect that was added."""
     statistic: Statistic | None = None
     """None where samples were compared, in units of their noise."""
+    ended_early: bool = False
+    """Patience ran out before the search was done."""
 
 
-def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Explanation:
-    measure, tuning = arena.measure, arena.tuning
-    before = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Explanation:
+    """patient: asked before each piece of the search for effects; once it says no, what was found until then stands."""
+    before = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
-    known = sensitivity_at(arena, before.deviations, NOTHING)
-    retuned = refine(arena, fit(measure, tuning, before, known, RETUNING_ROUNDS))
+    retuned = _retuned_from(arena, before)
     base = arena.contender(retuned)
     confirmed = arena.confirmed(base)
     surprised = bool(np.nanmax(confirmed.standing.test, initial=0.0) > SURPRISING)
     rounds: list[tuple[Contender, ...]] = []
     steps: list[Contender] = []
+    hasty, ended_early = replace(arena, map_=impatient(arena.map_, patient)), False
     while len(rounds) < MOST_EFFECTS and (
         base.standing.seen > (MORE if rounds else CLEAN) or (surprised and not rounds)
     ):
         step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
-        contenders = _next(arena, catalogue, base.fitted, step)
+        try:
+            contenders = _next(hasty, catalogue, base.fitted, step)
+        except OutOfPatienceError:
+            ended_early = True
+            break
         if not contenders or not _worthwhile(base, contenders[0]):
             rounds.append(contenders)
             break
@@ -84,7 +91,17 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Ex
         base = contenders[0]
         steps.append(base)
     ends = (arena.confirmed(arena.contender(before)), confirmed, arena.confirmed(base))
-    return Explanation(*ends, tuple(rounds), tuple(steps))
+    return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early)
+
+
+def retuned_alone(arena: Arena) -> Fitted:
+    """Without physics that the model does not name."""
+    return _retuned_from(arena, evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
+
+
+def _retuned_from(arena: Arena, before: Fitted) -> Fitted:
+    known = sensitivity_at(arena, before.deviations, NOTHING)
+    return refine(arena, fit(arena.measure, arena.tuning, before, known, RETUNING_ROUNDS))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.explain import Explanation, Progress, explain
+from analysis.diagnosis.patience import OUT_OF_TIME, Patience, always
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.verdict import Judgement, judge
 from equalizer.effects.effect import Effect
@@ -30,13 +31,13 @@ class Searched:
     remarks: tuple[str, ...] = ()
 
 
-def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress) -> Searched:
-    found = explain(arena, catalogue, progress)
+def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
+    found = explain(arena, catalogue, progress, patient)
     judged = judge(found)
-    if judged.named or not _sealed_alone(found):
-        return Searched(arena, found, judged)
+    if found.ended_early or judged.named or not _sealed_alone(found):
+        return Searched(arena, found, judged, (OUT_OF_TIME,) if found.ended_early else ())
     half = arena.half_opened()
-    again = explain(half, catalogue, progress)
+    again = explain(half, catalogue, progress, patient)
     second = judge(again)
     if second.named:
         return Searched(half, again, second, (OPENED,))
