@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.black_box import black_box
+from analysis.diagnosis.clean_floor import CleanFloor
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.error_table import channel_errors, errors_of
@@ -15,6 +16,7 @@ from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import without_claim
 from analysis.diagnosis.impact_remainder import impact_remainder
 from analysis.diagnosis.intervals import standard_errors
+from analysis.diagnosis.learn_clean_floor import learned_sentence
 from analysis.diagnosis.localisation import Localisation, localised
 from analysis.diagnosis.mismatch_maps import Maps, maps_of, whole_mismatch
 from analysis.diagnosis.mismatch_rows import mismatch_rows
@@ -38,13 +40,15 @@ def assembled(
     judged: Judgement,
     floors: tuple[NoiseFloor, ...],
     names: Sequence[str],
+    learned: CleanFloor,
 ) -> Findings:
-    """found.after is what is named; the same as re-tuned where nothing is. names: of the recordings."""
+    """found.after is what is named; the same as re-tuned where nothing is. names: of the recordings. learned: what
+    clean recordings differ by."""
     measure, tuning = arena.whole, arena.tuning
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
-    maps = maps_of(measure, found, floors)
+    maps = maps_of(measure, found, floors, learned)
     local = localised(measure, tuning, found, floors, maps.cells)
     document = _document(arena, found, judged, maps, local)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
@@ -63,7 +67,7 @@ def assembled(
         black_box=None
         if found.statistic is not None
         else black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
-        remarks=tuple(dict.fromkeys(remark for floor in floors for remark in floor.remarks)),
+        remarks=tuple(dict.fromkeys(filter(None, (learned_sentence(learned, channels), *_remarks(floors))))),
         maps=maps.cells,
         local=local,
         floor=floors[0],
@@ -71,6 +75,10 @@ def assembled(
         axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
         split_s=_split_s(measure),
     )
+
+
+def _remarks(floors: tuple[NoiseFloor, ...]) -> list[str]:
+    return [remark for floor in floors for remark in floor.remarks]
 
 
 def _split_s(measure: ErrorMeasure) -> dict[str, float]:

@@ -13,6 +13,16 @@ class CleanFloor:
 
     shares: Mapping[tuple[str, str, str, Band], float] = field(default_factory=dict)
     """By output, its quantity, input and octave."""
+    channels: tuple[float, ...] = ()
+    """By channel, the response's and then the position's, over all octaves. Empty where nothing was learned."""
+    error: str = ""
+    """How it was measured, as `diagnosis.json` says it."""
+    recordings: int = 0
+
+    @property
+    def beyond(self) -> float:
+        """By how much the largest that was seen was raised to give these shares: the fewer recordings, the more."""
+        return 1 + 1 / max(self.recordings, 1)
 
     def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
         """Of the cell; the largest of the channel's octave where clean recordings never drove this input; else 0."""

@@ -4,12 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from analysis.diagnosis.assemble_findings import assembled
-from analysis.diagnosis.choose_measure import measure_of
+from analysis.diagnosis.choose_measure import Chosen, measure_of
+from analysis.diagnosis.clean_floor import CleanFloor
 from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.impacts import rattling
+from analysis.diagnosis.learn_clean_floor import floored, learned_from
 from analysis.diagnosis.observed_parts import names_of_parts
+from analysis.diagnosis.patience import Patience, always
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.screening import Mapper
 from analysis.diagnosis.search import Searched, searched
@@ -26,6 +29,10 @@ class DiagnosisSettings:
     """Effects that are not to be considered."""
     names: tuple[str, ...] = ()
     """Of the recordings, for the reader."""
+    clean: tuple[Recording, ...] = ()
+    """Of the device when it was in order: what it differed by then from its model, re-tuned, is no mismatch."""
+    patient: Patience = always
+    """Asked before each piece of the search; once it says no, what was found until then stands."""
 
 
 def diagnose(
@@ -35,18 +42,29 @@ def diagnose(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """recordings: of one device, alike in channels, units and rate; see `belonging` for what is refused."""
+    """recordings: of one device, alike in channels, units and rate; see `belonging` for what is refused. Raises
+    NothingLearned where the clean recordings say nothing of these."""
     progress("measuring the noise", 0.0)
     chosen = measure_of(recordings, model)
     tuning = tuning_of(model, recordings[0].command.channels)
-    arena = Arena(chosen.measure.shortened(), chosen.measure, tuning, map_)
+    learned = _learned(settings.clean, model, chosen, map_, progress)
+    measure = floored(chosen.measure, learned)
+    arena = Arena(measure.shortened(), measure, tuning, map_)
     catalogue = [one for one in CATALOGUE if one.name not in settings.without]
-    seen = searched(arena, catalogue, progress)
-    if seen.judged.verdict in ("unexplained", "partly_explained"):
+    seen = searched(arena, catalogue, progress, settings.patient)
+    if seen.judged.verdict in ("unexplained", "partly_explained") and settings.patient():
         progress("looking for play that rattles", 0.9)
         rattled = rattling(seen.arena, seen.found, chosen.floors, catalogue)
         seen = seen if rattled is None else Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,))
     progress("writing down what was found", 0.95)
     found = seen.found if seen.judged.named else replace(seen.found, after=seen.found.retuned)
-    whole = assembled(seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names))
+    whole = assembled(
+        seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names), learned
+    )
     return replace(whole, remarks=(*chosen.remarks, *seen.remarks, *whole.remarks))
+
+
+def _learned(
+    clean: Sequence[Recording], model: MechanicalModel, chosen: Chosen, map_: Mapper, progress: Progress
+) -> CleanFloor:
+    return learned_from(clean, model, chosen.measure.name, map_, progress) if clean else CleanFloor()

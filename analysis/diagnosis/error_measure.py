@@ -33,8 +33,15 @@ class ErrorMeasure(Protocol):
     def unit(self) -> FloatArray:
         """(c,): what 1 in a residual is in each channel's own unit."""
 
+    @property
+    def least(self) -> float:
+        """Times the noise: no error counts as less, for what lies below tells nothing."""
+
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         """The same records, with samples that count for something else."""
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        """rms: (c,), in each channel's own unit: so much more counts as noise, and no error as less than that."""
 
     def shortened(self) -> Self:
         """Without the samples behind the last that decisions may see."""

@@ -154,5 +154,5 @@ def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
         for cell in cells:
             key = (cell.output, cell.quantity, cell.input, cell.band_hz)
             shares[key] = max(shares.get(key, 0.0), cell.share)
-    beyond = 1 + 1 / max(len(clean), 1)
-    return CleanFloor({key: beyond * share for key, share in shares.items()})
+    beyond = CleanFloor(recordings=len(clean)).beyond
+    return CleanFloor({key: beyond * share for key, share in shares.items()}, recordings=len(clean))

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.clean_floor import CleanFloor
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.explain import Explanation
-from analysis.diagnosis.mismatch_cells import MismatchCell, Prediction, mismatch_cells
+from analysis.diagnosis.mismatch_cells import Margin, MismatchCell, Prediction, mismatch_cells
 from analysis.diagnosis.noise_floor import NoiseFloor
 from analysis.diagnosis.rivalry import Contender
 
@@ -29,9 +30,12 @@ class Maps:
         )
 
 
-def maps_of(measure: ErrorMeasure, found: Explanation, floors: tuple[NoiseFloor, ...]) -> Maps:
+def maps_of(
+    measure: ErrorMeasure, found: Explanation, floors: tuple[NoiseFloor, ...], learned: CleanFloor | None = None
+) -> Maps:
+    """learned: what is no mismatch, from clean recordings."""
     stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
-    return Maps({stage: _cells(measure, one, floors) for stage, one in stages.items()})
+    return Maps({stage: cells_of(measure, one, floors, learned) for stage, one in stages.items()})
 
 
 def whole_mismatch(measure: ErrorMeasure, contender: Contender) -> tuple[Mismatch, ...]:
@@ -46,11 +50,14 @@ def whole_mismatch(measure: ErrorMeasure, contender: Contender) -> tuple[Mismatc
     return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, 0.0),)
 
 
-def _cells(measure: ErrorMeasure, contender: Contender, floors: tuple[NoiseFloor, ...]) -> Cells:
+def cells_of(
+    measure: ErrorMeasure, contender: Contender, floors: tuple[NoiseFloor, ...], learned: CleanFloor | None = None
+) -> Cells:
+    margin = Margin(learned=learned or CleanFloor())
     cells: list[MismatchCell] = []
     for record, residuals, floor in zip(measure.records, contender.fitted.residuals, floors, strict=True):
         p = record.recording.response.samples.shape[1]
         predicted = record.measured - residuals * measure.unit
         position = predicted[:, p:] if predicted.shape[1] > p else None
-        cells += mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor)
+        cells += mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor, margin=margin)
     return tuple(cells)

@@ -35,9 +35,13 @@ class PredictedForce:
     name: str = "predicted force"
     known: tuple[PlacedEffect, ...] = ()
     """What the model's own file names: it is part of every simulation."""
+    least: float = 0.0
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shortened(self) -> "PredictedForce":
         kept = [

@@ -38,7 +38,10 @@ def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> Standi
     scale = measure.unit / measure.noise
     return Standing(
         *(
-            rms_over(measure.records, residuals, [getattr(record, part) for record in measure.records]) * scale
+            np.maximum(
+                rms_over(measure.records, residuals, [getattr(record, part) for record in measure.records]) * scale,
+                measure.least,
+            )
             for part in ("fit", "choose", "test")
         )
     )

@@ -39,6 +39,7 @@ class Windows:
     window_s: float = 1.0
     known: tuple[PlacedEffect, ...] = ()
     """What the model's own file names: it is part of every simulation."""
+    least: float = 0.0
 
     @property
     def name(self) -> str:
@@ -46,6 +47,9 @@ class Windows:
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shortened(self) -> "Windows":
         kept = [
