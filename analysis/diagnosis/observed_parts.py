@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.observed import Mask, Observed, measured_of, roles
+from analysis.diagnosis.observed import KEPT_BACK, Mask, Observed, measured_of, roles
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -29,13 +29,23 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     for one in recordings:
         measured, known = measured_of(one, responses)
         fit, choose, test = roles(one.segments, len(one), tested)
-        new = ~_repeated(one)
-        masks = tuple(mask & known for mask in (fit & new, choose & new, test))
+        masks = tuple(mask & known for mask in (*_without_repeats(fit, choose, ~_repeated(one)), test))
         for start, stop in parts_of(one):
             cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
             part = part_of(one, start, stop)
             found.append(Observed(part, part.command.samples, measured[start:stop], *cut))
     return tuple(found)
+
+
+def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
+    """Where all that was to choose by only repeats what was fitted to, the last quarter of what is left is."""
+    if (choose & new).any() or not (fit & new).any():
+        return fit & new, choose & new
+    places = np.flatnonzero(fit & new)
+    last = places[int((1 - KEPT_BACK) * len(places)) :]
+    chosen: Mask = np.zeros(len(fit), dtype=np.bool_)
+    chosen[last] = True
+    return fit & new & ~chosen, chosen
 
 
 def _repeated(recording: Recording) -> Mask:
