@@ -28,7 +28,9 @@ class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
         self.problems = problems
 
 
-def require_alike(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+def require_alike(
+    recordings: Sequence[Recording], names: Sequence[str], what_now: str = "diagnose them one by one"
+) -> None:
     """Of one device with the same channels, units and rate. Raises NothingToDiagnose."""
     if not recordings:
         raise NothingToDiagnose(("there is no recording",))
@@ -40,7 +42,7 @@ def require_alike(recordings: Sequence[Recording], names: Sequence[str]) -> None
             ("response", _words(first.response), _words(other.response)),
         ):
             if one != two:
-                problems.append(f"{name} has the {what} {two}, {names[0]} has {one}; diagnose them one by one")
+                problems.append(f"{name} has the {what} {two}, {names[0]} has {one}; {what_now}")
     if problems:
         raise NothingToDiagnose(tuple(problems))
 

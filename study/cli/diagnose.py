@@ -22,6 +22,14 @@ def diagnose(
     without: Annotated[
         list[str] | None, typer.Option(metavar="EFFECT", help="An effect not to be considered; may be repeated.")
     ] = None,
+    clean: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="CLEAN.h5",
+            help="A recording of the device when it was in order: what it differed by then is no mismatch; may be "
+            "repeated.",
+        ),
+    ] = None,
     seed: Annotated[
         int, typer.Option(min=0, help="Draws which trials of a session are used, and which are kept for the test.")
     ] = 1,
@@ -35,7 +43,7 @@ def diagnose(
     from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
     from study.workflows.diagnosed_summary import diagnosed_lines, summary
 
-    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), seed)
+    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed)
     with steps("Diagnosing") as show:
         done = diagnose_recordings(plan, show)
     typer.echo(json.dumps(summary(done), indent=2) if as_json else "\n".join(diagnosed_lines(done)))

@@ -106,7 +106,7 @@ class ArchiveScreens:
             if somebody:
                 self._send(LetGo())
 
-        self._send(Diagnose(wanted.sources, wanted.model, wanted.out))
+        self._send(Diagnose(wanted.sources, wanted.model, wanted.out, wanted.clean))
         self._diagnosing = DiagnosingScreen("Getting ready.")
         await self._app.push_screen(self._diagnosing, stopped)
 

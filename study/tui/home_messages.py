@@ -71,6 +71,8 @@ class DiagnoseWanted(Message):
     """Empty: none is given."""
     out: str
     """Folder for the results; empty: a new one near what is diagnosed."""
+    clean: tuple[str, ...] = ()
+    """Of the device when it was in order."""
 
 
 @dataclass(eq=False)

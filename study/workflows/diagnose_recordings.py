@@ -11,13 +11,16 @@ import numpy as np
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.learn_clean_floor import NothingLearned
 from analysis.diagnosis.screening import Mapper
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.new_folder import new_folder, require_new_folder
+from study.workflows.clean_recordings import with_clean
 from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, nothing_to_diagnose, read_input
+from study.workflows.spring_in_model import spring_words, with_spring
 from study.workflows.worker_threads import worker_threads
 from study.workflows.write_diagnosis import write_diagnosis_into
 from study.workflows.write_twin import TwinPlan, write_twin
@@ -40,6 +43,8 @@ class DiagnosePlan:
     model: Path | None = None
     without: tuple[str, ...] = ()
     """Effects that are not to be considered."""
+    clean: tuple[Path, ...] = ()
+    """Recordings of the device when it was in order, or one session's folder."""
     seed: int = 1
     """Of what is drawn: which trials of a session are taken, and which are kept for the test."""
 
@@ -67,21 +72,37 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
     found = read_input(plan.sources, plan.seed)
+    clean: DiagnosisInput | None = None
+    if plan.clean:
+        both = with_clean(found, plan.sources, plan.clean, plan.seed)
+        found, clean = both.found, both.clean
     on_progress("reading", READ)
-    model, remarks = _model(plan, found, on_progress)
+    model, remarks = _model(plan, found, clean, on_progress)
+    # A model that was fitted to these recordings has the spring in it.
+    spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
+    held = with_spring(model, spring)
     begun = FITTED if plan.model is None else READ
-    settings = DiagnosisSettings(without=plan.without, names=found.names)
+    known = () if clean is None else clean.recordings
+    settings = DiagnosisSettings(without=plan.without, names=found.names, clean=known)
     try:
         with worker_threads() as threads:
-            findings = engine(found.recordings, model, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+            findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+    except NothingLearned as refusal:
+        raise nothing_to_diagnose(
+            (str(refusal),), "Leave --clean out, or record the sound device in the same way."
+        ) from refusal
     except np.linalg.LinAlgError as problem:
         raise nothing_to_diagnose(
             (f"The fits broke down ({problem}): near the given numbers the model runs away from what was recorded",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from problem
-    findings = replace(findings, remarks=(*found.remarks, *remarks, *findings.remarks))
+    findings = replace(
+        findings,
+        improved=with_spring(findings.improved, -spring),
+        remarks=(*found.remarks, *spring_words(spring), *remarks, *findings.remarks),
+    )
     on_progress("writing the report", DIAGNOSED)
-    parents = (*found.parents, *(() if plan.model is None else (plan.model,)))
+    parents = (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
     with new_folder(plan.out) as folder:
         write_diagnosis_into(folder, findings, parents)
     on_progress("done", 1.0)
@@ -100,14 +121,20 @@ def check_names(without: Sequence[str]) -> None:
             )
 
 
-def _model(plan: DiagnosePlan, found: DiagnosisInput, on_progress: Progress) -> tuple[MechanicalModel, tuple[str, ...]]:
+def _model(
+    plan: DiagnosePlan, found: DiagnosisInput, clean: DiagnosisInput | None, on_progress: Progress
+) -> tuple[MechanicalModel, tuple[str, ...]]:
     if plan.model is not None:
         return given_model(plan.model, found), ()
     if found.simulated:
         return _twin(_within(on_progress, READ, FITTED)), (TWIN_SAID,)
     on_progress("fitting a linear model, as none was given", READ)
     within = _within(on_progress, READ, FITTED)
-    return fitted_model(found, lambda share: within("fitting a linear model, as none was given", share))
+
+    def show(share: float) -> None:
+        within("fitting a linear model, as none was given", share)
+
+    return fitted_model(found, show) if clean is None else fitted_model(clean, show, "the clean recordings")
 
 
 def _twin(on_progress: Progress) -> MechanicalModel:

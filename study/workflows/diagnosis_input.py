@@ -24,7 +24,6 @@ from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
 from study.workflows.session_as_recordings import session_recordings
 
-FITTED_NAME = "fitted to these recordings"
 RIGID_SAID = (
     "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
     "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
@@ -40,6 +39,8 @@ class DiagnosisInput:
     remarks: tuple[str, ...]
     simulated: bool = False
     """A session on the simulated omega.3."""
+    spring_n_per_m: float = 0.0
+    """Of the virtual spring that held the handle and is no part of the commands: a session's."""
 
 
 def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
@@ -51,7 +52,10 @@ def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
         )
     if folders:
         session = session_recordings(folders[0], seed)
-        found = DiagnosisInput(session.recordings, session.names, session.parents, session.remarks, session.simulated)
+        found = DiagnosisInput(
+            (session.recording,), (session.name,), session.parents, session.remarks, session.simulated,
+            session.spring_n_per_m,
+        )  # fmt: skip
     else:
         read = all_force_driven([read_recording(source) for source in sources])
         found = DiagnosisInput(read, _names(sources), tuple(sources), ())
@@ -60,7 +64,7 @@ def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
         require_something(found.recordings, found.names)
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems) from refusal
-    return _same_position(found)
+    return same_position(found)
 
 
 def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
@@ -80,15 +84,15 @@ def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
 
 
 def fitted_model(
-    found: DiagnosisInput, on_progress: Callable[[float], None]
+    found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear one, and what must be known of it. Raises StudyError where the recordings do not carry one."""
-    if wants_rigid_model(found.recordings) and (rigid := _rigid(found.recordings)) is not None:
+    if wants_rigid_model(found.recordings) and (rigid := _rigid(found.recordings, whose)) is not None:
         return rigid, (RIGID_SAID,)
     try:
-        fit = fit_mechanical_model(found.recordings, on_progress=on_progress, name=FITTED_NAME)
+        fit = fit_mechanical_model(found.recordings, on_progress=on_progress, name=f"fitted to {whose}")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        if (rigid := _rigid(found.recordings)) is not None:
+        if (rigid := _rigid(found.recordings, whose)) is not None:
             return rigid, (RIGID_SAID,)
         raise nothing_to_diagnose(
             (f"no model was given, and none can be fitted: {refusal}",),
@@ -96,7 +100,7 @@ def fitted_model(
         ) from refusal
     tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
     said = (
-        f"No model was given. A linear one was fitted to these recordings first, with an error of "
+        f"No model was given. A linear one was fitted to {whose} first, with an error of "
         f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
         "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
         "is not named."
@@ -104,12 +108,12 @@ def fitted_model(
     return opened(fit.model), (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
 
 
-def _rigid(recordings: Sequence[Recording]) -> MechanicalModel | None:
+def _rigid(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
     """None where the recordings do not carry one."""
     if not can_be_rigid(recordings):
         return None
     try:
-        return rigid_model(recordings, FITTED_NAME)
+        return rigid_model(recordings, f"fitted to {whose}")
     except (MechanicalModelError, np.linalg.LinAlgError):
         return None
 
@@ -121,7 +125,13 @@ def nothing_to_diagnose(problems: Sequence[str], do_now: str = "Correct them, or
 
 
 def _sentences(problems: Sequence[str]) -> str:
-    return " ".join(f"{problem[:1].upper()}{problem[1:].rstrip('.')}." for problem in problems)
+    return " ".join(f"{_begun(problem).rstrip('.')}." for problem in problems)
+
+
+def _begun(sentence: str) -> str:
+    """With a capital, unless a file's name comes first: that stays as it is."""
+    named = any(mark in sentence.partition(" ")[0] for mark in "./\\")
+    return sentence if named else sentence[:1].upper() + sentence[1:]
 
 
 def _names(sources: Sequence[Path]) -> tuple[str, ...]:
@@ -132,8 +142,8 @@ def _names(sources: Sequence[Path]) -> tuple[str, ...]:
     return tuple(f"{source.parent.name}/{source.name} ({number})" for number, source in enumerate(sources, start=1))
 
 
-def _same_position(found: DiagnosisInput) -> DiagnosisInput:
-    """Compared where every recording has it in the same channels."""
+def same_position(found: DiagnosisInput) -> DiagnosisInput:
+    """Compared where every recording has it in the same channels; where not, it is left out, and that is said."""
     kinds = {None if one.position is None else (one.position.channels, one.position.units) for one in found.recordings}
     if len(kinds) < 2:
         return found

@@ -142,7 +142,8 @@ class Desk:
         self._link.send(Working("getting ready", 0.0))
         sources = tuple(Path(source) for source in wanted.sources)
         out = Path(wanted.out) if wanted.out else free_out(sources[0])
-        plan = DiagnosePlan(sources, out, Path(wanted.model) if wanted.model else None)
+        model, clean = Path(wanted.model) if wanted.model else None, tuple(Path(one) for one in wanted.clean)
+        plan = DiagnosePlan(sources, out, model, clean=clean)
         written = diagnose_at_screen(plan, lambda what, share: self._link.send(Working(what, share)))
         self._link.send(_diagnosis(written))
 

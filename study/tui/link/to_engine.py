@@ -77,6 +77,8 @@ class Diagnose:
     """Empty: none is given."""
     out: str
     """Empty: a new folder near what is diagnosed."""
+    clean: tuple[str, ...] = ()
+    """Of the device when it was in order."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,8 @@ Where does a recording differ from a model of the device, and what physics does 
   name that holds some); or the folder of a session, whose trials are taken.
 * **Model**: a mechanical model, MODEL.toml. Left empty, a linear one is fitted to the recordings first; a session on
   the simulated device is compared with its twin.
+* **In order**: recordings of the device when it was in order, where there are any. What it differed by from its model
+  then is no mismatch.
 * **Results**: a folder that is not there yet. Left empty, one beside the recording, or in the session's folder.
 
 **F5** begins, **Esc** goes back.
@@ -33,6 +35,7 @@ In a terminal: `hapteq diagnose REC.h5 --model MODEL.toml --out DIR`.
 FIELDS = (
     ("sources", "Recordings", "REC.h5, several, or a session's folder"),
     ("model", "Model", "MODEL.toml; empty: none is given"),
+    ("clean", "In order", "recordings of it when nothing was missing; may stay empty"),
     ("out", "Results", "a new folder; empty: beside the recording"),
 )
 
@@ -75,23 +78,26 @@ class DiagnoseForm(ModalScreen[None]):
 
     @on(Input.Submitted)
     def action_begin(self) -> None:
-        try:
-            sources = tuple(str(Path(word).expanduser()) for word in shlex.split(self._typed("sources")))
-        except ValueError:
-            self._say("A quotation mark is open.", "sources")
-            return
+        named: dict[str, tuple[str, ...]] = {}
+        for field in ("sources", "clean"):
+            try:
+                named[field] = tuple(str(Path(word).expanduser()) for word in shlex.split(self._typed(field)))
+            except ValueError:
+                self._say("A quotation mark is open.", field)
+                return
+        sources = named["sources"]
         model, out = (
             str(Path(typed).expanduser()) if (typed := self._typed(name)) else "" for name in ("model", "out")
         )
-        missing = next((path for path in sources if not Path(path).exists()), None)
+        missing = next(((f, path) for f, paths in named.items() for path in paths if not Path(path).exists()), None)
         if not sources:
             self._say("Name a recording, or the folder of a session.", "sources")
         elif missing is not None:
-            self._say(f"There is nothing at {missing}.", "sources")
+            self._say(f"There is nothing at {missing[1]}.", missing[0])
         elif model and not Path(model).is_file():
             self._say(f"There is no file {model}.", "model")
         elif self.is_active:
-            self.app.post_message(DiagnoseWanted(sources, model, out))
+            self.app.post_message(DiagnoseWanted(sources, model, out, named["clean"]))
             take_off(self, None)
 
     def action_help(self) -> None:

@@ -17,11 +17,11 @@ def folder(tmp_path):
     return tmp_path
 
 
-def filled(on_screen, folder, sources, model="", out="", *keys):
+def filled(on_screen, folder, sources, model="", out="", *keys, clean=""):
     seen = []
 
     async def story(sight):
-        for name, text in (("sources", sources), ("model", model), ("out", out)):
+        for name, text in (("sources", sources), ("model", model), ("out", out), ("clean", clean)):
             sight.app.screen.query_one(f"#{name}", Input).value = text
         for key in keys or ("f5",):
             await sight.press(key)
@@ -41,7 +41,19 @@ def test_recordings_a_model_and_a_folder_are_asked_for(on_screen, folder, key):
 
 def test_model_and_folder_may_be_left_to_the_program(on_screen, folder):
     (asked,), _ = filled(on_screen, folder, f"{folder}/two.h5")
-    assert (asked.model, asked.out) == ("", "")
+    assert (asked.model, asked.out, asked.clean) == ("", "", ())
+
+
+def test_recordings_of_the_device_in_order_may_be_named(on_screen, folder):
+    (asked,), _ = filled(on_screen, folder, f"{folder}/two.h5", clean=f"'{folder}/rec one.h5'")
+    assert asked.clean == (f"{folder}/rec one.h5",)
+
+
+@pytest.mark.parametrize(("clean", "said"), [("old.h5", "There is nothing at old.h5."), ("'x", "A quotation mark")])
+def test_wrong_ones_are_said(on_screen, folder, clean, said):
+    asked, words = filled(on_screen, folder, f"{folder}/two.h5", clean=clean)
+    assert asked == []
+    assert said in words
 
 
 @pytest.mark.parametrize(
