@@ -1,7 +1,11 @@
-"""The trials of a session as recordings to be diagnosed: one per frequency, its trials one after the other.
+"""The trials of a session as one recording to be diagnosed, one after the other, by frequency and level.
 
 A trial's recording holds the middle of a vibration that was on before. A simulation starts from rest, so before each
 trial a full cycle of its own command is played, over and over and fading in, with nothing to compare with.
+
+What is played is what was decided beforehand. The virtual spring that held the handle at its place goes into the model:
+a simulation by forces that a spring made of what really happened would drift away from it. Positions are left out: they
+are encoders', in front of the cables, and where a handle that sticks comes to rest is chance.
 """
 
 import math
@@ -20,10 +24,12 @@ from study.store.archive import SessionFolder, find_session
 from study.store.recording_file import read_recording
 from study.workflows.fold_session import fold_session
 
-MOST_S = 120.0
+MOST_S = 60.0
 """Of vibration, over all trials that are taken: more would cost time without telling much more."""
-LEAD_S = 0.6
+LEAD_S = 0.4
 """Before each trial: a handle that is held settles in less."""
+REPEAT_S = 0.2
+"""Cycles are counted in groups so long where they fit: more of what was played is then compared."""
 LEVEL_STEP_DB = 4.0
 """Levels within so many decibels count as one: a staircase's own are too many to be compared one by one."""
 TESTED_OF = 4
@@ -32,12 +38,14 @@ TESTED_OF = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecordings:
-    recordings: tuple[Recording, ...]
-    names: tuple[str, ...]
+    recording: Recording
+    name: str
     parents: tuple[Path, ...]
     remarks: tuple[str, ...]
     simulated: bool
     """The device was the simulated omega.3."""
+    spring_n_per_m: float
+    """Of the virtual spring, which is no part of the recording's command; 0 = none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,13 +71,14 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
         )
     draw = np.random.default_rng(seed)
     taken = _taken(usable, draw)
-    groups = [list(group) for _, group in groupby(taken, key=lambda trial: trial.frequency_hz)]
+    spring = spring_of([trial.recording for trial in taken])
     return SessionRecordings(
-        recordings=tuple(_merged(group, folder, draw) for group in groups),
-        names=tuple(f"{folder.name}, {group[0].frequency_hz:g} Hz" for group in groups),
+        recording=_merged(taken, folder, draw),
+        name=folder.name,
         parents=(folder.log, *(trial.path for trial in taken)),
         remarks=tuple(_remarks(folder, found, usable, taken)),
         simulated=opened.device.simulated,
+        spring_n_per_m=spring,
     )
 
 
@@ -106,53 +115,67 @@ def _rung(level_n: float) -> int:
 
 
 def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
-    """Of one frequency."""
     first = trials[0].recording
     lead = round(LEAD_S * first.sample_rate_hz)
     parts: list[Mapping[str, FloatArray]] = []
     segments: list[Segment] = []
     begin = 0
-    for _, members in groupby(trials, key=_key):
+    for (_, rung), members in groupby(trials, key=_key):
         group = list(members)
-        amplitude = float(np.exp(np.mean([np.log(max(trial.level_n, 1e-6)) for trial in group])))
         tested = set(draw.permutation(len(group))[: len(group) // TESTED_OF].tolist())
         for place, trial in enumerate(group):
             parts.append(_with_lead(trial.recording, lead))
             own = trial.recording.segments[0]
             start, stop = begin + lead + own.start, begin + lead + own.stop
             role = "test" if place in tested else "fit"
-            segments.append(Segment(start, stop, "sine", amplitude, own.period, role))
+            period = _repeating(own.period, trial.recording.sample_rate_hz)
+            segments.append(Segment(start, stop, "sine", 10 ** (rung * LEVEL_STEP_DB / 20), period, role))
             begin += lead + len(trial.recording)
+    decided = _joined("command", parts, _decided(first))
     return Recording(
         device=first.device,
-        command=_joined("command", parts, first.command),
+        command=decided,
         response=_joined("response", parts, first.response),
-        position=None if first.position is None else _joined("position", parts, first.position),
-        excitation=None if first.excitation is None else _joined("excitation", parts, first.excitation),
+        excitation=decided,
         hold=first.hold,
         segments=tuple(segments),
         meta={"session": folder.name, "hand": "held"},
     )
 
 
+def _decided(recording: Recording) -> Signal:
+    return recording.command if recording.excitation is None else recording.excitation
+
+
+def _repeating(period: int, sample_rate_hz: float) -> int:
+    longer = round(REPEAT_S * sample_rate_hz)
+    return longer if period > 0 and longer % period == 0 else period
+
+
 def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
-    """Each signal, (lead + n, channels): what was commanded goes on backwards, what came out is not known there."""
+    """Both signals, (lead + n, channels): what was commanded goes on backwards, what came out is not known there."""
+    played, answered = _decided(recording).samples, recording.response.samples
     period = recording.segments[0].period or len(recording)
     fade = np.minimum(1.0, np.arange(lead) / max(1, lead // 2))[:, None]
-    signals = {
-        "command": recording.command, "response": recording.response, "position": recording.position,
-        "excitation": recording.excitation,
-    }  # fmt: skip
-    found = {}
-    for name, signal in signals.items():
-        if signal is None:
-            continue
-        if name in ("command", "excitation"):
-            before = fade * signal.samples[np.arange(-lead, 0) % min(period, len(signal))]
-        else:
-            before = np.full((lead, len(signal.channels)), np.nan)
-        found[name] = np.vstack([before, signal.samples])
-    return found
+    before = fade * played[np.arange(-lead, 0) % min(period, len(played))]
+    return {
+        "command": np.vstack([before, played]),
+        "response": np.vstack([np.full((lead, answered.shape[1]), np.nan), answered]),
+    }
+
+
+def spring_of(recordings: Sequence[Recording]) -> float:
+    """N/m, from what was commanded beyond what was decided, over the way; 0 where that is not known."""
+    pushed, way = 0.0, 0.0
+    for one in recordings:
+        if one.excitation is None or one.position is None:
+            return 0.0
+        place = one.position.samples
+        if place.shape != one.command.samples.shape or not np.isfinite(place).all():
+            return 0.0
+        pushed -= float(np.sum((one.command.samples - one.excitation.samples) * place))
+        way += float(np.sum(place**2))
+    return pushed / way if way > 0 else 0.0
 
 
 def _joined(name: str, parts: Sequence[Mapping[str, FloatArray]], like: Signal) -> Signal:
