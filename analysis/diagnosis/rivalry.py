@@ -22,8 +22,9 @@ MOST_REFINED = 3
 WORTH_REFINING = 0.5
 """where they gained such a share of what the best one gained."""
 FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
-MOST_REFRESHED, SETTLED = 4, 0.0005
-"""What the model's numbers do is recomputed so often, or until that gains no more than such a share."""
+MOST_REFRESHED, SETTLED, STALE = 4, 0.0005, 0.5
+"""What the model's numbers do is recomputed so often, or until that gains no more than such a share; and only where
+one of them has moved by so many standard deviations since, for it costs a simulation for each."""
 NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
 
@@ -82,11 +83,11 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
 def refine(arena: Arena, fitted: Fitted) -> Fitted:
     """To the end, with what the model's numbers do recomputed there; where that leaves more than noise, also from the
     calibration as it was, for what re-tuning had to hide may have taken it far away."""
-    here = _refined_from(arena, fitted)
+    here, known = _refined_from(arena, fitted, None)
     if arena.contender(here).standing.seen <= NEARLY_CLEAN:
         return here
     calibrated = evaluated(arena.measure, arena.tuning, np.zeros_like(here.deviations), here.hypothesis)
-    there = _refined_from(arena, calibrated)
+    there, _ = _refined_from(arena, calibrated, known)
     return there if there.cost < here.cost else here
 
 
@@ -102,16 +103,21 @@ def sensitivity_at(
     return sensitivity(arena.measure, arena.tuning, deviations, kept, arena.map_)
 
 
-def _refined_from(arena: Arena, fitted: Fitted) -> Fitted:
+def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
+    """known: what the model's numbers do, taken elsewhere with the same hypothesis; None = not taken yet."""
     best = fitted
-    for time in range(MOST_REFRESHED):
-        there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=time > 0)
+    complete = known is not None
+    there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
+    for _ in range(MOST_REFRESHED):
         better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
         settled = better.cost > (1 - SETTLED) * best.cost
         best = better
-        if settled and (time > 0 or arena.contender(best).standing.seen <= NEARLY_CLEAN):
+        if complete and settled or arena.contender(best).standing.seen <= NEARLY_CLEAN and settled:
             break
-    return best
+        if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
+            there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=True)
+            complete = True
+    return best, there
 
 
 def _holds(richer: Fitted, plain: Fitted) -> bool:

@@ -1,5 +1,7 @@
 """A logger that started at another time than the commands: the response comes late or early, the position does not."""
 
+import numpy as np
+
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.other_times import read_other_times
@@ -11,7 +13,7 @@ LEAST_SAMPLES = 1e-3
 
 
 def _read(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
-    return read_other_times(response, 1.0, -of["offset"] * sample_rate_hz)
+    return read_other_times(response, 1.0, -of["offset"] * sample_rate_hz, of.get("interpolated", 0.0))
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
@@ -20,7 +22,16 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     weight = evidence.used[:, None] / evidence.noise
     longest = min(int(LONGEST_S * evidence.sample_rate_hz), len(weight) // 2)
     late = lateness(evidence.response * weight, evidence.predicted * weight, longest)
-    return ({"offset": late / evidence.sample_rate_hz},) if abs(late) > LEAST_SAMPLES else ()
+    if abs(late) <= LEAST_SAMPLES:
+        return ()
+    # A straight line between samples loses height where another start does not: both are tried.
+    starts = [{"offset": late / evidence.sample_rate_hz, "interpolated": straight} for straight in (0.0, 1.0)]
+    return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
+
+
+def _misfit(evidence: Evidence, values: Values) -> float:
+    read = _read(evidence.predicted, evidence.sample_rate_hz, (), values)
+    return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
 EFFECT = Effect(
@@ -28,7 +39,10 @@ EFFECT = Effect(
     equation="y(t) = x(t - offset)",
     source="Oppenheim and Schafer, Discrete-Time Signal Processing, ch. 4: a delay by part of a sample",
     signature="the response's phase is off in proportion to frequency, at every level alike, while the position agrees",
-    parameters=(Parameter("offset", -LONGEST_S, LONGEST_S, none=0.0, scale="linear", step=1e-5),),
+    parameters=(
+        Parameter("offset", -LONGEST_S, LONGEST_S, none=0.0, scale="linear", step=1e-5),
+        Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
+    ),
     acts=OnResponse(_read, stage=4, shared=True),
     starts=_starts,
     sites=("all",),

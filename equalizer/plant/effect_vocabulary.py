@@ -150,7 +150,7 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
         "sensor",
         (_number("ppm", "ppm"), _optional("interpolated", "1"), _optional("with_position", "1")),
     ),
-    EffectName("logger_offset", "sensor", (_number("offset", "s"),)),
+    EffectName("logger_offset", "sensor", (_number("offset", "s"), _optional("interpolated", "1"))),
     EffectName("lost_samples", "sensor", (_number("fraction", "1"),)),
 )
 
