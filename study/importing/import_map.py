@@ -136,6 +136,40 @@ class SegmentMap:
 
 
 @dataclass(frozen=True, config=STRICT)
+class PairMap:
+    """The same device before and after something was changed on it."""
+
+    before: Annotated[str, Field(min_length=1, description="Pattern of the file from before.")]
+    after: Annotated[str, Field(min_length=1, description="Pattern of the file from after.")]
+    changed: Annotated[str, Field(min_length=1, description="What was changed, in words.")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class DiagnosisMap:
+    """What `hapteq real` needs to know beside the recording itself."""
+
+    model: Annotated[
+        str,
+        Field(description="A mechanical model beside the map, or one of ours. Default: a linear one is fitted."),
+    ] = ""
+    tests: Annotated[
+        str, Field(description="Name of the map whose model these recordings only test; they are not diagnosed.")
+    ] = ""
+    skip: Annotated[str, Field(description="Why these recordings are not to be diagnosed. Default: they are.")] = ""
+    volume_free: Annotated[
+        bool, Field(description="Whether such a test is of unknown volume, one factor for all of it. Default false.")
+    ] = False
+    nominal: Annotated[
+        dict[str, float],
+        Field(description="What is known of the device by other means: mass, damping, stiffness, in SI."),
+    ] = field(default_factory=dict)
+    pair: Annotated[
+        tuple[PairMap, ...], Field(description="Before and after, where each file is a recording of its own.")
+    ] = ()
+    objections: Annotated[tuple[str, ...], Field(description="What an expert would object, a sentence each.")] = ()
+
+
+@dataclass(frozen=True, config=STRICT)
 class ImportMap:
     """One kind of recording of a laboratory."""
 
@@ -169,6 +203,9 @@ class ImportMap:
     part: Annotated[tuple[PartMap, ...], Field(description="Parts, one [[part]] each.")] = ()
     segment: Annotated[tuple[SegmentMap, ...], Field(description="Segments, one [[segment]] each.")] = ()
     csv: Annotated[CsvMap, Field(description="How tables are written.")] = field(default_factory=CsvMap)
+    diagnosis: Annotated[DiagnosisMap, Field(description="What `hapteq real` needs to know beside it.")] = field(
+        default_factory=DiagnosisMap
+    )
     meta: Annotated[
         dict[str, Any], Field(description="Anything: place_m, feedback (gains), sensor, grip, operator, notes.")
     ] = field(default_factory=dict)

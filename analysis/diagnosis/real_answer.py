@@ -1,0 +1,151 @@
+"""What is said of one real recording, as plain values: a row of a table, a section of a page."""
+
+import json
+from dataclasses import asdict
+from typing import Any, Literal
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from analysis.diagnosis.document import Errors
+
+FORMAT, VERSION = "hapteq-real-answer", 1
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+Outcome = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained", "refused"]
+
+
+class RealAnswerError(ValueError):
+    """A document that is no such answer."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class HeldOutStretch:
+    """One channel over one stretch that nothing was fitted to; root-mean-squares in `unit`."""
+
+    record: str
+    channel: str
+    unit: str
+    start_s: float
+    stop_s: float
+    signal: float
+    retuned: float
+    after: float
+
+
+@dataclass(frozen=True, config=STRICT)
+class OwnNumber:
+    """A number of the simple model after everything, with its 95 % interval, and what is known by other means."""
+
+    name: str
+    unit: str
+    value: float
+    low: float | None
+    high: float | None
+    nominal: float | None
+
+    @property
+    def holds_nominal(self) -> bool | None:
+        if self.nominal is None or self.low is None or self.high is None:
+            return None
+        return self.low <= self.nominal <= self.high
+
+
+@dataclass(frozen=True, config=STRICT)
+class FurtherTest:
+    """Another recording of the device, predicted with what was found and nothing fitted; shares of the signal."""
+
+    recording: str
+    title: str
+    error: str
+    retuned: float | None
+    after: float | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, config=STRICT)
+class PairOutcome:
+    """Before and after something was changed. Errors on the held-out part of the recording from after."""
+
+    changed: str
+    before: str
+    after: str
+    verdict: Outcome
+    named: tuple[str, ...]
+    """Effects, each as a reader calls it with its numbers."""
+    returned: tuple[str, ...]
+    """Names of the vocabulary: what was named, and what these data cannot tell from it."""
+    as_before: float | None
+    """Of the model of before as it is,"""
+    gain: float | None
+    """with one factor re-tuned,"""
+    retuned: float | None
+    """re-tuned within its tolerances,"""
+    with_effects: float | None
+    """and with what is named."""
+    expected_left: float | None
+    """What the model misses on the recording from before, too."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class DrawnExcerpt:
+    """A held-out stretch in which it shows what was found."""
+
+    record: str
+    channel: str
+    unit: str
+    start_s: float
+    step_s: float
+    measured: tuple[float, ...]
+    retuned: tuple[float, ...]
+    after: tuple[float, ...]
+
+
+@dataclass(frozen=True, config=STRICT)
+class RealAnswer:
+    """One recording. Errors are shares of the signal."""
+
+    folder: str
+    recording: str
+    title: str
+    device: str
+    verdict: Outcome
+    answer: str
+    """The verdict as a sentence; where the recording was refused, why."""
+    model: str
+    """The simple model, in words."""
+    error: str
+    """How errors were measured; empty where nothing was."""
+    fitted: Errors | None
+    held_out: Errors | None
+    black_box: float | None
+    where: tuple[str, ...]
+    named: tuple[str, ...]
+    effects: tuple[str, ...]
+    """Names of the vocabulary."""
+    left: str
+    """What is still unexplained, in a sentence."""
+    remarks: tuple[str, ...]
+    numbers: tuple[OwnNumber, ...]
+    stretches: tuple[HeldOutStretch, ...]
+    excerpt: DrawnExcerpt | None
+    further: tuple[FurtherTest, ...]
+    pair: PairOutcome | None
+    objections: tuple[str, ...]
+    seconds: float
+
+
+def real_answer_to_json(answer: RealAnswer) -> dict[str, Any]:
+    """Plain values, without format and version."""
+    return asdict(answer)
+
+
+def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
+    """document: without format and version. Raises RealAnswerError."""
+    try:
+        return _ADAPTER.validate_json(json.dumps(document), strict=True)
+    except ValidationError as error:
+        raise RealAnswerError(str(error)) from error
+
+
+_ADAPTER: TypeAdapter[RealAnswer] = TypeAdapter(RealAnswer)

@@ -1,0 +1,93 @@
+"""One figure per real recording: a held-out stretch, measured and predicted, and the errors of all that was tried."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.diagnosis.real_answer import DrawnExcerpt, RealAnswer
+from analysis.diagnosis.unit_wording import scale_of
+from analysis.figures.diagnosis_style import AFTER, MEASURED, RETUNED
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, new_figure, plain_axes, say_nothing_to_draw
+
+_LOWEST = 1e-4
+"""Share of the signal below which nothing is drawn."""
+
+
+def real_picture(answer: RealAnswer) -> Picture:
+    rows = error_rows(answer)
+    said = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
+    return Picture(
+        name=f"held-out-{_plain(answer.folder)}-{_plain(answer.recording)}",
+        title=f"Held-out data of {answer.recording}",
+        caption="Left: where what was found changes the prediction most. Right: errors on all held-out data as a share "
+        "of the signal, logarithmic; shorter is better.",
+        figure=_drawn(answer.excerpt, rows),
+        alternative=said or "Nothing was held out.",
+    )
+
+
+def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
+    """What, share of the signal, colour."""
+    if answer.held_out is None:
+        return []
+    errors = answer.held_out
+    every = (
+        ("as given", errors.before, ORANGE),
+        ("re-tuned", errors.retuned, RETUNED.colour),
+        ("with what was found", errors.after if answer.effects else None, AFTER.colour),
+        ("black box", answer.black_box, GREEN),
+        ("noise alone", errors.noise, GREY),
+    )
+    return [(name, value, colour) for name, value, colour in every if value is not None and value > 0]
+
+
+def _drawn(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
+    if excerpt is None or not rows:
+        return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+    figure = new_figure(8.8, 3.4)
+    grid = figure.add_gridspec(1, 2, width_ratios=[1.75, 1])
+    _draw_excerpt(figure.add_subplot(grid[0, 0]), excerpt)
+    _draw_errors(figure.add_subplot(grid[0, 1]), rows)
+    handles = [MEASURED, RETUNED.handle, AFTER.handle]
+    figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
+    return figure
+
+
+def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
+    plain_axes(axes)
+    measured = np.array(excerpt.measured)
+    shown = scale_of(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
+    seconds = excerpt.start_s + excerpt.step_s * np.arange(len(measured))
+    axes.plot(seconds, shown.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    for stage, values in ((RETUNED, excerpt.retuned), (AFTER, excerpt.after)):
+        drawn = shown.factor * np.array(values)
+        axes.plot(seconds, drawn, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    reach = 1.6 * shown.factor * max(float(np.max(np.abs(measured), initial=0.0)), np.finfo(float).tiny)
+    low, high = axes.get_ylim()
+    axes.set_ylim(max(low, -reach), min(high, reach))
+    axes.set_xlabel(f"Time in {excerpt.record} (s)", fontsize=9.5)
+    axes.set_ylabel(f"{excerpt.channel} ({shown.unit})", fontsize=9.5)
+
+
+def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
+    plain_axes(axes)
+    at = np.arange(len(rows))
+    values = [max(value, _LOWEST) for _, value, _ in rows]
+    low = 0.5 * min(values)
+    axes.barh(at, [value - low for value in values], left=low, height=0.6, color=[colour for _, _, colour in rows])
+    axes.set_xscale("log")
+    axes.set_xlim(low, 3.0 * max(values))
+    for row, value in zip(at, values, strict=True):
+        axes.annotate(
+            f"{100 * value:.3g} %", (value, row), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8.5
+        )
+    axes.set_yticks(at, [name for name, _, _ in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.grid(False, axis="y")
+    axes.set_xticks([])
+    axes.set_xticks([], minor=True)
+
+
+def _plain(name: str) -> str:
+    return "".join(sign if sign.isalnum() else "-" for sign in name)

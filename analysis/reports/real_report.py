@@ -1,0 +1,154 @@
+"""The page about a folder of real recordings: what was named, what is left, what an expert would object."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.real_answer import OwnNumber, PairOutcome, RealAnswer
+from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.wording import error_text
+from analysis.figures.picture import Picture
+from analysis.figures.real_held_out import error_rows
+from analysis.reports.page import Page, Section, Table, render_page
+
+VERDICT_WORDS = {
+    "no_mismatch": "no mismatch",
+    "parameters": "parameters alone",
+    "explained": "explained",
+    "partly_explained": "partly explained",
+    "unexplained": "unexplained",
+    "refused": "refused",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """A folder or file that could not be used."""
+
+    where: str
+    why: str
+
+
+def render_real_report(
+    answers: Sequence[RealAnswer],
+    troubles: Sequence[Trouble],
+    pictures: Mapping[tuple[str, str], Picture],
+    provenance: Mapping[str, str],
+    generated_utc: str,
+) -> str:
+    """HTML. pictures: by folder and recording."""
+    sections = [Section("All recordings", tables=(overview_table(answers),))]
+    if troubles:
+        sections.append(Section("What could not be used", points=tuple(f"{one.where}: {one.why}" for one in troubles)))
+    sections += [_section(one, pictures.get((one.folder, one.recording))) for one in answers]
+    named = sum(bool(one.effects) for one in answers)
+    return render_page(
+        Page(
+            title="Diagnosis of real recordings",
+            summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named} of them "
+            "physics was named. What is left, and what speaks against each answer, is said beside it.",
+            banner=_banner(troubles),
+            sections=tuple(sections),
+            generated_utc=generated_utc,
+            provenance=provenance,
+        )
+    )
+
+
+def overview_table(answers: Sequence[RealAnswer]) -> Table:
+    header = ("recording", "verdict", "named", "as given", "re-tuned", "with what was found", "black box", "noise", "s")
+    return Table("Errors on held-out data, shares of the signal", header, tuple(_row(one) for one in answers))
+
+
+def _row(one: RealAnswer) -> tuple[str, ...]:
+    errors = one.held_out
+    shown = (
+        ("", "", "", "") if errors is None else tuple(map(error_text, (errors.before, errors.retuned, errors.noise)))
+    )
+    before, retuned, noise = shown[:3]
+    after = error_text(errors.after) if errors is not None and one.effects else "-"
+    named = ", ".join(one.effects) or "-"
+    box = "-" if one.black_box is None else error_text(one.black_box)
+    return (
+        f"{one.folder}: {one.recording}", VERDICT_WORDS[one.verdict], named,
+        before, retuned, after, box, noise, f"{one.seconds:.0f}",
+    )  # fmt: skip
+
+
+def _banner(troubles: Sequence[Trouble]) -> str:
+    if not troubles:
+        return ""
+    return f"{len(troubles)} folders or files could not be used; they are named below."
+
+
+def _section(one: RealAnswer, picture: Picture | None) -> Section:
+    points = (*one.where, *one.named, *(number_sentence(number) for number in one.numbers), *_pair_points(one.pair))
+    further = tuple(_further_sentence(*test) for test in _further(one))
+    objections = tuple(f"An expert would object: {said}" for said in one.objections)
+    paragraphs = (
+        *((one.title,) if one.title else ()),
+        one.answer,
+        *((f"The simple model: {one.model}",) if one.model else ()),
+        *((f"Errors are measured by {one.error}.",) if one.error else ()),
+        *((one.left,) if one.left else ()),
+    )
+    return Section(
+        f"{one.folder}: {one.recording}",
+        paragraphs=paragraphs,
+        points=(*points, *further, *one.remarks, *objections),
+        pictures=(picture,) if picture is not None and error_rows(one) else (),
+        tables=_tables(one),
+    )
+
+
+def _tables(one: RealAnswer) -> tuple[Table, ...]:
+    if not one.stretches:
+        return ()
+    rows = tuple(
+        (
+            f"{each.record}, {each.channel}, {each.start_s:.4g} to {each.stop_s:.4g} s",
+            value_text(each.signal, each.unit),
+            value_text(each.retuned, each.unit),
+            value_text(each.after, each.unit),
+            f"{each.after / each.retuned:.2f}" if each.retuned > 0 else "-",
+        )
+        for each in one.stretches
+    )
+    header = ("held-out stretch", "signal", "re-tuned", "with what was found", "ratio")
+    return (Table("Root-mean-square errors, stretch by stretch", header, rows),)
+
+
+def number_sentence(number: OwnNumber) -> str:
+    ends = None if number.low is None or number.high is None else (number.low, number.high)
+    said = f"The model's {number.name} is {value_text(number.value, number.unit, ends)} after everything"
+    if number.nominal is None:
+        return f"{said}."
+    off = 100 * (number.value / number.nominal - 1)
+    inside = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
+    known = value_text(number.nominal, number.unit)
+    return f"{said}; known by other means is {known}, {off:+.2g} % off{inside[number.holds_nominal]}."
+
+
+def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
+    if pair is None:
+        return ()
+    named = ", ".join(pair.named) if pair.named else "no effect of the catalogue"
+    return (
+        f"A change that was really made: {pair.changed} ({pair.before}, then {pair.after}). What the model missed "
+        f"before the change, {error_text(pair.expected_left)} of the signal, counts as no mismatch.",
+        f"Named as the change: {named}. Errors after it on held-out data: the model of before as it is "
+        f"{error_text(pair.as_before)}, with one factor re-tuned {error_text(pair.gain)}, re-tuned within its "
+        f"tolerances {error_text(pair.retuned)}, with what is named {error_text(pair.with_effects)}.",
+    )
+
+
+def _further(one: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
+    return [(each.recording, each.error, each.retuned, each.after, each.problem) for each in one.further]
+
+
+def _further_sentence(recording: str, error: str, retuned: float | None, after: float | None, problem: str) -> str:
+    if problem:
+        return f"A further test, {recording}, could not be made: {problem}"
+    return (
+        f"A further test, {recording}, nothing fitted to it, by {error}: re-tuned {error_text(retuned)}, with what was "
+        f"found {error_text(after)}."
+    )

@@ -1,0 +1,37 @@
+"""`hapteq real`: recordings of real devices against simple models, on one page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def real(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Its sub-folders hold recordings, and maps of them.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder of the page, the table, the figures and every diagnosis.")],
+    seconds: Annotated[
+        float, typer.Option(min=1.0, help="For a sub-folder: a search that is not done by then ends with what it has.")
+    ] = 150.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.
+
+    Maps that lie beside the recordings are taken, else ours. Interrupted, the same command goes on.
+    """
+    import json
+
+    from analysis.diagnosis.real_answer import real_answer_to_json
+    from study.cli.progress import steps
+    from study.workflows.real_recordings import RealPlan, diagnose_folder
+    from study.workflows.real_summary import real_lines
+
+    with steps("Real recordings") as show:
+        done = diagnose_folder(RealPlan(folder, out, seconds), show)
+    if as_json:
+        typer.echo(json.dumps([real_answer_to_json(one) for one in done.answers], indent=2))
+    else:
+        typer.echo("\n".join(real_lines(done)))

@@ -1,0 +1,26 @@
+"""Simple models of the devices that our maps are for."""
+
+from importlib.resources import files as resources
+from pathlib import Path
+
+from study.errors import WrongUseError
+from study.importing.map_errors import suggestion
+
+
+def shipped_models() -> tuple[str, ...]:
+    entries = resources("study.importing").joinpath("models").iterdir()
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
+
+
+def model_for(name: str, folder: Path) -> Path:
+    """A file beside a map, or one of ours by its name. Raises WrongUseError."""
+    if (beside := folder / name).is_file():
+        return beside
+    if name in shipped_models():
+        return Path(str(resources("study.importing").joinpath("models").joinpath(f"{name}.toml")))
+    raise WrongUseError(
+        "There is no such model",
+        f"'{name}' is neither a file in {folder.name} nor a model that comes with hapteq"
+        f"{suggestion(name, shipped_models())}; these are {', '.join(shipped_models())}.",
+        "Correct `model` in the map's [diagnosis], or leave it out: then a linear one is fitted.",
+    )

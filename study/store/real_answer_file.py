@@ -1,0 +1,31 @@
+"""`answer.json` of a real recording: the format `hapteq-real-answer`, version 1."""
+
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.real_answer import (
+    FORMAT,
+    VERSION,
+    RealAnswer,
+    RealAnswerError,
+    real_answer_from_json,
+    real_answer_to_json,
+)
+from study.store.file_errors import UnusableFileError
+from study.store.json_document import read_json, write_json
+from study.store.provenance import Provenance
+
+
+def read_real_answer(path: Path) -> RealAnswer:
+    """Raises CannotReadError, UnusableFileError."""
+    document: dict[str, Any] = read_json(path, FORMAT, VERSION)
+    document.pop("provenance", None)
+    try:
+        return real_answer_from_json(document)
+    except RealAnswerError as error:
+        raise UnusableFileError(path, "answer to a real recording", (str(error),)) from error
+
+
+def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_json(path, FORMAT, VERSION, real_answer_to_json(answer), provenance)

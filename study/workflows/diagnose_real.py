@@ -1,0 +1,180 @@
+"""One real recording: imported, compared with its simple model, and tested further, as plain values."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.diagnosis.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.belonging import NothingToDiagnose, require_model_of, require_something
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.explain import Progress
+from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.force_driven import all_force_driven
+from analysis.diagnosis.learn_clean_floor import NothingLearned
+from analysis.diagnosis.patience import Patience
+from analysis.diagnosis.played_errors import played_error
+from analysis.diagnosis.real_answer import FurtherTest, PairOutcome, RealAnswer
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+from study.errors import StudyError
+from study.importing.build_recording import build_recording
+from study.importing.map_library import FoundMap
+from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, nothing_to_diagnose
+from study.workflows.real_folder import RealRecording
+from study.workflows.worker_threads import worker_threads
+
+SHORT = "too short"
+"""What is said of a recording that holds too few cycles: of a real one, for which there is no other, it is a remark."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RealDiagnosis:
+    answer: RealAnswer
+    findings: Findings | None
+    """None where the recording was refused."""
+    parents: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Read:
+    recording: Recording
+    model: MechanicalModel
+    remarks: tuple[str, ...]
+    before: Recording | None
+
+
+def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progress) -> RealDiagnosis:
+    """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
+    parents = wanted.found.files if wanted.before is None else (*wanted.found.files, *wanted.before.files)
+    try:
+        read = _read(wanted, on_progress)
+        settings = DiagnosisSettings(
+            names=(wanted.name,), clean=() if read.before is None else (read.before,), patient=patient
+        )
+        with worker_threads() as threads:
+            found = diagnose((read.recording,), read.model, settings, threads.map, on_progress)
+            found = replace(found, remarks=(*read.remarks, *found.remarks))
+            diagnosis = wanted.found.source.map.diagnosis
+            names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
+            answer = answer_of_findings(found, read.recording, names, diagnosis.nominal, threads.map)
+    except (StudyError, NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+        return RealDiagnosis(_refused(wanted, refusal), None, parents)
+    further = tuple(_further(one, found) for one in wanted.tests)
+    pair = None if read.before is None else _pair(wanted, read, found)
+    objections = (
+        *diagnosis.objections,
+        *(said for one in wanted.tests for said in one.source.map.diagnosis.objections),
+    )
+    return RealDiagnosis(replace(answer, further=further, pair=pair, objections=objections), found, parents)
+
+
+def imported(found: FoundMap) -> Recording:
+    """One recording of force-driven kind. Raises StudyError."""
+    recording = build_recording(found.source.map, found.files, lambda share: None).recording
+    return all_force_driven([recording])[0]
+
+
+def _read(wanted: RealRecording, on_progress: Progress) -> _Read:
+    """Raises StudyError where there is nothing to diagnose."""
+    on_progress("importing", 0.0)
+    if why := wanted.found.source.map.diagnosis.skip:
+        raise nothing_to_diagnose((why,))
+    recording = imported(wanted.found)
+    remarks: tuple[str, ...] = ()
+    try:
+        require_something((recording,), (wanted.name,))
+    except NothingToDiagnose as refusal:
+        if not all(SHORT in problem for problem in refusal.problems):
+            raise nothing_to_diagnose(refusal.problems) from refusal
+        remarks = tuple(f"{problem}." for problem in refusal.problems)
+    before = None if wanted.before is None else imported(wanted.before)
+    model, said = _model(wanted, recording, on_progress)
+    return _Read(recording, model, (*remarks, *said), before)
+
+
+def _model(
+    wanted: RealRecording, recording: Recording, on_progress: Progress
+) -> tuple[MechanicalModel, tuple[str, ...]]:
+    given = wanted.model()
+    if given is None:
+        fitted = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
+        return fitted_model(fitted, lambda share: on_progress("fitting a linear model", 0.1 * share))
+    try:
+        require_model_of(given, (recording,))
+    except NothingToDiagnose as refusal:
+        raise nothing_to_diagnose(refusal.problems) from refusal
+    return given, ()
+
+
+def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
+    diagnosis = wanted.found.source.map.diagnosis
+    return RealAnswer(
+        folder=wanted.folder.name,
+        recording=wanted.name,
+        title=wanted.found.source.map.title,
+        device=wanted.found.source.map.device,
+        verdict="refused",
+        answer=refusal.happened if isinstance(refusal, StudyError) else f"The fits broke down: {refusal}.",
+        model="",
+        error="",
+        fitted=None,
+        held_out=None,
+        black_box=None,
+        where=(),
+        named=(),
+        effects=(),
+        left="",
+        remarks=(),
+        numbers=(),
+        stretches=(),
+        excerpt=None,
+        further=(),
+        pair=None,
+        objections=diagnosis.objections,
+        seconds=0.0,
+    )
+
+
+def _further(test: FoundMap, found: Findings) -> FurtherTest:
+    """Nothing is fitted to it but, where the map says so, its volume."""
+    title, free = test.source.map.title, test.source.map.diagnosis.volume_free
+    try:
+        recording = imported(test)
+        retuned, after = (played_error(recording, model, "all") for model in (retuned_model(found), found.improved))
+    except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
+        said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
+        return FurtherTest(test.name, title, "", None, None, said)
+    without, with_it = (one.with_gain if free else one.as_it_is for one in (retuned, after))
+    return FurtherTest(test.name, title, after.error + (", one factor fitted" if free else ""), without, with_it)
+
+
+def retuned_model(found: Findings) -> MechanicalModel:
+    """Re-tuned without new physics."""
+    assert found.tuning is not None
+    return found.tuning.tuned(found.explanation.retuned.fitted.deviations)
+
+
+def _pair(wanted: RealRecording, read: _Read, found: Findings) -> PairOutcome:
+    assert wanted.before is not None and read.before is not None
+    given = played_error(read.recording, read.model, "test")
+    missed = played_error(read.before, read.model, "test")
+    errors = found.diagnosis.fit.test
+    return PairOutcome(
+        changed=wanted.changed,
+        before=_file(wanted.before.files),
+        after=_file(wanted.found.files),
+        verdict=found.diagnosis.verdict,
+        named=named_sentences(found),
+        returned=found.diagnosis.returned_set,
+        as_before=given.as_it_is,
+        gain=given.with_gain,
+        retuned=errors.retuned,
+        with_effects=errors.after if found.diagnosis.effects else None,
+        expected_left=missed.as_it_is,
+    )
+
+
+def _file(files: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in files)

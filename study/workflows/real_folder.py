@@ -1,0 +1,105 @@
+"""What a folder of real recordings holds: sub-folders, each with recordings that a map tells how to read."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.reports.real_report import Trouble
+from equalizer.plant.mechanical_model import MechanicalModel
+from study.errors import StudyError
+from study.importing.map_library import FoundMap, find_map
+from study.importing.model_library import model_for
+from study.store.mechanical_model_file import read_mechanical_model
+
+
+@dataclass(frozen=True, slots=True)
+class RealRecording:
+    """One to diagnose."""
+
+    folder: Path
+    found: FoundMap
+    tests: tuple[FoundMap, ...] = ()
+    """Recordings of the same device that are only predicted."""
+    before: FoundMap | None = None
+    """The same device before something was changed on it,"""
+    changed: str = ""
+    """in words."""
+
+    @property
+    def name(self) -> str:
+        return self.found.name
+
+    def model(self) -> MechanicalModel | None:
+        """None where a linear one is to be fitted. Raises StudyError."""
+        wanted = self.found.source.map.diagnosis.model
+        return read_mechanical_model(model_for(wanted, self.folder)) if wanted else None
+
+
+@dataclass(frozen=True, slots=True)
+class RealFolder:
+    recordings: tuple[RealRecording, ...]
+    troubles: tuple[Trouble, ...]
+
+
+def read_real_folder(folder: Path) -> RealFolder:
+    """Sub-folders in order of their names; the folder itself where it has none. Raises StudyError where there is no
+    such folder."""
+    if not folder.is_dir():
+        raise StudyError(
+            "There is no such folder",
+            f"{folder} is no folder of recordings.",
+            "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
+            saved="Nothing was written.",
+        )
+    inner = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    recordings: list[RealRecording] = []
+    troubles: list[Trouble] = []
+    for each in inner or [folder]:
+        try:
+            found = _recordings(each, find_map(each))
+        except (StudyError, OSError) as problem:
+            troubles.append(Trouble(each.name, _said(problem)))
+            continue
+        if not found:
+            troubles.append(Trouble(each.name, "no map is for its files: there is none in it, and none of ours fits."))
+        recordings += found
+    return RealFolder(tuple(recordings), tuple(troubles))
+
+
+def _said(problem: StudyError | OSError) -> str:
+    return problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
+
+
+def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
+    made = []
+    for one in found:
+        if one.source.map.diagnosis.tests and any(_tests(one, other) for other in found):
+            continue
+        tests = tuple(other for other in found if _tests(other, one))
+        before, changed = _pair(one, found)
+        made.append(RealRecording(folder, one, tests, before, changed))
+    return made
+
+
+def _tests(test: FoundMap, base: FoundMap) -> bool:
+    """Whether one only tests what was found in the other; of maps with a recording per file, in the file whose name
+    begins alike, up to the first underline."""
+    wanted = test.source.map.diagnosis.tests
+    if not wanted or base.source.map.diagnosis.tests:
+        return False
+    if wanted == base.name:
+        return True
+    alike = test.files[0].stem.split("_")[0] == base.files[0].stem.split("_")[0]
+    return wanted == base.source.name and (not base.source.map.separate or alike)
+
+
+def _pair(one: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
+    for pair in one.source.map.diagnosis.pair:
+        if one.files[0].match(pair.after):
+            before = next((other for other in found if other.source is one.source and _is(other, pair.before)), None)
+            return before, pair.changed if before is not None else ""
+    return None, ""
+
+
+def _is(found: FoundMap, pattern: str) -> bool:
+    return found.files[0].match(pattern)

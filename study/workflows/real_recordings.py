@@ -1,0 +1,98 @@
+"""`hapteq real`: all recordings of a folder, one after the other. Answers that are there already are kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from analysis.diagnosis.real_answer import RealAnswer
+from study.devices.clock import Clock, RealClock
+from study.errors import LeftError
+from study.store.file_errors import CannotWriteError
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.new_folder import new_folder
+from study.store.provenance import gather_provenance
+from study.store.real_answer_file import read_real_answer, write_real_answer
+from study.workflows.diagnose_real import RealDiagnosis, diagnose_real, retuned_model
+from study.workflows.real_folder import RealFolder, RealRecording, read_real_folder
+from study.workflows.write_diagnosis import write_diagnosis_into
+from study.workflows.write_real import WrittenReal, write_real
+
+ANSWER_NAME, RETUNED_NAME = "answer.json", "retuned.toml"
+SECONDS = 150.0
+"""For a folder's recordings together: a search that is not done by then ends with what it has."""
+WITHOUT_MODEL_S = 25.0
+"""What fitting a model, a page and figures take beside the search, where nothing is known better."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class RealPlan:
+    folder: Path
+    out: Path
+    seconds: float = SECONDS
+
+
+def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None = None) -> WrittenReal:
+    """`on_progress(what is being done, share)`. Interrupted (LeftError), the same call goes on. Raises StudyError."""
+    found = read_real_folder(plan.folder)
+    time = clock or RealClock()
+    try:
+        plan.out.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(plan.out, problem) from problem
+    try:
+        answers = _answers(plan, found, on_progress, time)
+        on_progress("writing the page", 0.98)
+        return write_real(plan.out, answers, found.troubles, time.utc())
+    except (KeyboardInterrupt, LeftError) as interruption:
+        raise LeftError(
+            "Interrupted",
+            "Not all recordings were diagnosed.",
+            "Run the same command again: it goes on where it stopped.",
+            saved=f"What was answered so far is in {plan.out}.",
+        ) from interruption
+
+
+def _answers(plan: RealPlan, found: RealFolder, on_progress: Progress, clock: Clock) -> tuple[RealAnswer, ...]:
+    answers, count = [], max(len(found.recordings), 1)
+    left = dict.fromkeys((one.folder.name for one in found.recordings), plan.seconds)
+    for number, one in enumerate(found.recordings):
+        rest = sum(other.folder == one.folder for other in found.recordings[number:])
+        begun = clock.now_s()
+        budget = max(left[one.folder.name] / rest - WITHOUT_MODEL_S, 0.1 * plan.seconds)
+
+        def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
+            on_progress(f"{one.folder.name}, {one.name}: {what}", 0.98 * (number + min(share, 1.0)) / count)
+
+        answers.append(_answer(plan.out, one, (begun, budget), show, clock))
+        left[one.folder.name] -= clock.now_s() - begun
+    return tuple(answers)
+
+
+def _answer(
+    out: Path, one: RealRecording, time: tuple[float, float], on_progress: Progress, clock: Clock
+) -> RealAnswer:
+    """time: when it began, and the seconds that the search may take."""
+    folder = out / one.folder.name / one.name
+    kept = folder / ANSWER_NAME
+    if kept.is_file():
+        return read_real_answer(kept)
+    begun, seconds = time
+    done = diagnose_real(one, lambda: clock.now_s() - begun < seconds, on_progress)
+    answer = replace(done.answer, seconds=round(clock.now_s() - begun, 1))
+    _write(folder, replace(done, answer=answer))
+    return answer
+
+
+def _write(folder: Path, done: RealDiagnosis) -> None:
+    """Whole or not at all."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(folder, problem) from problem
+    with new_folder(folder) as part:
+        if done.findings is not None:
+            write_diagnosis_into(part, done.findings, done.parents)
+            write_mechanical_model(part / RETUNED_NAME, retuned_model(done.findings))
+        write_real_answer(part / ANSWER_NAME, done.answer, gather_provenance(parents=done.parents))

@@ -1,0 +1,25 @@
+"""What is said of a folder of real recordings at the end, in lines."""
+
+from analysis.diagnosis.real_answer import RealAnswer
+from analysis.diagnosis.wording import error_text
+from analysis.reports.real_report import VERDICT_WORDS
+from study.workflows.write_real import WrittenReal
+
+
+def real_lines(done: WrittenReal) -> tuple[str, ...]:
+    troubles = tuple(f"Could not be used: {one.where}: {one.why}" for one in done.troubles)
+    return (*(_line(one) for one in done.answers), *troubles, "", f"Page: {done.page}", f"Table: {done.table}")
+
+
+def _line(one: RealAnswer) -> str:
+    named = f": {', '.join(one.effects)}" if one.effects else ""
+    said = f"{one.folder}, {one.recording}: {VERDICT_WORDS[one.verdict]}{named}"
+    if one.held_out is None:
+        return f"{said}. {one.answer}"
+    errors = one.held_out
+    after = f", with what was found {error_text(errors.after)}" if one.effects else ""
+    box = "" if one.black_box is None else f", black box {error_text(one.black_box)}"
+    return (
+        f"{said}. Held out: as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}{after}{box} "
+        f"({one.seconds:.0f} s)."
+    )

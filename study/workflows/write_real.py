@@ -1,0 +1,68 @@
+"""The page, the table and the figures of a folder of real recordings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.diagnosis.real_answer import RealAnswer
+from analysis.figures.real_held_out import real_picture
+from analysis.reports.real_report import Trouble, render_real_report
+from study.store.csv_rows import rows_to_csv
+from study.store.provenance import gather_provenance
+from study.store.text_file import write_text
+from study.workflows.picture_files import write_pictures
+
+PAGE_NAME, TABLE_NAME, FIGURES_NAME = "report.html", "recordings.csv", "figures"
+
+
+@dataclass(frozen=True, slots=True)
+class RealRow:
+    """Errors are shares of the signal on held-out data."""
+
+    folder: str
+    recording: str
+    verdict: str
+    effects: str
+    measured_by: str
+    before: float | None
+    retuned: float | None
+    after: float | None
+    black_box: float | None
+    noise: float | None
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenReal:
+    answers: tuple[RealAnswer, ...]
+    troubles: tuple[Trouble, ...]
+    page: Path
+    table: Path
+
+
+def write_real(
+    out: Path, answers: Sequence[RealAnswer], troubles: Sequence[Trouble], generated_utc: str
+) -> WrittenReal:
+    """What is there from an earlier run is replaced. Raises CannotWriteError."""
+    pictures = {(one.folder, one.recording): real_picture(one) for one in answers}
+    write_pictures(out / FIGURES_NAME, tuple(pictures.values()))
+    write_text(out / TABLE_NAME, rows_to_csv([_row(one) for one in answers], RealRow), overwrite=True)
+    origin = gather_provenance()
+    shown = {
+        "command": " ".join(origin.command),
+        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
+    }
+    write_text(out / PAGE_NAME, render_real_report(answers, troubles, pictures, shown, generated_utc), overwrite=True)
+    return WrittenReal(tuple(answers), tuple(troubles), out / PAGE_NAME, out / TABLE_NAME)
+
+
+def _row(one: RealAnswer) -> RealRow:
+    errors = one.held_out
+    before, retuned, after, noise = (
+        (None, None, None, None) if errors is None else (errors.before, errors.retuned, errors.after, errors.noise)
+    )
+    effects = " ".join(one.effects)
+    return RealRow(
+        one.folder, one.recording, one.verdict, effects, one.error,
+        before, retuned, after, one.black_box, noise, one.seconds,
+    )  # fmt: skip
