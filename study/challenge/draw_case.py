@@ -10,13 +10,15 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
-from study.challenge.bench import Bench, draw_bench
-from study.challenge.device import Device, motion, record
+from study.challenge.bench import draw_bench
+from study.challenge.device import Device, motion
 from study.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
+from study.challenge.extras import with_extras
 from study.challenge.hidden import Circumstances, HiddenEffect
 from study.challenge.nominal import as_model, calibrated, retuned
-from study.challenge.sensor import RANGE_MPS2
+from study.challenge.rig import WHOLE, Rig
+from study.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read
 
 EFFECTS: dict[str, HiddenEffect] = {
     effect.name: effect
@@ -28,6 +30,8 @@ DECOYS: dict[str, HiddenEffect] = {effect.name: effect for effect in decoys.DECO
 """Outside of it."""
 
 Concealed = Literal["calibrated", "retuned"]
+Moved = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Acceleration and position of one device, then of another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,12 @@ class Case:
     recording: Recording
     model: MechanicalModel
     truth: tuple[Truth, ...]
+    adds: float = 0.0
+    """What the concealed effects change of the readings, in the worst channel: rms over that of the noise."""
+
+
+NOISE = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_M / 12**0.5))] * 3])
+"""Of acceleration, then position."""
 
 
 def draw_case(
@@ -56,6 +66,7 @@ def draw_case(
     concealed: Concealed = "calibrated",
     strength: float | Sequence[float] | None = None,
     name: str = "",
+    rig: Rig = WHOLE,
 ) -> Case:
     """effects: names, of the vocabulary or of DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, for all
     or one each; None draws it evenly. The same arguments give the same case.
@@ -67,16 +78,33 @@ def draw_case(
     if concealed == "retuned" and any(effect.name == "hand_impedance" for effect in hidden):
         raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
     random = np.random.default_rng([seed, len(hidden)])
-    bench, plan = draw_bench(random), draw_plan(random)
+    bench, plan = draw_bench(random), draw_plan(random, rig)
+    bare = with_extras(Device(bench), rig.extras, seed)
     strengths = _strengths(strength, len(hidden), random)
-    device, truth = _concealed(bench, plan, hidden, strengths, random)
-    response, position = record(device, plan.command, random)
+    free = motion(bare, plan.command)
+    device, truth = _concealed(bare, free, (hidden, strengths), random, rig)
+    moved = motion(device, plan.command) if hidden else free
+    response, position = read(device.sensor, *moved, RATE_HZ, random)
     if concealed == "calibrated":
-        known, tolerance = calibrated(bench, random)
+        known, tolerance = calibrated(bench, random, rig.axes)
     else:
-        known, tolerance = retuned(bench, response, plan)
+        known, tolerance = retuned(bench, response, plan, rig.axes)
     label = name or f"bench {seed}"
-    return Case(_recording(label, plan, response, position), as_model(label, known, tolerance), truth)
+    model = as_model(label, known, tolerance, rig.axes)
+    recording = recording_of(label, plan, response, position, rig)
+    return Case(recording, model, truth, added(bare, device, (free, moved), rig) if hidden else 0.0)
+
+
+def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
+    """By which two devices' readings differ: rms over that of the noise, in the worst channel. moved: how both move."""
+    readings = []
+    for one, (acceleration, position) in zip((bare, device), moved, strict=True):
+        # The same noise and the same losses for both: what is left is the difference of the devices.
+        seen, _ = read(one.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0))
+        readings.append(np.hstack([seen[:, rig.axes], position[:, rig.axes]]))
+    noise = NOISE[[*rig.axes, *(3 + axis for axis in rig.axes)]]
+    power = np.mean(((readings[1] - readings[0]) / noise) ** 2, axis=0)
+    return float(np.sqrt(power.max()))
 
 
 def _known(name: str) -> HiddenEffect:
@@ -94,20 +122,20 @@ def _strengths(given: float | Sequence[float] | None, count: int, random: np.ran
 
 
 def _concealed(
-    bench: Bench,
-    plan: DrivePlan,
-    hidden: Sequence[HiddenEffect],
-    strengths: FloatArray,
+    device: Device,
+    free: tuple[FloatArray, FloatArray],
+    wanted: tuple[Sequence[HiddenEffect], FloatArray],
     random: np.random.Generator,
+    rig: Rig,
 ) -> tuple[Device, tuple[Truth, ...]]:
-    device, truth = Device(bench), []
-    if not hidden:
-        return device, ()
-    acceleration, position = motion(device, plan.command)
+    """free: how the device moves without them."""
+    (hidden, strengths), (acceleration, position) = wanted, free
+    bench, truth = device.bench, []
     peak = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
     for effect, strength in zip(hidden, strengths, strict=True):
-        axis = int(random.integers(3))
-        at = Circumstances(random, float(strength), bench, axis, np.abs(position).max(axis=0), peak)
+        axis = rig.axes[int(random.integers(len(rig.axes)))]
+        travel = np.abs(position).max(axis=0)
+        at = Circumstances(random, float(strength), bench, axis, travel, peak, rig.axes)
         values = effect.draw(at)
         device = effect.build(device, axis, values)
         truth.append(_truth(effect, axis, values))
@@ -126,11 +154,13 @@ def _truth(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:
     )
 
 
-def _recording(name: str, plan: DrivePlan, response: FloatArray, position: FloatArray) -> Recording:
+def recording_of(name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, rig: Rig) -> Recording:
+    """response, position: (samples, 3)"""
+    axes, names = list(rig.axes), tuple(AXES[axis] for axis in rig.axes)
     return Recording(
         device=name,
-        command=Signal(plan.command, RATE_HZ, "force", "N", tuple(f"f{axis}" for axis in AXES)),
-        response=Signal(response, RATE_HZ, "acceleration", "m/s^2", tuple(f"a{axis}" for axis in AXES)),
-        position=Signal(position, RATE_HZ, "position", "m", AXES),
+        command=Signal(plan.command[:, axes], RATE_HZ, "force", "N", tuple(f"f{axis}" for axis in names)),
+        response=Signal(response[:, axes], RATE_HZ, "acceleration", "m/s^2", tuple(f"a{axis}" for axis in names)),
+        position=Signal(position[:, axes], RATE_HZ, "position", "m", names),
         segments=plan.segments,
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
+from study.challenge.rig import WHOLE, Rig
 
 RATE_HZ = 1000.0
 AXES = ("x", "y", "z")
@@ -25,21 +26,21 @@ class DrivePlan:
     segments: tuple[Segment, ...]
 
 
-def multisine(random: np.random.Generator, level_n: float) -> FloatArray:
-    """One period, (PERIOD,), with peak `level_n`: odd lines of amplitude f^-1/2 and random phase, one of every four
+def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD) -> FloatArray:
+    """One period, (period,), with peak `level_n`: odd lines of amplitude f^-1/2 and random phase, one of every four
     neighbours left silent, so that it shows what odd distortion puts there."""
-    lines = np.arange(FIRST_LINE, LAST_LINE + 1, 2)
+    lines = np.arange(FIRST_LINE, LAST_LINE * period // PERIOD + 1, 2)
     silent = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
-    spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
+    spectrum = np.zeros(period // 2 + 1, dtype=complex)
     spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / np.sqrt(lines)
     spectrum[silent] = 0.0
-    wave = np.fft.irfft(spectrum, PERIOD)
+    wave = np.fft.irfft(spectrum, period)
     shaped: FloatArray = level_n * wave / np.abs(wave).max()
     return shaped
 
 
-def draw_plan(random: np.random.Generator) -> DrivePlan:
-    """105 s."""
+def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
+    """105 s for the whole bench."""
     blocks: list[FloatArray] = []
     segments: list[Segment] = []
     start = 0
@@ -50,15 +51,17 @@ def draw_plan(random: np.random.Generator) -> DrivePlan:
         blocks.extend((block, np.zeros((REST, 3))))
         start += len(block) + REST
 
-    for axis in range(3):
+    for axis in rig.axes:
         for level_n in LEVELS_N:
-            wave = np.tile(multisine(random, level_n), PERIODS)
-            add(_along(axis, wave), "multisine", level_n, PERIOD, "fit")
-    for axis in range(3):
-        add(_along(axis, _sweep()), "sweep", SWEEP_N, 0, "test")
-    together = np.column_stack([multisine(random, LEVELS_N[1]) for _ in range(3)])
-    add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], PERIOD, "test")
-    add(_slow(), "slow", SLOW_N, 0, "test")
+            wave = np.tile(multisine(random, level_n, rig.period), rig.periods)
+            add(_along(axis, wave), "multisine", level_n, rig.period, "fit")
+    for axis in rig.axes:
+        add(_along(axis, _sweep(rig.along(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test")
+    together = np.zeros((rig.period, 3))
+    for axis in rig.axes:
+        together[:, axis] = multisine(random, LEVELS_N[1], rig.period)
+    add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], rig.period, "test")
+    add(_slow(rig), "slow", SLOW_N, 0, "test")
     return DrivePlan(np.vstack(blocks), tuple(segments))
 
 
@@ -68,19 +71,20 @@ def _along(axis: int, wave: FloatArray) -> FloatArray:
     return block
 
 
-def _sweep() -> FloatArray:
+def _sweep(samples: int) -> FloatArray:
     """Logarithmic, with a straight rise and fall."""
-    t, total = np.arange(SWEEP_SAMPLES) / RATE_HZ, SWEEP_SAMPLES / RATE_HZ
+    t, total = np.arange(samples) / RATE_HZ, samples / RATE_HZ
     octaves = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
     turns = SWEEP_HZ[0] * total / octaves * (np.exp(octaves * t / total) - 1.0)
-    rise = np.minimum(np.arange(SWEEP_SAMPLES) / SWEEP_FADE, 1.0)
+    rise = np.minimum(np.arange(samples) / SWEEP_FADE, 1.0)
     wave: FloatArray = SWEEP_N * np.sin(2 * np.pi * turns) * rise * np.append(1.0, rise[:0:-1])
     return wave
 
 
-def _slow() -> FloatArray:
+def _slow(rig: Rig) -> FloatArray:
     """All axes at once, each at its own frequency; it ends without a fall."""
-    t = np.arange(SLOW_SAMPLES) / RATE_HZ
-    rise = np.minimum(np.arange(SLOW_SAMPLES) / SLOW_FADE, 1.0)
-    block: FloatArray = SLOW_N * np.sin(2 * np.pi * np.outer(t, SLOW_HZ)) * rise[:, None]
+    samples = np.arange(rig.along(SLOW_SAMPLES))
+    rise = np.minimum(samples / SLOW_FADE, 1.0)
+    block: FloatArray = SLOW_N * np.sin(2 * np.pi * np.outer(samples / RATE_HZ, SLOW_HZ)) * rise[:, None]
+    block[:, [axis for axis in range(3) if axis not in rig.axes]] = 0.0
     return block

@@ -27,6 +27,8 @@ class Circumstances:
     """(3,): how far the handle moves from the centre where nothing is concealed."""
     peak_mps2: FloatArray
     """(3,): the largest reading there."""
+    axes: tuple[int, ...] = (0, 1, 2)
+    """Those that are driven and read."""
 
     def between(self, weakest: float, strongest: float) -> float:
         return float(weakest * (strongest / weakest) ** self.strength)

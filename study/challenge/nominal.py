@@ -24,8 +24,8 @@ DECIMALS = 8
 """Significant digits of the matrices in the file."""
 
 
-def calibrated(bench: Bench, random: np.random.Generator) -> tuple[Bench, Tolerance]:
-    """The bench as its owner knows it, and how well."""
+def calibrated(bench: Bench, random: np.random.Generator, axes: tuple[int, ...] = (0, 1, 2)) -> tuple[Bench, Tolerance]:
+    """The bench as its owner knows it, and how well. axes: those of which anything is unknown."""
     tolerance = Tolerance(
         mass_kg=float(np.diag(bench.mass).mean() * random.uniform(0.013, 0.022)),
         damping_n_s_per_m=float(np.diag(bench.damping).mean() * random.uniform(0.035, 0.09)),
@@ -33,26 +33,33 @@ def calibrated(bench: Bench, random: np.random.Generator) -> tuple[Bench, Tolera
         modes=MODES_TOLERANCE,
     )
     sizes = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
-    return shifted(bench, random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)), tolerance
+    off = random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)
+    return shifted(bench, off * _of_axes(axes)), tolerance
 
 
-def retuned(bench: Bench, response: FloatArray, plan: DrivePlan) -> tuple[Bench, Tolerance]:
-    """The bench whose nine numbers fit the response (samples, 3) of the multisines at 1.5 N best."""
+def retuned(
+    bench: Bench, response: FloatArray, plan: DrivePlan, axes: tuple[int, ...] = (0, 1, 2)
+) -> tuple[Bench, Tolerance]:
+    """The bench whose numbers at these axes, nine of three, fit the response (samples, 3) of the multisines at 1.5 N
+    best."""
     parts = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
     commands = [plan.command[s.start : s.stop] for s in parts]
-    wanted = np.vstack([response[s.start : s.stop] for s in parts]) / NOISE_MPS2
+    seen, free = list(axes), _of_axes(axes)
+    noise = np.array(NOISE_MPS2)[seen]
+    wanted = np.vstack([response[s.start : s.stop, seen] for s in parts]) / noise
     steps = np.repeat((1e-3, 1e-2, 1.0), 3)
     shift = np.zeros(9)
 
     def predicted(at: FloatArray) -> FloatArray:
-        return np.vstack([_linear_response(shifted(bench, at), command) for command in commands]) / NOISE_MPS2
+        played = np.vstack([_linear_response(shifted(bench, at), command)[:, seen] for command in commands])
+        return np.asarray(played / noise)
 
     slopes = np.zeros((wanted.size, 9))
     for turn in range(ROUNDS):
         here = predicted(shift)
         if turn < SLOPES_ANEW:
             each = [(predicted(shift + h * unit) - here).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)]
-            slopes = np.column_stack(each)
+            slopes = np.column_stack(each) * free
         change = np.linalg.lstsq(slopes, (wanted - here).ravel(), rcond=None)[0]
         shift = _within(shift + change, bench)
         if np.abs(change / steps).max() < 0.05:
@@ -68,14 +75,20 @@ def shifted(bench: Bench, by: FloatArray) -> Bench:
     )
 
 
-def as_model(name: str, bench: Bench, tolerance: Tolerance) -> MechanicalModel:
+def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...] = (0, 1, 2)) -> MechanicalModel:
     """Values as they are written: 8 significant digits."""
     mass, damping, stiffness = (_rounded(matrix) for matrix in bench.matrices())
-    seen = np.eye(len(AXES), len(mass))
+    seen = np.eye(len(AXES), len(mass))[list(axes)]
     return MechanicalModel(
         name, "acceleration", mass, damping, stiffness, seen.T, seen,
         sensor=SensorLimits(BANDWIDTH_HZ, RANGE_MPS2), tolerance=tolerance,
     )  # fmt: skip
+
+
+def _of_axes(axes: tuple[int, ...]) -> FloatArray:
+    """(9,): 1 for what belongs to these axes, else 0."""
+    mask: FloatArray = np.array([float(axis in axes) for axis in range(3)] * 3)
+    return mask
 
 
 def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:

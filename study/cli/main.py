@@ -26,6 +26,8 @@ from study.cli import (
     noise,
     note,
     protocol,
+    prove,
+    real,
     record,
     rehearse,
     reproduce,
@@ -61,6 +63,8 @@ app.command("identify")(identify.identify)
 app.command("equalize")(equalize.equalize)
 app.command("twin")(twin.twin)
 app.command("diagnose")(diagnose.diagnose)
+app.command("real")(real.real)
+app.command("prove")(prove.prove)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)
 app.command("watch")(watch.watch)

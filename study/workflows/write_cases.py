@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 from study.challenge.draw_case import Case
 from study.store.mechanical_model_file import write_mechanical_model
@@ -18,7 +19,11 @@ def write_case(folder: Path, name: str, case: Case, *, overwrite: bool = False) 
 
 def truth_text(case: Case) -> str:
     """A JSON list, one entry per effect; empty where the model lacks nothing."""
-    entries = [
+    return json.dumps(truths(case), indent=1, allow_nan=False) + "\n"
+
+
+def truths(case: Case) -> list[dict[str, Any]]:
+    return [
         {
             "effect": truth.effect,
             "place": truth.place,
@@ -28,4 +33,3 @@ def truth_text(case: Case) -> str:
         }
         for truth in case.truth
     ]
-    return json.dumps(entries, indent=1, allow_nan=False) + "\n"

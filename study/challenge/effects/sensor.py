@@ -71,9 +71,9 @@ def _curve(device: Device, axis: int, values: Values) -> Device:
 
 
 def _shares(at: Circumstances) -> dict[str, float]:
-    """Of the three channels, the largest 1."""
+    """Of the three channels, the largest that is read 1."""
     drawn = at.direction()
-    drawn /= np.abs(drawn).max() * at.sign()
+    drawn /= np.abs(drawn[list(at.axes)]).max() * at.sign()
     return dict(zip(("share_x", "share_y", "share_z"), map(float, drawn), strict=True))
 
 

@@ -1,0 +1,74 @@
+"""One case of a bank once its label is revealed: what was concealed, and what was said."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Diagnosis, NamedEffect
+
+DETECTABLE = 1.25
+"""Of the re-tuned model's errors over the noise, in the worst channel, on samples that nothing was fitted to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Concealed:
+    effect: str
+    place: str
+    axis: str | None
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    number: int
+    seed: int
+    kind: str
+    """nothing, single, pair, outside (the catalogue) or without (the true effect was not to be considered)."""
+    bank: str
+    """main, dirty (more hidden extras) or engine (a second physics engine)."""
+    axes: tuple[str, ...]
+    model: str
+    """How the model came about: calibrated, or retuned to the device as it is."""
+    concealed: tuple[Concealed, ...]
+    strengths: tuple[float, ...]
+    """0 = the weakest that is drawn, 1 = the strongest."""
+    adds: float
+    """By how much the concealed effects change the readings: rms over the noise's, in the worst channel."""
+    said: Diagnosis | None
+    """None: the diagnosis broke down."""
+    channel_errors: Mapping[str, Mapping[str, float]]
+    """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
+    seconds: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(one.effect for one in self.concealed)
+
+    @property
+    def named(self) -> tuple[NamedEffect, ...]:
+        return () if self.said is None else self.said.effects
+
+    @property
+    def named_names(self) -> tuple[str, ...]:
+        return tuple(one.effect for one in self.named)
+
+    @property
+    def verdict(self) -> str:
+        return "failed" if self.said is None else self.said.verdict
+
+    @property
+    def detectable(self) -> bool:
+        """A diagnosis that broke down counts as one that should have seen something."""
+        return self.said is None or self.left("retuned") > DETECTABLE
+
+    @property
+    def right(self) -> bool:
+        """Exactly the concealed effects are named."""
+        return sorted(self.named_names) == sorted(self.names)
+
+    @property
+    def returned(self) -> tuple[str, ...]:
+        return () if self.said is None else self.said.returned_set
+
+    def left(self, stage: str) -> float:
+        """Error over noise in the worst channel; nan where it is not known."""
+        return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))

@@ -1,0 +1,50 @@
+"""Numbers with their uncertainty: shares after Wilson, medians and means by resampling."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from statsmodels.stats.proportion import proportion_confint
+
+from equalizer.signals.signal import FloatArray
+
+Item = TypeVar("Item")
+RESAMPLED = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A share (of `of` draws `hits`), or a statistic of `of` values (`hits` None), with its 95 % interval."""
+
+    name: str
+    value: float | None
+    """None where nothing was drawn that it could be of."""
+    low: float | None
+    high: float | None
+    of: int
+    hits: int | None = None
+
+
+def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Figure:
+    hits, of = sum(right(one) for one in among), len(among)
+    if not of:
+        return Figure(name, None, None, None, 0, 0)
+    low, high = wilson(hits, of)
+    return Figure(name, hits / of, low, high, of, hits)
+
+
+def wilson(hits: int, of: int) -> tuple[float, float]:
+    low, high = proportion_confint(hits, of, method="wilson")
+    return float(low), float(high)
+
+
+def statistic(name: str, values: Iterable[float], of: Callable[..., FloatArray]) -> Figure:
+    """of: takes (resamples, values) and axis=1, such as np.median. Bootstrap intervals, always the same."""
+    known = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
+    if not len(known):
+        return Figure(name, None, None, None, 0)
+    value = float(of(known[None, :], axis=1)[0])
+    drawn = np.random.default_rng(20).integers(len(known), size=(RESAMPLED, len(known)))
+    low, high = np.quantile(of(known[drawn], axis=1), (0.025, 0.975))
+    return Figure(name, value, float(low), float(high), len(known))

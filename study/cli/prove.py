@@ -1,0 +1,43 @@
+"""`hapteq prove`: how often the diagnosis is right about physics that was concealed from it."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def prove(
+    out: Annotated[Path, typer.Option(help="Folder of the bank and the results; new, or the one to go on with.")],
+    cases: Annotated[int, typer.Option(min=1, max=100_000, help="How many devices are drawn.")] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all draws but the salt of the labels.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    brief: Annotated[bool, typer.Option("--brief", help="Short recordings: a quick look.")] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings, 1 to 4 MB each.")] = False,
+    table: Annotated[Path | None, typer.Option(help="A small table of the figures, CSV, to be kept.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Conceal physics in simulated devices, seal what it is, diagnose them blind, and count.
+
+    Writes proof.json, proof.csv and report.html. Interrupted, the same command goes on.
+    """
+    from study.cli.progress import steps
+    from study.workflows.proof_summary import proof_lines, summary
+    from study.workflows.prove import prove as proved
+    from study.workflows.seal_cases import BankPlan
+    from study.workflows.write_proof import write_proof, write_table
+
+    with steps("Proving") as show:
+        proof = proved(
+            out,
+            BankPlan(seed, cases, brief),
+            workers,
+            lambda what, done, of: show(f"{what} {done} of {of}", done / max(of, 1)),
+            keep,
+        )
+    write_proof(proof)
+    if table is not None:
+        write_table(table, proof)
+    typer.echo(json.dumps(summary(proof), indent=2) if as_json else "\n".join(proof_lines(proof)))

@@ -1,0 +1,100 @@
+"""The diagnosis of a bank in a process of its own: `python -m study.workflows.answer_cases FOLDER`.
+
+It is given the folder of open cases and nothing else, reads a case's name per line, and says the name again once
+answer.json lies in the case's folder. It cannot import what the cases were made with, and opens no file beside them.
+"""
+
+import hashlib
+import json
+import signal
+import sys
+import time
+import traceback
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+import analysis.diagnosis
+import equalizer
+from study.store.provenance import sha256_of
+from study.store.text_file import read_text, write_text
+from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS
+
+APART = "study.challenge"
+
+
+def main(arguments: list[str]) -> None:
+    cases = Path(arguments[0]).resolve()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent ends us
+    stay_apart(cases)
+    digest = engine_digest()
+    for line in sys.stdin:
+        answer(cases / line.strip(), digest)
+        sys.stdout.write(line)
+        sys.stdout.flush()
+
+
+def stay_apart(cases: Path) -> None:
+    """From here on, what made the cases cannot be loaded, and no file beside them can be opened by Python."""
+    sys.modules[APART] = cast(ModuleType, None)
+    beside, inside = f"{cases.parent}/", f"{cases}/"
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open" and isinstance(arguments[0], str):
+            path = str(Path(arguments[0]).absolute())
+            if path.startswith(beside) and not path.startswith(inside):
+                raise PermissionError(f"a diagnosis must not open {path}")
+
+    sys.addaudithook(watch)
+
+
+def answer(place: Path, digest: str) -> None:
+    """Writes answer.json, whole or not at all. What breaks the diagnosis is an answer, too: a wrong one."""
+    began, worked = time.perf_counter(), time.process_time()
+    try:
+        said = _diagnosed(place)
+    except Exception:  # noqa: BLE001 - the bank goes on, and the score counts it
+        said = {"failed": traceback.format_exc()}
+    said |= {
+        "name": place.name,
+        "seconds": time.perf_counter() - began,
+        "cpu_seconds": time.process_time() - worked,
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "engine": digest,
+        "knows_the_challenge": challenge_is_loaded(),
+    }
+    write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
+
+
+def challenge_is_loaded() -> bool:
+    """The name alone stands for nothing: that is how its import is forbidden."""
+    return any(name.split(".")[:2] == APART.split(".") for name, one in vars(sys)["modules"].items() if one is not None)
+
+
+def engine_digest() -> str:
+    """Of all code that an answer hangs on."""
+    digest = hashlib.sha256()
+    for package in (analysis.diagnosis, equalizer):
+        root = Path(package.__path__[0])
+        for file in sorted(root.rglob("*.py")):
+            digest.update(str(file.relative_to(root)).encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _diagnosed(place: Path) -> dict[str, Any]:
+    from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+    from analysis.diagnosis.document import diagnosis_to_json
+    from study.store.mechanical_model_file import read_mechanical_model
+    from study.store.recording_file import read_recording
+
+    asked = json.loads(read_text(place / SETTINGS))
+    recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
+    settings = DiagnosisSettings(without=tuple(asked["without"]))
+    found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
+    errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
+    return {"diagnosis": diagnosis_to_json(found.diagnosis), "channel_errors": errors}
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

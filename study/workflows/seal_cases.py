@@ -1,0 +1,89 @@
+"""A bank's cases as files: what a diagnosis gets, and apart from it the truth, under a seal that comes first."""
+
+import hashlib
+import json
+import secrets
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from study.challenge import second_engine
+from study.challenge.draw_bank import Draw, case_of, draw
+from study.challenge.draw_case import Case
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.provenance import sha256_of
+from study.store.recording_file import write_recording
+from study.store.text_file import write_text
+from study.workflows.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.workflows.worker_processes import worker_processes
+from study.workflows.write_cases import truths
+
+SALT_BYTES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class BankPlan:
+    seed: int
+    cases: int
+    brief: bool = False
+    """One axis and short periods: for tests, and for a quick look."""
+
+
+def to_draw(plan: BankPlan) -> tuple[Draw, ...]:
+    """All that can be drawn here: without the second engine its cases are left out."""
+    whole = (draw(plan.seed, number, plan.brief) for number in range(plan.cases))
+    return tuple(one for one in whole if one.bank != "engine" or second_engine.is_installed())
+
+
+def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
+    """Draws, writes and seals what is not sealed yet, calling `on_sealed(how many are)`. Returns the SHA-256 of
+    labels.sha256, to be kept elsewhere before anything is diagnosed. Raises StudyError."""
+    drawn = to_draw(plan)
+    left = [one for one in drawn if not folder.label(one.number).exists()]
+    done = len(drawn) - len(left)
+    on_sealed(done)
+    with worker_processes(workers if len(left) > 1 else 1) as pool:
+        for finished in as_completed([pool.submit(seal_one, folder, one) for one in left]):
+            finished.result()
+            done += 1
+            on_sealed(done)
+    lines = (f"{sha256_of(path)}  sealed/{path.name}\n" for path in sorted(folder.sealed.glob("*.json")))
+    text = "".join(lines)
+    write_text(folder.seals, text, overwrite=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def seal_one(folder: ProofFolder, one: Draw) -> None:
+    """The label comes last: a case without one is drawn again."""
+    name = secrets.token_hex(6)
+    case, place = case_of(one, name), folder.open / name
+    place.mkdir()
+    write_recording(place / RECORDING, case.recording, precision="float32")
+    write_mechanical_model(place / MODEL, case.model)
+    write_text(place / SETTINGS, json.dumps({"without": list(one.without)}) + "\n")
+    write_text(folder.label(one.number), json.dumps(_label(one, case, place), indent=1, allow_nan=False) + "\n")
+
+
+def _label(one: Draw, case: Case, place: Path) -> dict[str, Any]:
+    """All that is concealed. The salt keeps a hash from being guessed: there are few effects."""
+    drawn = asdict(one)
+    return {
+        "name": place.name,
+        **{key: drawn[key] for key in ("number", "seed", "kind", "bank", "strengths", "concealed")},
+        "axes": ["xyz"[axis] for axis in one.rig.axes],
+        "extras": one.rig.extras,
+        "without": list(one.without),
+        "truth": truths(case),
+        "adds": case.adds,
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "salt": secrets.token_hex(SALT_BYTES),
+    }
+
+
+def sealed_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
+    """What the cases are called under `open`, in the order of their numbers."""
+    found = [json.loads(folder.label(number).read_text(encoding="utf-8")) for number in numbers]
+    return tuple(str(label["name"]) for label in found)
