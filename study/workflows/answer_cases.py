@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
@@ -18,7 +19,7 @@ import analysis.diagnosis
 import equalizer
 from study.store.provenance import sha256_of
 from study.store.text_file import read_text, write_text
-from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS
+from study.workflows.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS
 
 APART = "study.challenge"
 
@@ -82,6 +83,11 @@ def engine_digest() -> str:
     return digest.hexdigest()[:16]
 
 
+def _patience(seconds: float | None) -> Callable[[], bool]:
+    begun = time.perf_counter()
+    return lambda: seconds is None or time.perf_counter() - begun < seconds
+
+
 def _diagnosed(place: Path) -> dict[str, Any]:
     from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
     from analysis.diagnosis.document import diagnosis_to_json
@@ -90,7 +96,8 @@ def _diagnosed(place: Path) -> dict[str, Any]:
 
     asked = json.loads(read_text(place / SETTINGS))
     recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
-    settings = DiagnosisSettings(without=tuple(asked["without"]))
+    clean = tuple(read_recording(path) for path in sorted(place.glob(f"{CLEAN}/*.h5")))
+    settings = DiagnosisSettings(without=tuple(asked["without"]), clean=clean, patient=_patience(asked.get("seconds")))
     found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
     errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
     return {"diagnosis": diagnosis_to_json(found.diagnosis), "channel_errors": errors}

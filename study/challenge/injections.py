@@ -1,0 +1,184 @@
+"""Faults of sensor, clock and line, put into a recording of a real device: real noise, known truth.
+
+Written for the challenge alone: nothing of it is shared with the effects that a diagnosis compares.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+MAINS_HZ = (50.0, 60.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a fault is drawn for."""
+
+    rate_hz: float
+    rms: float
+    """Of the largest channel."""
+    middle_hz: float
+    """Below which half of the response's power lies."""
+    seconds: float
+
+
+Draw = Callable[[Reading, float, np.random.Generator], dict[str, float]]
+"""Numbers of a fault from its strength, 0 (weakest) to 1."""
+Spoil = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], FloatArray]
+"""Response (n, p), sample rate, numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Injection:
+    effect: str
+    """As the vocabulary calls it."""
+    draw: Draw
+    spoil: Spoil
+    axes: int = 1
+    """Response channels that it needs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Injected:
+    recording: Recording
+    effect: str
+    """Empty where nothing was injected."""
+    values: dict[str, float]
+    strength: float
+    change: FloatArray
+    """(p,): rms of what it changed."""
+
+
+def _between(low: float, high: float, strength: float) -> float:
+    return float(low * (high / low) ** strength)
+
+
+def _lag(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    share = 1.0 - np.exp(-2 * np.pi * of["bandwidth"] / rate_hz)
+    filtered, _ = lfilter([share], [1.0, share - 1.0], samples, axis=0, zi=(1.0 - share) * samples[:1])
+    return np.asarray(filtered)
+
+
+def _clip(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(np.clip(samples, -of["limit"], of["limit"]))
+
+
+def _hum(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    turns = of["frequency"] * np.arange(len(samples)) / rate_hz + of["turn"]
+    return np.asarray(samples + of["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
+
+
+def _drift(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return samples + of["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
+
+
+def _offset(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return samples + of["offset"]
+
+
+def _steps(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(of["step"] * np.round(samples / of["step"]))
+
+
+def _lose(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    lost = random.random(len(samples)) < of["fraction"]
+    lost[0] = False
+    kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
+    return np.asarray(samples[kept])
+
+
+def _other_clock(
+    samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
+    at = np.arange(len(samples), dtype=np.float64)
+    read = at * (1.0 + 1e-6 * of["ppm"])
+    return np.column_stack([np.interp(read, at, channel) for channel in samples.T])
+
+
+def _turn(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    about = np.array([of["about_x"], of["about_y"], of["about_z"]])
+    return np.asarray(Rotation.from_rotvec(np.radians(of["degrees"]) * about).apply(samples))
+
+
+def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dict[str, float]:
+    x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
+    return {"degrees": _between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
+
+
+def _either(random: np.random.Generator) -> float:
+    return float(random.choice((-1.0, 1.0)))
+
+
+INJECTIONS: tuple[Injection, ...] = (
+    Injection("sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _between(20.0, 0.5, s)}, _lag),
+    Injection("sensor_clipping", lambda at, s, r: {"limit": at.rms * _between(3.0, 0.7, s)}, _clip),
+    Injection(
+        "mains_hum",
+        lambda at, s, r: {
+            "amplitude": at.rms * _between(0.01, 1.0, s),
+            "frequency": float(r.choice(MAINS_HZ)) + float(r.normal(0.0, 0.02)),
+            "turn": float(r.random()),
+        },
+        _hum,
+    ),
+    Injection("sensor_drift", lambda at, s, r: {"total": _either(r) * at.rms * _between(0.05, 3.0, s)}, _drift),
+    Injection("sensor_offset", lambda at, s, r: {"offset": _either(r) * at.rms * _between(0.02, 1.5, s)}, _offset),
+    Injection("quantization", lambda at, s, r: {"step": at.rms * _between(0.05, 1.5, s)}, _steps),
+    Injection("lost_samples", lambda at, s, r: {"fraction": _between(0.003, 0.3, s)}, _lose),
+    Injection(
+        "clock_drift",
+        lambda at, s, r: {"ppm": _either(r) * 1e6 * _between(0.02, 1.0, s) / at.middle_hz / at.seconds},
+        _other_clock,
+    ),
+    Injection("sensor_misalignment", _draw_turn, _turn, axes=3),
+)
+
+
+def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> Injected:
+    """effect: of INJECTIONS; empty = nothing is injected. Raises ValueError for a name or a strength that is none, or
+    a fault that needs more channels than there are."""
+    if not effect:
+        return Injected(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
+    wanted = next((one for one in INJECTIONS if one.effect == effect), None)
+    if wanted is None:
+        raise ValueError(
+            f"nobody knows how to inject '{effect}'; known are {', '.join(one.effect for one in INJECTIONS)}"
+        )
+    if not 0.0 <= strength <= 1.0:
+        raise ValueError(f"strength is {strength}; it must lie between 0 and 1")
+    samples = recording.response.samples
+    if samples.shape[1] < wanted.axes:
+        raise ValueError(f"{effect} needs {wanted.axes} response channels, and there are {samples.shape[1]}")
+    values = wanted.draw(reading_of(recording), strength, random)
+    spoiled = np.asarray(wanted.spoil(samples, recording.sample_rate_hz, values, random))
+    change = np.sqrt(np.nanmean((spoiled - samples) ** 2, axis=0))
+    response = replace(recording.response, samples=spoiled)
+    return Injected(replace(recording, response=response), effect, values, strength, np.asarray(change))
+
+
+def fitting_injections(recording: Recording) -> tuple[str, ...]:
+    """Names of the faults that the recording can carry: mains hum asks for a rate well above it."""
+    width, rate_hz = recording.response.samples.shape[1], recording.sample_rate_hz
+    hums = rate_hz > 4 * max(MAINS_HZ)
+    return tuple(one.effect for one in INJECTIONS if one.axes in (1, width) and (hums or one.effect != "mains_hum"))
+
+
+def reading_of(recording: Recording) -> Reading:
+    samples = recording.response.samples
+    known = samples[np.isfinite(samples).all(axis=1)]
+    moving = known - known.mean(axis=0)
+    power = np.sum(np.abs(np.fft.rfft(moving, axis=0)) ** 2, axis=1)
+    rate_hz = recording.sample_rate_hz
+    middle = float(np.searchsorted(np.cumsum(power), power.sum() / 2)) * rate_hz / len(known)
+    return Reading(
+        rate_hz,
+        float(np.sqrt(np.mean(moving**2, axis=0)).max()),
+        max(middle, rate_hz / len(known)),
+        len(samples) / rate_hz,
+    )
