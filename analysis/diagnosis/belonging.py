@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analysis.diagnosis.answering import SURE, answer
-from analysis.diagnosis.growth import GROWTH, growth_rate
+from analysis.diagnosis.growth import GROWTH, growth_rate, motions
 from equalizer.effects.placing import PlacingError, placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -14,6 +14,8 @@ from equalizer.signals.signal import Signal
 
 LEAST_SAMPLES = 256
 """With a response, in all recordings together: fewer carry neither a fit nor a test."""
+SHORT_S, SHORT_SAMPLES = 1.5, 2000
+"""What lasts less and holds fewer does neither: one course explains it as well as another."""
 LEAST_CYCLES = 3.0
 """Of the commands' middle frequency, in all recordings together."""
 LARGEST = 1e12
@@ -57,6 +59,11 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
         cycles = sum(_cycles(one) for one in recordings)
         if known < LEAST_SAMPLES:
             problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
+        elif known < SHORT_SAMPLES and known / recordings[0].sample_rate_hz < SHORT_S:
+            problems.append(
+                f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording; at least "
+                f"{SHORT_S:g} s or {SHORT_SAMPLES} samples are needed, one part to fit and one to test"
+            )
         elif cycles < LEAST_CYCLES:
             problems.append(
                 f"the recording holds about {cycles:.2g} cycles of what was commanded, which is too short; at least "
@@ -76,7 +83,7 @@ def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) ->
     first = recordings[0]
     problems = (*_size(model, first), *_kind(model, first), *_absurd_model(model))
     if not problems:
-        problems = (*_idle(model, first), *_runaway(model, recordings), *_effects(model, first))
+        problems = (*_idle(model, first), *_runaway(model, recordings), *_fast(model, first), *_effects(model, first))
     if problems:
         raise NothingToDiagnose(problems)
 
@@ -189,6 +196,17 @@ def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterato
         yield (
             f"the model is unstable: undisturbed it grows e-fold in {1 / fastest:.3g} s; damping and stiffness must "
             "not be negative"
+        )
+
+
+def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """Where the rate is a thousand times too low, most likely."""
+    swings_hz = np.abs(motions(model).imag) / (2 * np.pi)
+    slowest_hz = min((float(one) for one in swings_hz if one > 0), default=0.0)
+    if slowest_hz > recording.sample_rate_hz / 2:
+        yield (
+            f"the model swings at {slowest_hz:.3g} Hz and faster, which nobody can see at a rate of "
+            f"{recording.sample_rate_hz:g} Hz; the recording must state its rate in hertz"
         )
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.lockin import ComplexArray
 
 GROWTH = 1.0
 """e-foldings over the longest recording by which a model may grow by itself: rounding alone stays far below."""
@@ -10,6 +11,11 @@ GROWTH = 1.0
 
 def growth_rate(model: MechanicalModel) -> float:
     """Of its fastest growing or slowest dying motion, 1/s; negative where all motion dies out."""
+    return float(motions(model).real.max())
+
+
+def motions(model: MechanicalModel) -> ComplexArray:
+    """(2 coordinates,): rates of its free motions, 1/s; those of swings come in pairs."""
     n = model.coordinates
     motion = np.block(
         [
@@ -17,7 +23,7 @@ def growth_rate(model: MechanicalModel) -> float:
             [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
         ]
     )
-    return float(np.linalg.eigvals(motion).real.max())
+    return np.asarray(np.linalg.eigvals(motion), dtype=np.complex128)
 
 
 def runs_away(model: MechanicalModel, longest_s: float) -> bool:

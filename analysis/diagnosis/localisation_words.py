@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from analysis.diagnosis.entry_point import EntryPoint, EntryScore
 from analysis.diagnosis.localisation import Localisation
 from analysis.diagnosis.mismatch_rows import StateMismatch
+from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import listed, p_text
 
 FEWEST_LINES = 40
@@ -36,7 +37,7 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
     if not states:
         return ""
     parts = [
-        f"{one.output}, driven by {one.input}, {one.region.words} ({100 * one.region.share:.2g} % of what is missing, "
+        f"{one.output}, driven by {one.input}, {one.region.words} ({share_text(one.region.share)} of what is missing, "
         f"{p_text(one.region.p_value)})"
         for one in states
     ]
@@ -70,4 +71,4 @@ def _rule(entry: EntryPoint) -> str:
 
 
 def _percent(score: EntryScore) -> str:
-    return f"{100 * max(score.share, 0.0):.2g} %"
+    return share_text(max(score.share, 0.0))

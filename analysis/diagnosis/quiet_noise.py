@@ -9,6 +9,8 @@ from equalizer.identification.noise_floor import SETTLING_S, over_neighbours
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
+_LEAST_SAMPLES = 8
+"""Of a window: a recording at less than 32 Hz has none."""
 _WINDOW_S = 0.25
 _SILENT = 1e-4
 """Share of the strongest smoothed power of the command that counts as none."""
@@ -33,6 +35,8 @@ def hiss_at_rest(recording: Recording, samples: FloatArray) -> Hiss | None:
     """From windows of a quarter of a second, a quarter of a second after the excitation: slow ringing is no hindrance,
     for only third differences count. None where there is no such window."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
+    if length < _LEAST_SAMPLES:
+        return None
     variances = []
     for start, stop in _rests(recording, _WINDOW_S):
         for at in range(start, stop - length + 1, length):
@@ -50,6 +54,8 @@ def resting_noise(
 ) -> tuple[FloatArray, float] | None:
     """(lines, channels) density and its degrees of freedom; None where nothing rests for a quarter of a second."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
+    if length < _LEAST_SAMPLES:
+        return None
     hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
     powers = []
     for start, stop in _rests(recording, SETTLING_S):

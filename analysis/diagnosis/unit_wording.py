@@ -64,6 +64,11 @@ def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
     return f"{value} %{bracket}{interval}"
 
 
+def share_text(share: float) -> str:
+    """As per cent with two digits; all of them from a hundred on."""
+    return f"{100 * share:.2g} %" if 100 * share < 99.5 else f"{100 * share:.0f} %"
+
+
 def _decimals(value: float, interval: tuple[float, float] | None) -> int:
     """So many that the interval's half is written with one digit."""
     size = np.floor(np.log10(abs(value))) if value else 0.0

@@ -8,6 +8,7 @@ from analysis.diagnosis.findings import BlackBox, Findings
 from analysis.diagnosis.impact_wording import impact_sentence
 from analysis.diagnosis.plausibility import implausible_sentences
 from analysis.diagnosis.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
+from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import listed, p_text
 
 _PLACES_NAMED = 3
@@ -126,7 +127,7 @@ def place_of(mismatch: Mismatch) -> str:
     level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
     state = f", {mismatch.state}" if mismatch.state else ""
     driven = f", driven by {mismatch.input}{level}" if mismatch.input else ""
-    share = f"{100 * mismatch.share:.2g} % of {'the mismatch' if mismatch.state else 'the signal'}"
+    share = f"{share_text(mismatch.share)} of {'the mismatch' if mismatch.state else 'the signal'}"
     return f"{mismatch.output} at {low:g} to {high:g} Hz{driven}{state}: {share} ({p_text(mismatch.p_value)})"
 
 

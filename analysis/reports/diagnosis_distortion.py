@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from analysis.diagnosis.distortion import Distortion, Kind
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.level_trends import PRESENT, LevelTrend, level_trends
+from analysis.diagnosis.unit_wording import share_text
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, listed
 
@@ -109,7 +110,7 @@ def _noise(found: Findings) -> dict[tuple[str, str], float]:
 
 
 def _share(rms: float | None, signal: float) -> str:
-    return NONE if rms is None or not signal > 0 else f"{100 * rms / signal:.2g} %"
+    return NONE if rms is None or not signal > 0 else share_text(rms / signal)
 
 
 def _cell(cell: Distortion | None) -> str:

@@ -7,7 +7,7 @@ from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.retuned_numbers import all_numbers
-from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.unit_wording import share_text, value_text
 from analysis.diagnosis.wording import capital, ended, error_text, probability_text
 from analysis.reports.page import Table
 from analysis.wording import NONE, p_value
@@ -84,7 +84,7 @@ def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
             f"{one.band_hz[0]:g} to {one.band_hz[1]:g} Hz",
             NONE if one.amplitude is None else f"{one.amplitude:g}",
             one.state or NONE,
-            f"{100 * one.share:.2g} %",
+            share_text(one.share),
             p_value(one.p_value),
         )
         for one in worst

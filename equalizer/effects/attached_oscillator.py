@@ -85,6 +85,8 @@ def _rest(shapes: FloatArray, aim: FloatArray) -> FloatArray:
 def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]) -> list[Hung]:
     """The best of each damping ratio and natural frequency, likeliest first; only masses above zero that explain more
     than chance would, below the highest frequency that is driven."""
+    if not len(seen.frequency_hz):
+        return []
     root = np.sqrt(np.maximum(seen.power, np.finfo(float).tiny))
     wave = 2j * np.pi * seen.frequency_hz
     linear = np.stack([np.ones_like(wave), 1 / wave, 1 / wave**2], axis=1) * root[:, None]

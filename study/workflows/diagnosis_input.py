@@ -14,6 +14,7 @@ from analysis.diagnosis.belonging import (
 )
 from analysis.diagnosis.force_driven import all_force_driven
 from analysis.diagnosis.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.wording import listed
 from equalizer.identification.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
 from equalizer.identification.open_tolerance import opened
@@ -24,6 +25,8 @@ from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
 from study.workflows.session_as_recordings import session_recordings
 
+STILL = 1e-9
+"""Of its value: what changes by less is the rounding of numbers."""
 RIGID_SAID = (
     "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
     "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
@@ -64,7 +67,7 @@ def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
         require_something(found.recordings, found.names)
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems) from refusal
-    return same_position(found)
+    return _moving_position(same_position(found))
 
 
 def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
@@ -129,8 +132,8 @@ def _sentences(problems: Sequence[str]) -> str:
 
 
 def _begun(sentence: str) -> str:
-    """With a capital, unless a file's name comes first: that stays as it is."""
-    named = any(mark in sentence.partition(" ")[0] for mark in "./\\")
+    """With a capital, unless the name of a file or an effect comes first: that stays as it is."""
+    named = any(mark in sentence.partition(" ")[0] for mark in "./\\_")
     return sentence if named else sentence[:1].upper() + sentence[1:]
 
 
@@ -148,6 +151,25 @@ def same_position(found: DiagnosisInput) -> DiagnosisInput:
     if len(kinds) < 2:
         return found
     said = "Only some recordings hold the same position channels: the position was left out of the comparison."
+    return replace(
+        found,
+        recordings=tuple(replace(one, position=None) for one in found.recordings),
+        remarks=(*found.remarks, said),
+    )
+
+
+def _moving_position(found: DiagnosisInput) -> DiagnosisInput:
+    """What stands still throughout says nothing, and its errors cannot be counted in units of anything."""
+    positions = [one.position for one in found.recordings if one.position is not None]
+    if not positions:
+        return found
+    courses = np.vstack([one.samples for one in positions])
+    known = np.where(np.isfinite(courses), courses, np.nanmedian(courses, axis=0))
+    still = np.ptp(known, axis=0) <= STILL * np.abs(known).max(axis=0)
+    dead = [name for name, stands in zip(positions[0].channels, still, strict=True) if stands]
+    if not dead:
+        return found
+    said = f"Position {listed(dead)} never changes: the position was left out of the comparison."
     return replace(
         found,
         recordings=tuple(replace(one, position=None) for one in found.recordings),

@@ -90,6 +90,20 @@ def test_too_few_samples_and_too_few_cycles_are_too_short():
     assert "cycles of what was commanded, which is too short" in refusal(require_something, [slow], ["a"])
 
 
+def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_holds_many():
+    said = refusal(require_something, [recording(samples=500)], ["a"])
+    assert "500 samples, 1 s, are too short a recording; at least 1.5 s or 2000 samples are needed" in said
+    require_something([recording(samples=4000, rate_hz=4000.0)], ["a"])
+    require_something([recording(samples=800)], ["a"])
+
+
+def test_a_rate_at_which_nobody_can_see_the_model_move_is_refused():
+    said = refusal(require_model_of, model(stiffness=100.0), [recording(rate_hz=0.5)])
+    assert "the model swings at" in said
+    assert "a rate of 0.5 Hz; the recording must state its rate in hertz" in said
+    require_model_of(model(stiffness=0.0), [recording(rate_hz=0.5)])
+
+
 def test_a_recording_that_is_all_noise_is_refused():
     rng = np.random.default_rng(5)
     noise = with_samples(recording(), "response", rng.standard_normal((5000, 1)))

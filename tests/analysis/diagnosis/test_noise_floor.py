@@ -71,6 +71,13 @@ def test_without_repeats_or_rest_noise_is_heard_above_the_driven_band(device):
     assert "above the driven band" in floor.remarks[0]
 
 
+def test_at_a_rate_of_few_samples_per_window_no_rest_is_heard(device):
+    found = device(rest=3000).recorded()
+    slow = {side: replace(getattr(found, side), sample_rate_hz=4.0) for side in ("command", "response", "position")}
+    assert noise_floor(replace(found, **slow)).how == "repeats"
+    assert noise_floor(without_periods(replace(found, **slow))).how != "rest"
+
+
 def test_where_nothing_is_quiet_the_noise_is_not_known():
     random = np.random.default_rng(4)
     command = Signal(random.standard_normal((4000, 1)), 1000.0, "force", "N", ("fx",))

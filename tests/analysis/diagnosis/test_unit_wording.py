@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.diagnosis.unit_wording import percent_text, scale_of, value_text
+from analysis.diagnosis.unit_wording import percent_text, scale_of, share_text, value_text
 
 
 @pytest.mark.parametrize(
@@ -36,6 +36,12 @@ def test_an_interval_that_is_a_point_takes_three_digits():
 def test_a_share_is_read_as_per_cent_with_its_interval():
     assert percent_text(0.3, (0.25, 0.35)) == "30 % [25, 35]"
     assert percent_text(0.02) == "2.00 %"
+
+
+def test_a_share_has_two_digits_and_no_powers_of_ten():
+    assert [share_text(one) for one in (0.0123, 0.4, 0.994, 0.999, 1.0, 25.4)] == [
+        "1.2 %", "40 %", "99 %", "100 %", "100 %", "2540 %",
+    ]  # fmt: skip
 
 
 def test_a_scale_takes_a_value_there_and_back():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.learn_clean_floor import NothingLearned
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.errors import LeftError, StudyError, WrongUseError
 from study.store.diagnosis_file import read_diagnosis
 from study.store.json_document import read_json
@@ -213,6 +213,26 @@ def test_a_position_that_not_all_recordings_have_is_left_out_and_it_is_said(file
     assert "the position was left out" in read_input(sources, seed=1).remarks[0]
 
 
+@pytest.mark.parametrize(
+    "stands",
+    [lambda x: 0 * x, lambda x: 0 * x + 0.01, lambda x: 0.01 + 1e-12 * x, lambda x: np.where(x > 0, 0.01, np.nan)],
+    ids=["zero", "somewhere", "rounding", "gaps"],
+)
+def test_a_position_that_stands_still_is_left_out_and_it_is_said(tmp_path, recording, stands):
+    dead = replace(recording.position, samples=stands(recording.position.samples))
+    write_recording(tmp_path / "dead.h5", replace(recording, position=dead))
+    found = read_input((tmp_path / "dead.h5",), seed=1)
+    assert found.recordings[0].position is None
+    assert found.remarks == ("Position x never changes: the position was left out of the comparison.",)
+
+
+def test_names_of_files_and_effects_keep_their_letters(files, findings, tmp_path, made):
+    rubbing = replace(made.device(1), effects=(ModelEffect("coulomb_friction", "q", {"level": 0.1}),))
+    write_mechanical_model(tmp_path / "model.toml", rubbing)
+    with pytest.raises(StudyError, match=r" coulomb_friction: the axis 'q' is none of fx"):
+        diagnose_recordings(plan(files, tmp_path / "out", model=tmp_path / "model.toml"), quiet, Scripted(findings))
+
+
 def test_recordings_of_one_name_are_told_apart_by_their_folders(files, findings, tmp_path, recording):
     write_recording(tmp_path / "rec.h5", recording)
     both = (files / "rec.h5", tmp_path / "rec.h5")
@@ -245,9 +265,7 @@ def test_a_recording_cannot_be_diagnosed_and_be_clean(files, findings, tmp_path)
 
 def test_clean_recordings_of_another_device_are_refused(files, findings, tmp_path, made):
     write_recording(tmp_path / "clean.h5", made.recorded(2, ()))
-    with pytest.raises(
-        StudyError, match=r"clean.h5 has the command .*one says nothing of the other"
-    ) as refused:
+    with pytest.raises(StudyError, match=r"clean.h5 has the command .*one says nothing of the other") as refused:
         diagnose_recordings(plan(files, tmp_path / "out", clean=(tmp_path / "clean.h5",)), quiet, Scripted(findings))
     assert "leave --clean out" in str(refused.value.do_now)
 

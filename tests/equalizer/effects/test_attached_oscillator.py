@@ -1,0 +1,10 @@
+"""What hangs on an axis, looked for in the spectra of a missing force."""
+
+import numpy as np
+
+from equalizer.effects.attached_oscillator import MissingMass, hung
+
+
+def test_where_no_frequency_is_driven_nothing_hangs():
+    nothing = MissingMass(np.zeros(0), np.zeros(0), np.zeros((0, 1), dtype=complex))
+    assert hung(nothing, 0, [4.0, 11.0], [0.02]) == []
