@@ -8,6 +8,8 @@ from analysis.diagnosis.unit_wording import value_text
 from analysis.diagnosis.wording import error_text
 from analysis.figures.picture import Picture
 from analysis.figures.real_held_out import error_rows
+from analysis.proof.injected import InjectedOutcome
+from analysis.reports.injected_section import injected_section
 from analysis.reports.page import Page, Section, Table, render_page
 
 VERDICT_WORDS = {
@@ -31,6 +33,7 @@ class Trouble:
 def render_real_report(
     answers: Sequence[RealAnswer],
     troubles: Sequence[Trouble],
+    injected: Sequence[InjectedOutcome],
     pictures: Mapping[tuple[str, str], Picture],
     provenance: Mapping[str, str],
     generated_utc: str,
@@ -40,6 +43,8 @@ def render_real_report(
     if troubles:
         sections.append(Section("What could not be used", points=tuple(f"{one.where}: {one.why}" for one in troubles)))
     sections += [_section(one, pictures.get((one.folder, one.recording))) for one in answers]
+    if injected:
+        sections.append(injected_section(injected))
     named = sum(bool(one.effects) for one in answers)
     return render_page(
         Page(

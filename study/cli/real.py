@@ -16,6 +16,10 @@ def real(
     seconds: Annotated[
         float, typer.Option(min=1.0, help="For a sub-folder: a search that is not done by then ends with what it has.")
     ] = 150.0,
+    inject: Annotated[
+        int, typer.Option(min=0, help="So many faults of sensor or clock are injected under a seal, and looked for.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws of these faults.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.
@@ -30,8 +34,8 @@ def real(
     from study.workflows.real_summary import real_lines
 
     with steps("Real recordings") as show:
-        done = diagnose_folder(RealPlan(folder, out, seconds), show)
+        done = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show)
     if as_json:
-        typer.echo(json.dumps([real_answer_to_json(one) for one in done.answers], indent=2))
+        typer.echo(json.dumps([real_answer_to_json(one) for one in done.results.answers], indent=2))
     else:
         typer.echo("\n".join(real_lines(done)))

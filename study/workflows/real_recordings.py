@@ -1,10 +1,11 @@
 """`hapteq real`: all recordings of a folder, one after the other. Answers that are there already are kept."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.diagnosis.real_answer import RealAnswer
+from analysis.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError
 from study.store.file_errors import CannotWriteError
@@ -13,11 +14,14 @@ from study.store.new_folder import new_folder
 from study.store.provenance import gather_provenance
 from study.store.real_answer_file import read_real_answer, write_real_answer
 from study.workflows.diagnose_real import RealDiagnosis, diagnose_real, retuned_model
+from study.workflows.inject_real import carriers, injected_outcomes
 from study.workflows.real_folder import RealFolder, RealRecording, read_real_folder
 from study.workflows.write_diagnosis import write_diagnosis_into
-from study.workflows.write_real import WrittenReal, write_real
+from study.workflows.write_real import RealResults, WrittenReal, write_real
 
-ANSWER_NAME, RETUNED_NAME = "answer.json", "retuned.toml"
+ANSWER_NAME, RETUNED_NAME, INJECTED_NAME = "answer.json", "retuned.toml", "injected"
+DIAGNOSED_OF_BOTH = 0.5
+"""Share of the work that is done when faults begin to be injected."""
 SECONDS = 150.0
 """For a folder's recordings together: a search that is not done by then ends with what it has."""
 WITHOUT_MODEL_S = 25.0
@@ -31,6 +35,10 @@ class RealPlan:
     folder: Path
     out: Path
     seconds: float = SECONDS
+    inject: int = 0
+    """Faults to inject into what was diagnosed; 0 = none."""
+    seed: int = 1
+    """Of their draws."""
 
 
 def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None = None) -> WrittenReal:
@@ -43,8 +51,9 @@ def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None =
         raise CannotWriteError(plan.out, problem) from problem
     try:
         answers = _answers(plan, found, on_progress, time)
+        injected = _injected(plan, found, answers, on_progress)
         on_progress("writing the page", 0.98)
-        return write_real(plan.out, answers, found.troubles, time.utc())
+        return write_real(plan.out, RealResults(answers, found.troubles, injected), time.utc())
     except (KeyboardInterrupt, LeftError) as interruption:
         raise LeftError(
             "Interrupted",
@@ -54,8 +63,23 @@ def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None =
         ) from interruption
 
 
+def _injected(
+    plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress
+) -> tuple[InjectedOutcome, ...]:
+    if plan.inject == 0:
+        return ()
+    begun = DIAGNOSED_OF_BOTH
+    on_progress("injecting faults", begun)
+    carried = carriers(plan.out, found.recordings, answers)
+
+    def show(done: int, of: int) -> None:
+        on_progress(f"injected faults, {done} of {of}", begun + (0.98 - begun) * done / max(of, 1))
+
+    return injected_outcomes(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show)
+
+
 def _answers(plan: RealPlan, found: RealFolder, on_progress: Progress, clock: Clock) -> tuple[RealAnswer, ...]:
-    answers, count = [], max(len(found.recordings), 1)
+    answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
     left = dict.fromkeys((one.folder.name for one in found.recordings), plan.seconds)
     for number, one in enumerate(found.recordings):
         rest = sum(other.folder == one.folder for other in found.recordings[number:])
@@ -63,7 +87,7 @@ def _answers(plan: RealPlan, found: RealFolder, on_progress: Progress, clock: Cl
         budget = max(left[one.folder.name] / rest - WITHOUT_MODEL_S, 0.1 * plan.seconds)
 
         def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
-            on_progress(f"{one.folder.name}, {one.name}: {what}", 0.98 * (number + min(share, 1.0)) / count)
+            on_progress(f"{one.folder.name}, {one.name}: {what}", end * (number + min(share, 1.0)) / count)
 
         answers.append(_answer(plan.out, one, (begun, budget), show, clock))
         left[one.folder.name] -= clock.now_s() - begun

@@ -2,13 +2,19 @@
 
 from analysis.diagnosis.real_answer import RealAnswer
 from analysis.diagnosis.wording import error_text
+from analysis.proof.injected import injected_figures
+from analysis.reports.injected_section import figure_text
 from analysis.reports.real_report import VERDICT_WORDS
 from study.workflows.write_real import WrittenReal
 
 
 def real_lines(done: WrittenReal) -> tuple[str, ...]:
-    troubles = tuple(f"Could not be used: {one.where}: {one.why}" for one in done.troubles)
-    return (*(_line(one) for one in done.answers), *troubles, "", f"Page: {done.page}", f"Table: {done.table}")
+    results = done.results
+    troubles = tuple(f"Could not be used: {one.where}: {one.why}" for one in results.troubles)
+    figures = injected_figures(results.injected) if results.injected else ()
+    counted = tuple(f"Injected: {one.name}: {figure_text(one)}" for one in figures)
+    lines = (*(_line(one) for one in results.answers), *troubles, *counted)
+    return (*lines, "", f"Page: {done.page}", f"Table: {done.table}")
 
 
 def _line(one: RealAnswer) -> str:

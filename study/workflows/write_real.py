@@ -1,18 +1,18 @@
 """The page, the table and the figures of a folder of real recordings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.real_answer import RealAnswer
 from analysis.figures.real_held_out import real_picture
+from analysis.proof.injected import InjectedOutcome
 from analysis.reports.real_report import Trouble, render_real_report
 from study.store.csv_rows import rows_to_csv
 from study.store.provenance import gather_provenance
 from study.store.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
-PAGE_NAME, TABLE_NAME, FIGURES_NAME = "report.html", "recordings.csv", "figures"
+PAGE_NAME, TABLE_NAME, INJECTED_NAME, FIGURES_NAME = "report.html", "recordings.csv", "injected.csv", "figures"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +33,39 @@ class RealRow:
 
 
 @dataclass(frozen=True, slots=True)
-class WrittenReal:
+class InjectedRow:
+    """`adds`: error with the fault over error without it, of the model that knows what is really there."""
+
+    recording: str
+    injected: str
+    strength: float
+    values: str
+    adds: float
+    detectable: bool
+    right: bool
+    verdict: str
+    named: str
+    returned: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class RealResults:
     answers: tuple[RealAnswer, ...]
     troubles: tuple[Trouble, ...]
+    injected: tuple[InjectedOutcome, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenReal:
+    results: RealResults
     page: Path
     table: Path
 
 
-def write_real(
-    out: Path, answers: Sequence[RealAnswer], troubles: Sequence[Trouble], generated_utc: str
-) -> WrittenReal:
+def write_real(out: Path, results: RealResults, generated_utc: str) -> WrittenReal:
     """What is there from an earlier run is replaced. Raises CannotWriteError."""
+    answers = results.answers
     pictures = {(one.folder, one.recording): real_picture(one) for one in answers}
     write_pictures(out / FIGURES_NAME, tuple(pictures.values()))
     write_text(out / TABLE_NAME, rows_to_csv([_row(one) for one in answers], RealRow), overwrite=True)
@@ -52,8 +74,13 @@ def write_real(
         "command": " ".join(origin.command),
         "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
     }
-    write_text(out / PAGE_NAME, render_real_report(answers, troubles, pictures, shown, generated_utc), overwrite=True)
-    return WrittenReal(tuple(answers), tuple(troubles), out / PAGE_NAME, out / TABLE_NAME)
+    if results.injected:
+        write_text(
+            out / INJECTED_NAME, rows_to_csv([_injected(one) for one in results.injected], InjectedRow), overwrite=True
+        )
+    page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated_utc)
+    write_text(out / PAGE_NAME, page, overwrite=True)
+    return WrittenReal(results, out / PAGE_NAME, out / TABLE_NAME)
 
 
 def _row(one: RealAnswer) -> RealRow:
@@ -65,4 +92,12 @@ def _row(one: RealAnswer) -> RealRow:
     return RealRow(
         one.folder, one.recording, one.verdict, effects, one.error,
         before, retuned, after, one.black_box, noise, one.seconds,
+    )  # fmt: skip
+
+
+def _injected(one: InjectedOutcome) -> InjectedRow:
+    values = " ".join(f"{name}={value:.6g}" for name, value in one.values.items())
+    return InjectedRow(
+        one.recording, one.effect or "nothing", one.strength, values, one.adds, one.detectable, one.right,
+        one.verdict, " ".join(one.named), " ".join(one.returned), one.seconds,
     )  # fmt: skip
