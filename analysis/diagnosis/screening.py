@@ -47,7 +47,8 @@ def screen(
 
 
 def _reached(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
-    strength = float(change @ change)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        strength = float(change @ change)
     if not (np.isfinite(strength) and strength > 0):
         return np.inf
     t = len(base.deviations)

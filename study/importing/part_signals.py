@@ -12,6 +12,7 @@ from study.importing.functions import Value
 from study.importing.import_map import ChannelMap, ImportMap, PartMap
 from study.importing.map_errors import ImportProblemError
 from study.importing.namespace import Namespace
+from study.importing.time_base import MOST_SAMPLES
 
 Key = tuple[str, str]
 """Role and name of a channel."""
@@ -114,6 +115,11 @@ def _grid(wanted: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources
         origin_s = float(logger.base.times_s(1)[0]) + logger.base.offset_s
         begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - SAME_INSTANT) / rate_hz
     count = int(np.floor((end_s - begin_s) * rate_hz + SAME_INSTANT)) + 1
+    if count > MOST_SAMPLES:
+        raise ImportProblemError(
+            f"{part.file}: {end_s - begin_s:.9g} s at {rate_hz:g} Hz are {count:.3g} samples, more than "
+            f"{MOST_SAMPLES:.0e}; state a lower rate_hz, or take parts with start_s and stop_s"
+        )
     if count < 2:
         raise ImportProblemError(
             f"{part.file}: nothing is left between {begin_s:g} and {end_s:g} s, where all clocks have samples"

@@ -19,6 +19,8 @@ UNEVEN = 0.02
 LEFT_OUT = 0.02
 """A uniform logger leaves out rows at no more than this share of its steps: more, and its stamps were rounded."""
 _PLAIN_DIGITS = (4, 5, 6)
+MOST_SAMPLES = 10**8
+"""Of a recording: a day at 1 kHz. A wrong stamp would fill the memory with what is missing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +86,13 @@ def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
     if problem := _wrong_stamps(stamps_s):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
     rate_hz, places = _uniform(stamps_s)
+    if places is not None and places[-1] >= MOST_SAMPLES:
+        widest = int(np.argmax(np.diff(stamps_s)))
+        raise ImportProblemError(
+            f"clock '{clock.name}': {clock.time} jumps from {stamps_s[widest]:.9g} to {stamps_s[widest + 1]:.9g} s at "
+            f"sample {widest + 1}; at {rate_hz:g} Hz the recording would be {places[-1] + 1:.3g} samples long, most of "
+            "them missing. Correct the stamps, or cut the file there"
+        )
     gap_s = clock.gap_s or 3 * float(np.median(np.diff(stamps_s)))
     return TimeBase(clock.name, rate_hz, stamps_s, places, gap_s)
 

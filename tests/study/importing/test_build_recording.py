@@ -393,3 +393,15 @@ def test_progress_grows_to_the_whole(files):
     seen: list[float] = []
     build_recording(parse_map(map_text(), Path("m.toml")), [files("a.npz"), files("b.npz")], seen.append)
     assert seen == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_a_stamp_that_jumps_a_million_seconds_is_refused_before_the_memory_is_full(files):
+    t = np.arange(N) / 1000 + 1e6 * (np.arange(N) >= 100)
+    said = refusal(map_text("time = 't'\ntime_unit = 's'"), files(t=t, u=U, y=Y))
+    assert "t jumps from 0.099 to 1000000.1 s at sample 100" in said
+    assert "1e+09 samples long" in said
+
+
+def test_a_rate_that_makes_more_samples_than_anyone_can_hold_is_refused(files):
+    text = map_text("rate_hz = 1000", 'resample = "held"', 'resample = "linear"', "rate_hz = 1e12\n")
+    assert "0.399 s at 1e+12 Hz are 3.99e+11 samples, more than 1e+08" in refusal(text, files())
