@@ -1,5 +1,6 @@
 """How well a finished model predicts a recording to which nothing is fitted, and what one factor would mend."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,6 +15,16 @@ from equalizer.signals.signal import FloatArray
 Part = Literal["all", "test"]
 
 
+@dataclass(frozen=True, slots=True)
+class ChannelRms:
+    """In the unit of the recording."""
+
+    name: str
+    unit: str
+    signal: float
+    left: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedError:
     """Shares of the signal, root mean square over the channels; None where no number comes out."""
@@ -23,6 +34,8 @@ class PlayedError:
     as_it_is: float | None
     with_gain: float | None
     """With one factor for the prediction of all channels; fitted to what is not tested, or to all where all is."""
+    channels: tuple[ChannelRms, ...]
+    """As it is; none where it is no number."""
 
 
 def played_error(recording: Recording, model: MechanicalModel, part: Part) -> PlayedError:
@@ -38,7 +51,21 @@ def played_error(recording: Recording, model: MechanicalModel, part: Part) -> Pl
     y, f = np.vstack(measured), np.vstack(predicted)
     test, fit = np.concatenate(tested), np.concatenate(fitted)
     gain = _gain(y, f, fit if part == "test" and fit.any() else test)
-    return PlayedError(measure.name, _share(y, f, test), None if gain is None else _share(y, gain * f, test))
+    return PlayedError(
+        measure.name,
+        _share(y, f, test),
+        None if gain is None else _share(y, gain * f, test),
+        tuple(_channels(recording, y[test], f[test])),
+    )
+
+
+def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
+    """Of the responses, where these are what was compared."""
+    signal = recording.response
+    if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
+        return
+    for c, (name, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
+        yield ChannelRms(name, unit, float(np.std(y[:, c])), float(np.sqrt(np.mean((y - f)[:, c] ** 2))))
 
 
 def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:

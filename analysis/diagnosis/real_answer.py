@@ -60,6 +60,8 @@ class FurtherTest:
     error: str
     retuned: float | None
     after: float | None
+    stretches: tuple[HeldOutStretch, ...] = ()
+    """The whole of each channel, where what was compared are the responses."""
     problem: str = ""
 
 

@@ -106,7 +106,8 @@ def _section(one: RealAnswer, picture: Picture | None) -> Section:
 
 
 def _tables(one: RealAnswer) -> tuple[Table, ...]:
-    if not one.stretches:
+    every = (*one.stretches, *(each for test in one.further for each in test.stretches))
+    if not every:
         return ()
     rows = tuple(
         (
@@ -116,7 +117,7 @@ def _tables(one: RealAnswer) -> tuple[Table, ...]:
             value_text(each.after, each.unit),
             f"{each.after / each.retuned:.2f}" if each.retuned > 0 else "-",
         )
-        for each in one.stretches
+        for each in every
     )
     header = ("held-out stretch", "signal", "re-tuned", "with what was found", "ratio")
     return (Table("Root-mean-square errors, stretch by stretch", header, rows),)

@@ -14,8 +14,8 @@ from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.force_driven import all_force_driven
 from analysis.diagnosis.learn_clean_floor import NothingLearned
 from analysis.diagnosis.patience import Patience
-from analysis.diagnosis.played_errors import played_error
-from analysis.diagnosis.real_answer import FurtherTest, PairOutcome, RealAnswer
+from analysis.diagnosis.played_errors import PlayedError, played_error
+from analysis.diagnosis.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
@@ -145,9 +145,19 @@ def _further(test: FoundMap, found: Findings) -> FurtherTest:
         retuned, after = (played_error(recording, model, "all") for model in (retuned_model(found), found.improved))
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
-        return FurtherTest(test.name, title, "", None, None, said)
+        return FurtherTest(test.name, title, "", None, None, problem=said)
     without, with_it = (one.with_gain if free else one.as_it_is for one in (retuned, after))
-    return FurtherTest(test.name, title, after.error + (", one factor fitted" if free else ""), without, with_it)
+    said = after.error + (", one factor fitted" if free else "")
+    stretches = () if free or after.error == "predicted force" else _whole(test.name, recording, retuned, after)
+    return FurtherTest(test.name, title, said, without, with_it, stretches)
+
+
+def _whole(name: str, recording: Recording, retuned: PlayedError, after: PlayedError) -> tuple[HeldOutStretch, ...]:
+    seconds = len(recording) / recording.sample_rate_hz
+    return tuple(
+        HeldOutStretch(name, one.name, one.unit, 0.0, seconds, one.signal, one.left, two.left)
+        for one, two in zip(retuned.channels, after.channels, strict=False)
+    )
 
 
 def retuned_model(found: Findings) -> MechanicalModel:
