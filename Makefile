@@ -7,7 +7,8 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Small matrices: threads of a linear algebra library would wait for each other longer than they work.
 export OPENBLAS_NUM_THREADS ?= 1
 
-DIAGNOSIS := tests/stories/test_missing_physics_is_named.py tests/stories/test_a_bank_of_concealed_physics.py
+DIAGNOSIS := tests/stories/test_missing_physics_is_named.py tests/stories/test_a_bank_of_concealed_physics.py \
+	tests/stories/test_friction_is_named_and_then_compensated.py
 CASES ?= 60
 
 .DEFAULT_GOAL := help
