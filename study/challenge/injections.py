@@ -22,7 +22,9 @@ class Reading:
 
     rate_hz: float
     rms: float
-    """Of the largest channel."""
+    """Of the largest channel,"""
+    peak: float
+    """and its largest magnitude."""
     middle_hz: float
     """Below which half of the response's power lies."""
     seconds: float
@@ -103,7 +105,7 @@ def _other_clock(
 
 def _turn(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     about = np.array([of["about_x"], of["about_y"], of["about_z"]])
-    return np.asarray(Rotation.from_rotvec(np.radians(of["degrees"]) * about).apply(samples))
+    return np.asarray(Rotation.from_rotvec(np.radians(of["degrees"]) * about).apply(np.array(samples)))
 
 
 def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -117,7 +119,7 @@ def _either(random: np.random.Generator) -> float:
 
 INJECTIONS: tuple[Injection, ...] = (
     Injection("sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _between(20.0, 0.5, s)}, _lag),
-    Injection("sensor_clipping", lambda at, s, r: {"limit": at.rms * _between(3.0, 0.7, s)}, _clip),
+    Injection("sensor_clipping", lambda at, s, r: {"limit": at.peak * _between(0.95, 0.25, s)}, _clip),
     Injection(
         "mains_hum",
         lambda at, s, r: {
@@ -179,6 +181,7 @@ def reading_of(recording: Recording) -> Reading:
     return Reading(
         rate_hz,
         float(np.sqrt(np.mean(moving**2, axis=0)).max()),
+        float(np.abs(known).max()),
         max(middle, rate_hz / len(known)),
         len(samples) / rate_hz,
     )

@@ -14,8 +14,9 @@ def real(
     ],
     out: Annotated[Path, typer.Option(help="Folder of the page, the table, the figures and every diagnosis.")],
     seconds: Annotated[
-        float, typer.Option(min=1.0, help="For a sub-folder: a search that is not done by then ends with what it has.")
-    ] = 150.0,
+        float,
+        typer.Option(min=1.0, help="Processor time for a sub-folder: a search that is not done by then ends there."),
+    ] = 240.0,
     inject: Annotated[
         int, typer.Option(min=0, help="So many faults of sensor or clock are injected under a seal, and looked for.")
     ] = 0,

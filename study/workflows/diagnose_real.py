@@ -16,6 +16,7 @@ from analysis.diagnosis.learn_clean_floor import NothingLearned
 from analysis.diagnosis.patience import Patience
 from analysis.diagnosis.played_errors import PlayedError, played_error
 from analysis.diagnosis.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
+from analysis.diagnosis.verdict import EXPLAINED
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
@@ -67,7 +68,21 @@ def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progres
         *diagnosis.objections,
         *(said for one in wanted.tests for said in one.source.map.diagnosis.objections),
     )
-    return RealDiagnosis(replace(answer, further=further, pair=pair, objections=objections), found, parents)
+    answer = replace(answer, further=further, pair=pair, objections=objections)
+    return RealDiagnosis(answer if pair is None else _not_whole(answer, pair), found, parents)
+
+
+def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
+    """What was learned from the recording of before is wide, for one recording is little to learn from: what is more
+    than the model missed then is a remainder all the same."""
+    left, missed = pair.with_effects, pair.expected_left
+    if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED * missed:
+        return answer
+    said = (
+        f"Still unexplained: {100 * left:.3g} % of the signal are left on held-out data, where the model missed "
+        f"{100 * missed:.3g} % before the change."
+    )
+    return replace(answer, verdict="partly_explained", left=said, pair=replace(pair, verdict="partly_explained"))
 
 
 def imported(found: FoundMap) -> Recording:

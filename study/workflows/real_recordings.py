@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import process_time
 
 from analysis.diagnosis.real_answer import RealAnswer
 from analysis.proof.injected import InjectedOutcome
@@ -22,10 +23,11 @@ from study.workflows.write_real import RealResults, WrittenReal, write_real
 ANSWER_NAME, RETUNED_NAME, INJECTED_NAME = "answer.json", "retuned.toml", "injected"
 DIAGNOSED_OF_BOTH = 0.5
 """Share of the work that is done when faults begin to be injected."""
-SECONDS = 150.0
-"""For a folder's recordings together: a search that is not done by then ends with what it has."""
-WITHOUT_MODEL_S = 25.0
-"""What fitting a model, a page and figures take beside the search, where nothing is known better."""
+SECONDS = 240.0
+"""Of processor time, for a folder's recordings together: a search that is not done by then ends with what it has. The
+clock on the wall would make answers hang on what else the machine does."""
+BESIDE_S = 25.0
+"""What fitting a model, a page and figures take beside the search."""
 
 Progress = Callable[[str, float], None]
 
@@ -83,28 +85,26 @@ def _answers(plan: RealPlan, found: RealFolder, on_progress: Progress, clock: Cl
     left = dict.fromkeys((one.folder.name for one in found.recordings), plan.seconds)
     for number, one in enumerate(found.recordings):
         rest = sum(other.folder == one.folder for other in found.recordings[number:])
-        begun = clock.now_s()
-        budget = max(left[one.folder.name] / rest - WITHOUT_MODEL_S, 0.1 * plan.seconds)
+        begun = process_time()
+        budget = max(left[one.folder.name] / rest - BESIDE_S, 0.1 * plan.seconds)
 
         def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
             on_progress(f"{one.folder.name}, {one.name}: {what}", end * (number + min(share, 1.0)) / count)
 
-        answers.append(_answer(plan.out, one, (begun, budget), show, clock))
-        left[one.folder.name] -= clock.now_s() - begun
+        answers.append(_answer(plan.out, one, budget, show, clock))
+        left[one.folder.name] -= process_time() - begun
     return tuple(answers)
 
 
-def _answer(
-    out: Path, one: RealRecording, time: tuple[float, float], on_progress: Progress, clock: Clock
-) -> RealAnswer:
-    """time: when it began, and the seconds that the search may take."""
+def _answer(out: Path, one: RealRecording, seconds: float, on_progress: Progress, clock: Clock) -> RealAnswer:
+    """seconds: of processor time, that the search may take."""
     folder = out / one.folder.name / one.name
     kept = folder / ANSWER_NAME
     if kept.is_file():
         return read_real_answer(kept)
-    begun, seconds = time
-    done = diagnose_real(one, lambda: clock.now_s() - begun < seconds, on_progress)
-    answer = replace(done.answer, seconds=round(clock.now_s() - begun, 1))
+    begun_s, worked = clock.now_s(), process_time()
+    done = diagnose_real(one, lambda: process_time() - worked < seconds, on_progress)
+    answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
     _write(folder, replace(done, answer=answer))
     return answer
 

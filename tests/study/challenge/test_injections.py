@@ -1,0 +1,91 @@
+"""Faults put into recordings: each does what it says, by the truth that is kept of it."""
+
+import numpy as np
+import pytest
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from study.challenge.injections import INJECTIONS, fitting_injections, inject, reading_of
+
+RATE_HZ = 1000.0
+
+
+def recording(channels: int = 3) -> Recording:
+    random = np.random.default_rng(1)
+    time_s = np.arange(4000) / RATE_HZ
+    y = np.column_stack([np.sin(2 * np.pi * (7 + k) * time_s) for k in range(channels)])
+    y += 0.01 * random.normal(size=y.shape)
+    return Recording(
+        "rig",
+        Signal(random.normal(size=(4000, 1)), RATE_HZ, "force", "N", ("fx",)),
+        Signal(y, RATE_HZ, "acceleration", "m/s^2", tuple("abc"[:channels])),
+    )
+
+
+def injected(effect: str, strength: float = 0.7, channels: int = 3):
+    return inject(recording(channels), effect, strength, np.random.default_rng(2))
+
+
+@pytest.mark.parametrize("effect", [one.effect for one in INJECTIONS])
+def test_a_stronger_fault_changes_more(effect):
+    weak, strong = injected(effect, 0.2), injected(effect, 0.9)
+    assert 0 < weak.change.max() < strong.change.max()
+    assert np.isfinite(strong.recording.response.samples).all()
+
+
+@pytest.mark.parametrize("effect", [one.effect for one in INJECTIONS])
+def test_the_command_stays_as_it_is(effect):
+    assert np.array_equal(injected(effect).recording.command.samples, recording().command.samples)
+
+
+def test_the_same_draw_gives_the_same_fault():
+    one, other = injected("lost_samples"), injected("lost_samples")
+    assert np.array_equal(one.recording.response.samples, other.recording.response.samples)
+
+
+def test_nothing_injected_changes_nothing():
+    found = inject(recording(), "", 0.5, np.random.default_rng(3))
+    assert found.effect == "" and not found.change.any()
+
+
+def test_the_numbers_are_those_of_the_samples():
+    clipped = injected("sensor_clipping")
+    assert np.abs(clipped.recording.response.samples).max() == pytest.approx(clipped.values["limit"])
+    stepped = injected("quantization").recording.response.samples / injected("quantization").values["step"]
+    assert np.allclose(stepped, np.round(stepped))
+    drift = injected("sensor_drift")
+    assert drift.recording.response.samples[-1, 0] - recording().response.samples[-1, 0] == pytest.approx(
+        drift.values["total"]
+    )
+    turned = injected("sensor_misalignment").recording.response.samples
+    assert np.allclose(np.linalg.norm(turned, axis=1), np.linalg.norm(recording().response.samples, axis=1))
+
+
+def test_a_clock_that_is_fast_reads_what_comes_later():
+    found = injected("clock_drift", 0.9)
+    late = found.values["ppm"] * 1e-6 * 3000
+    expected = np.interp(3000 + late, np.arange(4000), recording().response.samples[:, 0])
+    assert found.recording.response.samples[3000, 0] == pytest.approx(expected)
+
+
+def test_a_lag_delays_a_slow_tone_by_its_time_constant():
+    found = injected("sensor_lag", 0.3)
+    y, x = found.recording.response.samples[1000:, 0], recording().response.samples[1000:, 0]
+    tone = np.exp(-2j * np.pi * 7 * np.arange(3000) / RATE_HZ)
+    delay_s = -np.angle((y @ tone) / (x @ tone)) / (2 * np.pi * 7)
+    assert delay_s == pytest.approx(1 / (2 * np.pi * found.values["bandwidth"]), rel=0.25)
+
+
+def test_only_faults_that_a_recording_can_carry_are_drawn():
+    assert "sensor_misalignment" in fitting_injections(recording(3))
+    assert "sensor_misalignment" not in fitting_injections(recording(1))
+    assert reading_of(recording(1)).middle_hz == pytest.approx(7, abs=0.5)
+
+
+def test_what_cannot_be_injected_is_refused():
+    with pytest.raises(ValueError, match="nobody knows how to inject 'gremlins'"):
+        injected("gremlins")
+    with pytest.raises(ValueError, match="strength is 1.5"):
+        injected("quantization", 1.5)
+    with pytest.raises(ValueError, match="needs 3 response channels"):
+        injected("sensor_misalignment", channels=1)
