@@ -27,6 +27,7 @@ from analysis.diagnosis.output_error import evaluated
 from analysis.diagnosis.proposed_experiment import proposed_experiment
 from analysis.diagnosis.rivalry import Arena, sensitivity_at
 from analysis.diagnosis.signature_curves import Names, signature_of
+from analysis.diagnosis.unit_doubt import unit_sentences
 from analysis.diagnosis.verdict import Judgement
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
@@ -48,7 +49,7 @@ def assembled(
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
-    maps = maps_of(measure, found, floors, learned)
+    maps, courses = maps_of(measure, found, floors, learned), _courses(measure, found, names)
     local = localised(measure, tuning, found, floors, maps.cells)
     document = _document(arena, found, judged, maps, local)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
@@ -59,7 +60,7 @@ def assembled(
         improved=replace(tuning.tuned(fitted.deviations), effects=effects),
         named=placed,
         evidence=gather_evidence(measure, tuning, found.retuned.fitted),
-        courses=_courses(measure, found, names),
+        courses=courses,
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
@@ -67,7 +68,7 @@ def assembled(
         black_box=None
         if found.statistic is not None
         else black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
-        remarks=tuple(dict.fromkeys(filter(None, (learned_sentence(learned, channels), *_remarks(floors))))),
+        remarks=_remarks(learned_sentence(learned, channels), *unit_sentences(courses), *_of_noise(floors)),
         maps=maps.cells,
         local=local,
         floor=floors[0],
@@ -77,8 +78,12 @@ def assembled(
     )
 
 
-def _remarks(floors: tuple[NoiseFloor, ...]) -> list[str]:
+def _of_noise(floors: tuple[NoiseFloor, ...]) -> list[str]:
     return [remark for floor in floors for remark in floor.remarks]
+
+
+def _remarks(*sentences: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(filter(None, sentences)))
 
 
 def _split_s(measure: ErrorMeasure) -> dict[str, float]:

@@ -2,6 +2,7 @@
 what is found here has no answer at all, not even 'unexplained'."""
 
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -74,6 +75,18 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
                 "the responses have nothing to do with the commands: what they share is no more than noise shares with "
                 "anything, so the recording is noise, of another device, or its command was not played"
             )
+    if problems:
+        raise NothingToDiagnose(tuple(problems))
+
+
+def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+    """A recording that is taken twice would be tested by what it was fitted to. Raises NothingToDiagnose."""
+    problems = [
+        f"{names[two]} holds the same samples as {names[one]}, and a recording counts once"
+        for one, two in combinations(range(len(recordings)), 2)
+        if np.array_equal(recordings[one].response.samples, recordings[two].response.samples, equal_nan=True)
+        and np.array_equal(recordings[one].command.samples, recordings[two].command.samples, equal_nan=True)
+    ]
     if problems:
         raise NothingToDiagnose(tuple(problems))
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -128,5 +129,8 @@ def _numbers(
     wrong = np.flatnonzero((values.isna() & ~missing).to_numpy())
     if len(wrong):
         number = body[int(wrong[0])][0]
-        raise ValueError(f"line {number}, column '{name}': '{column.iloc[int(wrong[0])]}' is not a number")
+        text = str(column.iloc[int(wrong[0])])
+        comma = settings.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
+        hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
+        raise ValueError(f"line {number}, column '{name}': '{text}' is not a number{hint}")
     return np.asarray(values, dtype=np.float64)

@@ -9,6 +9,7 @@ import numpy as np
 from analysis.diagnosis.belonging import (
     NothingToDiagnose,
     require_alike,
+    require_different,
     require_model_of,
     require_something,
 )
@@ -65,6 +66,7 @@ def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
     try:
         require_alike(found.recordings, found.names)
         require_something(found.recordings, found.names)
+        require_different(found.recordings, found.names)
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems) from refusal
     return _moving_position(same_position(found))

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.belonging import NothingToDiagnose, require_alike, require_model_of, require_something
+from analysis.diagnosis.belonging import (
+    NothingToDiagnose,
+    require_alike,
+    require_different,
+    require_model_of,
+    require_something,
+)
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -88,6 +94,13 @@ def test_too_few_samples_and_too_few_cycles_are_too_short():
     t = np.arange(5000)[:, None] / 5000
     slow = with_samples(recording(), "command", np.sin(2 * np.pi * 1.5 * t))
     assert "cycles of what was commanded, which is too short" in refusal(require_something, [slow], ["a"])
+
+
+def test_a_recording_counts_once():
+    one = recording()
+    said = refusal(require_different, [one, recording(seed=1), replace(one, device="copy")], ["a", "b", "c"])
+    assert said == "c holds the same samples as a, and a recording counts once"
+    require_different([one, recording(seed=1)], ["a", "b"])
 
 
 def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_holds_many():

@@ -46,12 +46,19 @@ def test_columns_without_a_header_are_numbered(tmp_path):
     assert list(read(written(tmp_path, "0 1\n2 3\n", "a.txt"))) == ["column1", "column2"]
 
 
+_COMMA = (
+    "Line 3, column 'u': '0,25' is not a number; where the decimal sign is a comma, the map says decimal = \",\" under "
+    "[csv]."
+)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", "It holds no lines."),
         ("t,u\n", "It has a header, but no rows below it."),
         ("t,u\n0,1\n1,OK\n", "Line 3, column 'u': 'OK' is not a number."),
+        ("t;u\n0;1\n1;0,25\n", _COMMA),
         ("# c\nt,u\n0,1\n1,2,3\n", "Line 4 has 3 fields, but there are 2 columns."),
         ("t,t\n0,1\n", "Its header names 't' twice; give the columns names of their own in [csv] names."),
     ],

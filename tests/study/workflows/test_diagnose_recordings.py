@@ -205,8 +205,8 @@ def test_recordings_of_two_devices_are_told_apart_by_name(files, findings, tmp_p
     assert "Three.h5 has the command" in error.happened or "three.h5 has the command" in error.happened
 
 
-def test_a_position_that_not_all_recordings_have_is_left_out_and_it_is_said(files, findings, tmp_path, recording):
-    write_recording(tmp_path / "blind.h5", replace(recording, position=None))
+def test_a_position_that_not_all_recordings_have_is_left_out_and_it_is_said(files, findings, tmp_path, made):
+    write_recording(tmp_path / "blind.h5", replace(made.recorded(1, seed=8), position=None))
     sources = (files / "rec.h5", tmp_path / "blind.h5")
     engine = asked_of_engine(plan(files, tmp_path / "out", sources=sources), findings)
     assert all(one.position is None for one in engine.recordings)
@@ -233,8 +233,17 @@ def test_names_of_files_and_effects_keep_their_letters(files, findings, tmp_path
         diagnose_recordings(plan(files, tmp_path / "out", model=tmp_path / "model.toml"), quiet, Scripted(findings))
 
 
-def test_recordings_of_one_name_are_told_apart_by_their_folders(files, findings, tmp_path, recording):
-    write_recording(tmp_path / "rec.h5", recording)
+def test_a_recording_that_is_given_twice_is_refused(files, findings, tmp_path, recording):
+    write_recording(tmp_path / "copy.h5", recording)
+    for other in (files / "rec.h5", tmp_path / "copy.h5"):
+        with pytest.raises(StudyError, match=r"holds the same samples as .*, and a recording counts once"):
+            diagnose_recordings(
+                plan(files, tmp_path / "out", sources=(files / "rec.h5", other)), quiet, Scripted(findings)
+            )
+
+
+def test_recordings_of_one_name_are_told_apart_by_their_folders(files, findings, tmp_path, made):
+    write_recording(tmp_path / "rec.h5", made.recorded(1, seed=8))
     both = (files / "rec.h5", tmp_path / "rec.h5")
     engine = asked_of_engine(plan(files, tmp_path / "out", sources=both), findings)
     assert len(set(engine.settings.names)) == 2
