@@ -138,11 +138,11 @@ def _concealed(
         at = Circumstances(random, float(strength), bench, axis, travel, peak, rig.axes)
         values = effect.draw(at)
         device = effect.build(device, axis, values)
-        truth.append(_truth(effect, axis, values))
+        truth.append(truth_of(effect, axis, values))
     return device, tuple(truth)
 
 
-def _truth(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:
+def truth_of(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:
     known = EFFECTS_BY_NAME.get(effect.name)
     names = set(values) if known is None else {parameter.name for parameter in known.parameters}
     return Truth(
