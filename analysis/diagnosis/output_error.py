@@ -4,6 +4,7 @@ Gauss and Newton's steps inside bounds. What the model's own numbers do is compu
 numbers do, at each step.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,9 +54,15 @@ def fitting(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatAr
 
 
 def sensitivity(
-    measure: ErrorMeasure, tuning: Tuning, at: FloatArray, hypothesis: Hypothesis, map_: object = map
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    at: FloatArray,
+    hypothesis: Hypothesis,
+    map_: object = map,
+    beside: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
-    """By moving each number. map_: `map`, or one that works in parallel."""
+    """By moving each number. map_: `map`, or one that works in parallel. beside: columns that are known, and the
+    numbers whose columns are not."""
     base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
 
     def moved(number: int) -> FloatArray:
@@ -71,8 +78,8 @@ def sensitivity(
         # Neither way is a model: the number stays where it is.
         return np.zeros_like(base)
 
-    columns = np.array(list(map_(moved, range(len(at)))))  # type: ignore[operator]
-    columns = columns.reshape(len(at), len(base))
+    columns, numbers = (np.zeros((len(at), len(base))), range(len(at))) if beside is None else beside
+    columns[numbers] = np.array(list(map_(moved, numbers))).reshape(len(numbers), len(base))  # type: ignore[operator]
     return Sensitivity(at, columns, columns @ columns.T)
 
 

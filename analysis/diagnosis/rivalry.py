@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.felt_numbers import felt_numbers
 from analysis.diagnosis.hypothesis import Hypothesis, without_claim
 from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
 from analysis.diagnosis.screening import Mapper, Screened
@@ -22,9 +23,10 @@ MOST_REFINED = 3
 WORTH_REFINING = 0.5
 """where they gained such a share of what the best one gained."""
 FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
-MOST_REFRESHED, SETTLED, STALE = 4, 0.0005, 0.5
-"""What the model's numbers do is recomputed so often, or until that gains no more than such a share; and only where
-one of them has moved by so many standard deviations since, for it costs a simulation for each."""
+MOST_REFRESHED, SETTLED, SETTLED_FAR, STALE = 4, 0.0005, 0.01, 0.5
+"""What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
+noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
+deviations since, for it costs a simulation for each."""
 NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
 
@@ -98,9 +100,13 @@ def sensitivity_at(
     small beside what moves, they hardly matter to it."""
     kept = hypothesis
     for number in reversed(range(len(hypothesis.claims))):
-        if not with_forces and isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
+        if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
             kept = without_claim(kept, number)
-    return sensitivity(arena.measure, arena.tuning, deviations, kept, arena.map_)
+    plain = sensitivity(arena.measure, arena.tuning, deviations, kept, arena.map_)
+    if not with_forces or kept is hypothesis:
+        return plain
+    felt = felt_numbers(arena.measure, arena.tuning, plain, hypothesis)
+    return sensitivity(arena.measure, arena.tuning, deviations, hypothesis, arena.map_, (plain.columns, felt))
 
 
 def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
@@ -110,9 +116,9 @@ def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tu
     there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
     for _ in range(MOST_REFRESHED):
         better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
-        settled = better.cost > (1 - SETTLED) * best.cost
+        settled = better.cost > (1 - max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))) * best.cost
         best = better
-        if complete and settled or arena.contender(best).standing.seen <= NEARLY_CLEAN and settled:
+        if (complete and settled) or (arena.contender(best).standing.seen <= NEARLY_CLEAN and settled):
             break
         if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
             there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=True)
