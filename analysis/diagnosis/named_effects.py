@@ -13,6 +13,7 @@ from analysis.diagnosis.parsimony import only_refines
 from analysis.diagnosis.probability import probabilities
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.same_within_errors import inseparable
+from analysis.diagnosis.verdict import BY_CHANCE as OF_CHANCE
 from analysis.diagnosis.verdict import share_of_mismatch
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -78,7 +79,8 @@ def axis_of(claim: Claim, said: Said) -> str | None:
 
 def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
     contenders = found.rounds[number]
-    chances = probabilities(contenders)
+    left = found.after.standing.seen if found.statistic is None else found.after.standing.seen / OF_CHANCE
+    chances = probabilities(contenders, left)
     best, by_name = contenders[0], _chances_of_names(contenders, chances)
     rivals: dict[str, Rival] = {}
     unit = BY_NOISE if found.statistic is None else BY_CHANCE
