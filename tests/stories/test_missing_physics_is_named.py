@@ -1,6 +1,6 @@
 """Whole diagnoses, from a recording and a model to a name, against devices that share no code with them.
 
-Short recordings here; `make prove-diagnosis` draws a bank of long ones, and asks for the labelled cases, too.
+Short recordings here; `make prove-diagnosis` asks for the labelled cases, too; `make prove-bank` draws long ones.
 """
 
 import json
