@@ -23,6 +23,7 @@ from study.cli import (
     equalize,
     identify,
     import_recording,
+    kit,
     noise,
     note,
     protocol,
@@ -64,6 +65,7 @@ app.command("equalize")(equalize.equalize)
 app.command("twin")(twin.twin)
 app.command("diagnose")(diagnose.diagnose)
 app.command("real")(real.real)
+app.add_typer(kit.app, name="kit")
 app.command("prove")(prove.prove)
 app.add_typer(protocol.app, name="protocol")
 app.command("noise")(noise.noise)

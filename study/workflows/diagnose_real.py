@@ -131,7 +131,9 @@ def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
         title=wanted.found.source.map.title,
         device=wanted.found.source.map.device,
         verdict="refused",
-        answer=refusal.happened if isinstance(refusal, StudyError) else f"The fits broke down: {refusal}.",
+        answer=f"{refusal.title}: {refusal.happened}"
+        if isinstance(refusal, StudyError)
+        else f"The fits broke down: {refusal}.",
         model="",
         error="",
         fitted=None,

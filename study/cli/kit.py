@@ -1,0 +1,52 @@
+"""`hapteq kit`: a laboratory's own blind test of the diagnosis, on a device that somebody changes on purpose."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    help="A blind test on your own device: draw what is changed, seal it, score it (docs/kit.md).",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+LabelsArgument = Annotated[Path, typer.Argument(metavar="LABELS.csv", help="The table of what was changed.")]
+
+
+@app.command("draw")
+def draw(
+    out: Annotated[Path, typer.Option(help="The table to write, LABELS.csv; for the one who changes the device.")],
+    repeats: Annotated[int, typer.Option(min=1, max=20, help="Of each change; nothing is changed twice as often.")] = 2,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the order [default: one that nobody knows].")] = None,
+) -> None:
+    """Draw the order of the changes. Whoever diagnoses must not see it."""
+    from analysis.proof.lab_kit import CHANGES
+    from study.workflows.lab_kit import draw_labels
+
+    labels = draw_labels(out, repeats, seed)
+    typer.echo(f"{len(labels)} recordings, {labels[0].recording} to {labels[-1].recording}: {out}")
+    for one in CHANGES:
+        number = f" Write down the number, in {one.unit}, where you know it." if one.unit else ""
+        typer.echo(f"  {one.name}: {one.how}{number}")
+
+
+@app.command("seal")
+def seal(labels: LabelsArgument) -> None:
+    """Hash the completed table. Give the hash to whoever diagnoses, and the table to nobody."""
+    from study.workflows.lab_kit import seal_labels
+
+    typer.echo(seal_labels(labels))
+
+
+@app.command("score")
+def score(
+    labels: LabelsArgument,
+    diagnoses: Annotated[Path, typer.Option(help="Folder with one diagnosis per recording, by its name.")],
+    out: Annotated[Path, typer.Option(help="The table to write, SCORE.csv.")],
+) -> None:
+    """Compare the revealed table with the diagnoses. It must be the one that was sealed."""
+    from study.workflows.lab_kit import score_kit, score_lines
+
+    for line in score_lines(score_kit(labels, diagnoses, out)):
+        typer.echo(line)
