@@ -2,20 +2,26 @@
 
 import json
 import subprocess
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import analysis.diagnosis
+from analysis.figures.proof_pictures import proof_pictures
 from analysis.proof.outcome import Outcome
 from analysis.proof.score import main_error
+from analysis.reports.proof_report import ProofFacts, render_proof_report
+from study.devices.clock import RealClock
 from study.store.csv_rows import rows_to_csv
 from study.store.json_document import write_json
-from study.store.provenance import gather_provenance, versions
+from study.store.provenance import command_line, gather_provenance, versions
 from study.store.text_file import write_text
+from study.workflows.picture_files import write_pictures
+from study.workflows.proof_summary import remarks
 from study.workflows.prove import Proof
 
 FORMAT, VERSION = "hapteq-proof", 1
-DOCUMENT, TABLE = "proof.json", "proof.csv"
+DOCUMENT, TABLE, PAGE = "proof.json", "proof.csv", "report.html"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,13 @@ def write_proof(proof: Proof) -> None:
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
     rows = [_row(one, one in score.misses) for one in proof.outcomes]
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
+    pictures = proof_pictures(proof.outcomes, score.calibration)
+    write_pictures(folder / "figures", pictures)
+    facts = ProofFacts(seeds(proof), proof.seal, commit(), proof.engines, tuple(remarks(proof)))
+    page = render_proof_report(
+        proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, RealClock().utc()
+    )
+    write_text(folder / PAGE, page, overwrite=True)
 
 
 def write_table(path: Path, proof: Proof) -> None:
@@ -81,13 +94,17 @@ def write_table(path: Path, proof: Proof) -> None:
     figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
     missed = [str(one.number) for one in proof.score.misses]
     lines = [
-        f"# {len(proof.outcomes)} cases, seeds {proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}",
+        f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
         f"# commit {commit()}, code of the diagnosis {' '.join(proof.engines)}",
         f"# seal of the labels {proof.seal}",
         f"# versions {json.dumps(versions())}",
         f"# missed {' '.join(missed) or 'none'}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
+
+
+def seeds(proof: Proof) -> str:
+    return f"{proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}"
 
 
 def commit() -> str:

@@ -1,0 +1,135 @@
+"""What a bank of concealed physics shows: which effect was taken for which, from which strength on, and how sure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from analysis.figures.diagnosis_style import ratio_ticks
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
+from analysis.proof.calibration import Calibration
+from analysis.proof.detection import Strip, detection_strips, shares_by_size
+from analysis.proof.outcome import Outcome
+
+MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
+NOTHING_SAID = "no name"
+
+
+def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
+    singles = [one for one in outcomes if one.kind == "single"]
+    pictures = []
+    if singles:
+        pictures += [_strips(detection_strips(singles)), _by_size(singles), _confusion(singles)]
+    if calibration.bins:
+        pictures.append(_reliability(calibration))
+    return tuple(pictures)
+
+
+def _strips(strips: Sequence[Strip]) -> Picture:
+    figure = new_figure(8.8, 1.3 + 0.21 * len(strips))
+    axes = figure.add_subplot()
+    plain_axes(axes)
+    for row, strip in enumerate(strips):
+        for strength, how in strip.draws:
+            marker, colour = MARKS[how]
+            axes.plot(strength, row, marker, color=colour, markersize=6.5 if marker != "." else 5)
+    axes.set_yticks(range(len(strips)), labels=[strip.effect.replace("_", " ") for strip in strips])
+    axes.set_ylim(len(strips) - 0.4, -0.6)
+    axes.set_xlim(-0.03, 1.03)
+    axes.set_xlabel("strength, from the weakest that is drawn to the strongest (logarithmic)")
+    handles = [Line2D([], [], marker=m, color=c, linestyle="", label=how) for how, (m, c) in MARKS.items()]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(MARKS), frameon=False)
+    return Picture(
+        "detection", "From which strength on an effect is named",
+        "Each mark is a device with one concealed effect. Invisible: the re-tuned model errs by at most 1.25 times "
+        "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named.",
+        figure,
+        alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {how}' for x, how in s.draws)}." for s in strips),
+    )  # fmt: skip
+
+
+def _by_size(singles: Sequence[Outcome]) -> Picture:
+    """All effects together, against what an oracle that knows the truth sees."""
+    figure = new_figure(7.4, 3.6)
+    axes = figure.add_subplot()
+    plain_axes(axes)
+    parts = shares_by_size(singles)
+    axes.set_xscale("log")
+    at = [part.adds for part in parts]
+    axes.vlines(at, [part.low for part in parts], [part.high for part in parts], color=BLUE, linewidth=1.4)
+    axes.plot(at, [part.right for part in parts], "o-", color=BLUE, linewidth=1.2)
+    axes.set_ylim(-0.02, 1.02)
+    if max(at) > min(at):
+        ratio_ticks(axes.xaxis, min(at), max(at))
+    axes.set_xlabel("what the effect changes of the readings: rms over the noise's, worst channel")
+    axes.set_ylabel("share named right")
+    return Picture(
+        "detection-by-size", "How large an effect must be",
+        "All effects together, in parts of equal count; bars are Wilson's 95 % intervals. The abscissa is known to an "
+        "oracle alone: the same device with and without the effect, before a re-tuned model hides part of it.",
+        figure,
+        alternative=" ".join(f"{part.adds:.3g}: {100 * part.right:.0f} % of {part.of}." for part in parts),
+    )  # fmt: skip
+
+
+def _confusion(singles: Sequence[Outcome]) -> Picture:
+    seen = [one for one in singles if one.detectable]
+    said = [one.named_names[0] if one.named else NOTHING_SAID for one in seen]
+    wrong = {name for one, name in zip(seen, said, strict=True) if name not in (NOTHING_SAID, one.names[0])}
+    names = sorted({one.names[0] for one in seen} | wrong)
+    columns = [*names, NOTHING_SAID]
+    counts = np.zeros((len(names), len(columns)))
+    for one, name in zip(seen, said, strict=True):
+        counts[names.index(one.names[0]), columns.index(name)] += 1
+    figure = new_figure(9.6, 2.2 + 0.23 * len(names))
+    axes = figure.add_subplot()
+    _draw_counts(axes, counts)
+    axes.set_yticks(range(len(names)), labels=[name.replace("_", " ") for name in names], fontsize=8)
+    axes.set_xticks(range(len(columns)), labels=[name.replace("_", " ") for name in columns], rotation=90, fontsize=8)
+    axes.set_xlabel("named first")
+    axes.set_ylabel("concealed")
+    return Picture(
+        "confusion", "What was taken for what",
+        "Devices with one concealed effect that shows; blue is right, red is not.", figure,
+        alternative=" ".join(f"{one.names[0]} named {name}." for one, name in zip(seen, said, strict=True)),
+    )  # fmt: skip
+
+
+def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> None:
+    rows, columns = counts.shape
+    most = max(counts.max(initial=1.0), 1.0)
+    for i in range(rows):
+        for j in range(columns):
+            if counts[i, j]:
+                colour = BLUE if i == j else VERMILLION
+                shade = 0.25 + 0.65 * counts[i, j] / most
+                axes.fill_between([j - 0.5, j + 0.5], i - 0.5, i + 0.5, color=colour, alpha=shade, linewidth=0)
+                axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7.5, color=BLACK)
+    axes.set_xlim(-0.5, columns - 0.5)
+    axes.set_ylim(rows - 0.5, -0.5)
+    axes.set_axisbelow(True)
+    axes.grid(True, color="#EEEEEE", linewidth=0.5)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _reliability(calibration: Calibration) -> Picture:
+    figure = new_figure(5.2, 4.4)
+    axes = figure.add_subplot()
+    plain_axes(axes)
+    axes.plot([0, 1], [0, 1], color=GREY, linewidth=1.0, linestyle="--")
+    for part in calibration.bins:
+        axes.vlines(part.stated, part.low, part.high, color=BLUE, linewidth=1.4)
+        axes.plot(part.stated, part.right, "o", color=BLUE)
+    axes.set_xlim(-0.02, 1.02)
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_xlabel("stated probability")
+    axes.set_ylabel("share that is right")
+    return Picture(
+        "reliability", "Whether probabilities mean what they say",
+        "All named effects in bins of equal count, with Wilson's 95 % intervals. On the dashed line they mean it.",
+        figure,
+        alternative=" ".join(f"{p.stated:.2f} stated, {p.right:.2f} right, of {p.of}." for p in calibration.bins),
+    )  # fmt: skip

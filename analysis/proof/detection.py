@@ -1,0 +1,56 @@
+"""From which strength on single effects are named."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.proof.outcome import Outcome
+from analysis.proof.share import wilson
+
+PARTS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    effect: str
+    draws: tuple[tuple[float, str], ...]
+    """Strength (0 to 1) and what became of it: right, in the set, missed or invisible; weakest first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    adds: float
+    """Median of its draws: what the effect changes of the readings, in units of the noise."""
+    right: float
+    low: float
+    high: float
+    of: int
+
+
+def detection_strips(singles: Sequence[Outcome]) -> tuple[Strip, ...]:
+    names = sorted({one.names[0] for one in singles})
+    return tuple(
+        Strip(name, tuple(sorted((one.strengths[0], what_became_of(one)) for one in singles if one.names[0] == name)))
+        for name in names
+    )
+
+
+def what_became_of(one: Outcome) -> str:
+    if one.right:
+        return "right"
+    if one.names[0] in one.returned:
+        return "in the set"
+    return "missed" if one.detectable else "invisible"
+
+
+def shares_by_size(singles: Sequence[Outcome]) -> tuple[Part, ...]:
+    """In parts of equal count, the smallest effects first."""
+    order = sorted(singles, key=lambda one: one.adds)
+    found = []
+    for part in np.array_split(np.arange(len(order)), min(PARTS, len(order))):
+        drawn = [order[k] for k in part]
+        hits = sum(one.right for one in drawn)
+        size = float(np.median([max(one.adds, 1e-3) for one in drawn]))
+        found.append(Part(size, hits / len(drawn), *wilson(hits, len(drawn)), len(drawn)))
+    return tuple(found)
