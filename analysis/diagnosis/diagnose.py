@@ -49,12 +49,16 @@ def diagnose(
     tuning = tuning_of(model, recordings[0].command.channels)
     learned = _learned(settings.clean, model, chosen, map_, progress)
     measure = floored(chosen.measure, learned)
-    arena = Arena(measure.shortened(), measure, tuning, map_)
     catalogue = [one for one in CATALOGUE if one.name not in settings.without]
+    refined = {name for one in catalogue for name in one.simpler}
+    arena = Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without))
+    catalogue += [one for one in CATALOGUE if one.name in refined & arena.barred]
     seen = searched(arena, catalogue, progress, settings.patient)
     if seen.judged.verdict in ("unexplained", "partly_explained") and settings.patient():
         progress("looking for play that rattles", 0.9)
-        rattled = rattling(seen.arena, seen.found, chosen.floors, catalogue)
+        rattled = rattling(
+            seen.arena, seen.found, chosen.floors, [one for one in catalogue if one.name not in arena.barred]
+        )
         seen = seen if rattled is None else Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,))
     progress("writing down what was found", 0.95)
     found = seen.found if seen.judged.named else replace(seen.found, after=seen.found.retuned)

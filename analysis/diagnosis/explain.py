@@ -62,6 +62,8 @@ class Explanation:
     """None where samples were compared, in units of their noise."""
     ended_early: bool = False
     """Patience ran out before the search was done."""
+    barred: str = ""
+    """An effect that was not to be named, where nothing but refinements of it explains as much."""
 
 
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Explanation:
@@ -74,6 +76,7 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
     surprised = bool(np.nanmax(confirmed.standing.test, initial=0.0) > SURPRISING)
     rounds: list[tuple[Contender, ...]] = []
     steps: list[Contender] = []
+    barred = ""
     hasty, ended_early = replace(arena, map_=impatient(arena.map_, patient)), False
     while len(rounds) < MOST_EFFECTS and (
         base.standing.seen > (MORE if rounds else CLEAN) or (surprised and not rounds)
@@ -84,14 +87,17 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
         except OutOfPatienceError:
             ended_early = True
             break
-        if not contenders or not _worthwhile(base, contenders[0]):
-            rounds.append(contenders)
+        named = tuple(one for one in contenders if one.fitted.hypothesis.claims[-1].effect.name not in arena.barred)
+        rounds.append(named)
+        if not named or not _worthwhile(base, named[0]):
             break
-        rounds.append(contenders)
-        base = contenders[0]
+        if named[0] is not contenders[0]:
+            barred = contenders[0].fitted.hypothesis.claims[-1].effect.name
+            break
+        base = named[0]
         steps.append(base)
     ends = (arena.confirmed(arena.contender(before)), confirmed, arena.confirmed(base))
-    return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early)
+    return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
 
 
 def retuned_alone(arena: Arena) -> Fitted:

@@ -47,6 +47,9 @@ class Arena:
     """and with what they may not."""
     tuning: Tuning
     map_: Mapper
+    barred: frozenset[str] = frozenset()
+    """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
+    only where its refinement shows, and without it that law is the barred one."""
 
     def half_opened(self) -> "Arena":
         """With the first half of every sealed stretch to fit and to choose by."""

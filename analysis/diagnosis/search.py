@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.explain import Explanation, Progress, explain
+from analysis.diagnosis.no_answer import foresees_nothing
 from analysis.diagnosis.patience import OUT_OF_TIME, Patience, always
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.verdict import Judgement, judge
@@ -22,6 +23,12 @@ OPENED = (
 NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
 
 
+ONLY_REFINES = (
+    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
+    "but what they add to it does not show, so none of them is named."
+)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
     arena: Arena
@@ -33,15 +40,23 @@ class Searched:
 
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
     found = explain(arena, catalogue, progress, patient)
-    judged = judge(found)
+    judged = _judged(arena, found)
     if found.ended_early or judged.named or not _sealed_alone(found):
-        return Searched(arena, found, judged, (OUT_OF_TIME,) if found.ended_early else ())
+        early = (OUT_OF_TIME,) if found.ended_early else ()
+        return Searched(arena, found, judged, early + ((ONLY_REFINES,) if found.barred else ()))
     half = arena.half_opened()
     again = explain(half, catalogue, progress, patient)
-    second = judge(again)
+    second = _judged(half, again)
     if second.named:
         return Searched(half, again, second, (OPENED,))
     return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN,))
+
+
+def _judged(arena: Arena, found: Explanation) -> Judgement:
+    judged = judge(found)
+    if judged.named and foresees_nothing(arena.whole, found.after):
+        return Judgement("unexplained", False)
+    return judged
 
 
 def _sealed_alone(found: Explanation) -> bool:

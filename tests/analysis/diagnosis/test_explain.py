@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.search import ONLY_REFINES
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.signals.signal import Signal
@@ -132,3 +133,15 @@ def test_commands_in_another_order_explain_nothing(rubs, diagnosed):
     other = found_in(lost, diagnosed.device(1))
     assert other.diagnosis.verdict == "unexplained"
     assert named(other) == []
+
+
+def test_a_refined_law_is_not_named_for_the_plain_one_that_was_to_be_left_out(rubs, diagnosed):
+    found = found_in(rubs, diagnosed.device(1), ("asymmetric_friction", "hardening_stiffness"))
+    assert (found.diagnosis.verdict, named(found)) == ("unexplained", [])
+    assert ONLY_REFINES in found.remarks
+
+
+def test_a_refined_law_is_named_where_its_refinement_shows(diagnosed):
+    uneven = PlacedEffect(EFFECTS["asymmetric_friction"], (0,), {"level_positive": 0.3, "level_negative": 0.1})
+    found = found_in(diagnosed.recorded(1, (uneven,)), diagnosed.device(1), ("asymmetric_friction",))
+    assert named(found) == [("asymmetric_friction", "x")]
