@@ -10,6 +10,8 @@ from analysis.proof.share import RESAMPLED, wilson
 from equalizer.signals.signal import FloatArray
 
 BINS = 10
+TIED = 3
+"""Decimals to which probabilities are told apart. Names that tie are right in equal parts, whichever bin they are in."""
 ANSWERABLE = ("nothing", "single", "pair")
 """Kinds of which the catalogue holds the answer; a probability is one among what it holds."""
 
@@ -52,13 +54,20 @@ def _parts(stated: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]
 
 
 def _error(stated: FloatArray, right: FloatArray) -> float:
-    parts = _parts(stated)
-    return float(sum(abs(stated[part].sum() - right[part].sum()) for part in parts) / len(stated))
+    even = _evened(stated, right)
+    return float(sum(abs(stated[part].sum() - even[part].sum()) for part in _parts(stated)) / len(stated))
+
+
+def _evened(stated: FloatArray, right: FloatArray) -> FloatArray:
+    """Right answers of equal probabilities, spread evenly over them."""
+    _, group = np.unique(np.round(stated, TIED), return_inverse=True)
+    mean: FloatArray = np.bincount(group, weights=right) / np.bincount(group)
+    return np.asarray(mean[group])
 
 
 def _bins(stated: FloatArray, right: FloatArray) -> list[Bin]:
-    found = []
+    found, even = [], _evened(stated, right)
     for part in _parts(stated):
-        hits, of = int(right[part].sum()), len(part)
+        hits, of = float(even[part].sum()), len(part)
         found.append(Bin(float(stated[part].mean()), hits / of, *wilson(hits, of), of))
     return found

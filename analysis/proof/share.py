@@ -34,7 +34,7 @@ def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Fi
     return Figure(name, hits / of, low, high, of, hits)
 
 
-def wilson(hits: int, of: int) -> tuple[float, float]:
+def wilson(hits: float, of: int) -> tuple[float, float]:
     low, high = proportion_confint(hits, of, method="wilson")
     return float(low), float(high)
 
