@@ -154,3 +154,43 @@ def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Pa
     assert not any(one.failed for one in done.results.injected)
     assert "Faults injected into real recordings" in done.page.read_text()
     assert any(line.startswith("Injected: ") for line in real_lines(done))
+
+
+def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:
+    if not (shared / "recordings").is_dir():
+        pytest.skip("the public recordings are not beside this checkout")
+    found = read_real_folder(shared / "recordings")
+    by_name = {one.name: one for one in found.recordings}
+    assert not found.troubles
+    assert set(by_name) == {
+        "emps", "f16_gvt", "haptic_paddle_sensors", "haptic_paddle_torque", "rack_drive", "silverbox",
+        "vibration_actuator_noise_condition1_noise", "vibration_actuator_noise_condition2_noise",
+    }  # fmt: skip
+    on_a_body = by_name["vibration_actuator_noise_condition2_noise"]
+    assert on_a_body.before is not None and on_a_body.before.files[0].name == "condition1_noise.npz"
+    assert [one.files[0].stem for one in on_a_body.tests] == ["condition2_clip"]
+    assert [one.name for one in by_name["silverbox"].tests] == ["silverbox_growing_noise", "silverbox_schroeder"]
+    assert all(one.found.source.map.diagnosis.objections for one in found.recordings)
+    assert by_name["haptic_paddle_torque"].model().rotational
+
+
+@pytest.mark.slow
+def test_the_figures_of_the_public_recordings_are_reached(shared: Path, tmp_path: Path) -> None:
+    """Those that are; docs/real.md says which are not."""
+    if not (shared / "recordings").is_dir():
+        pytest.skip("the public recordings are not beside this checkout")
+    few = tmp_path / "recordings"
+    few.mkdir()
+    for name in ("emps", "haptic_paddle", "vibration_actuator"):
+        (few / name).symlink_to(shared / "recordings" / name)
+    done = diagnose_folder(RealPlan(few, tmp_path / "out"), silent)
+    answers = {one.recording: one for one in done.results.answers}
+    axis, lever = answers["emps"], answers["haptic_paddle_torque"]
+    assert axis.held_out.after <= 0.28 * axis.held_out.retuned
+    assert axis.numbers[0].value == pytest.approx(95.1, rel=0.01)
+    assert lever.held_out.after <= 0.25 * lever.held_out.retuned
+    assert lever.numbers[0].holds_nominal
+    pair = answers["vibration_actuator_noise_condition2_noise"].pair
+    assert pair.with_effects <= 0.8 * pair.gain
+    assert "body_on_actuator" in pair.returned
+    assert not any(one.verdict == "explained" for one in answers.values())
