@@ -20,7 +20,7 @@ def noncentral_f_sf(
     """
     degrees = 2 * np.asarray(lines, dtype=np.float64)
     shift = np.asarray(noncentrality, dtype=np.float64)
-    equal = (degrees + shift) ** 2 / (degrees + 2 * shift)
+    equal = (degrees + shift) * ((degrees + shift) / (degrees + 2 * shift))
     scaled = np.asarray(ratio, dtype=np.float64) * degrees / (degrees + shift)
     return np.asarray(f_distribution.sf(scaled, equal, freedom), dtype=np.float64)
 

@@ -98,7 +98,8 @@ def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment
         except (MechanicalModelError, np.linalg.LinAlgError):
             break
         rest = wanted - there
-        squares = float(rest @ rest + tuned @ known @ tuned)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+            squares = float(rest @ rest + tuned @ known @ tuned)
         if not squares < least:
             break
         least = squares

@@ -1,5 +1,7 @@
 """A folder of results that appears whole or not at all."""
 
+import errno
+import os
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -13,9 +15,15 @@ from study.store.file_errors import CannotWriteError
 
 def require_new_folder(out: Path) -> None:
     """It is not there yet, or is empty, and there is a folder to make it in. Raises StudyError."""
-    if out.is_dir() and not any(out.iterdir()):
+    try:
+        empty, there, inside = out.is_dir() and not any(out.iterdir()), out.exists(), out.absolute().parent.is_dir()
+    except OSError as problem:
+        raise CannotWriteError(out, problem) from problem
+    if inside and not os.access(out.absolute().parent, os.W_OK):
+        raise CannotWriteError(out, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+    if empty:
         return
-    if out.exists():
+    if there:
         what = "holds files already" if out.is_dir() else "is a file"
         raise StudyError(
             "The results need a folder of their own",
@@ -23,7 +31,7 @@ def require_new_folder(out: Path) -> None:
             "Choose another name with --out, or empty it.",
             saved="Nothing was written.",
         )
-    if not out.absolute().parent.is_dir():
+    if not inside:
         raise StudyError(
             "The results need a folder of their own",
             f"There is no folder {out.parent} to make {out.name} in.",

@@ -20,6 +20,10 @@ def test_without_a_shift_it_is_the_central_f():
     assert noncentral_f_sf(ratio, 10, 50, 0.0) == pytest.approx(f_distribution.sf(ratio, 20, 50))
 
 
+def test_a_shift_without_measure_is_no_overflow():
+    assert noncentral_f_sf(1.0, 10, 5000, 1e200) == pytest.approx(1.0)
+
+
 def test_it_holds_for_shifts_of_millions():
     ratio = 1 + 1e7 / 20
     assert 0.4 < noncentral_f_sf(ratio, 10, 5000, 1e7) < 0.6

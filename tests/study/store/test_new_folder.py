@@ -1,8 +1,11 @@
 """A folder of results is there whole, or not at all."""
 
+import os
+
 import pytest
 
 from study.errors import StudyError
+from study.store.file_errors import CannotWriteError
 from study.store.new_folder import new_folder, require_new_folder
 
 
@@ -52,3 +55,14 @@ def test_a_folder_that_was_filled_meanwhile_is_left_alone(tmp_path):
 def test_the_folder_above_must_be_there(tmp_path):
     with pytest.raises(StudyError, match="There is no folder"):
         require_new_folder(tmp_path / "no" / "out")
+
+
+def test_a_place_that_cannot_be_written_to_is_refused_before_any_work(tmp_path):
+    with pytest.raises(CannotWriteError, match="was not written"):
+        require_new_folder(tmp_path / ("x" * 300))
+    (tmp_path / "closed").mkdir()
+    (tmp_path / "closed").chmod(0o555)
+    if os.access(tmp_path / "closed", os.W_OK):
+        pytest.skip("whoever runs this may write anywhere")
+    with pytest.raises(CannotWriteError, match="was not written"):
+        require_new_folder(tmp_path / "closed" / "out")

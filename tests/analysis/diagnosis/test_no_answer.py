@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+
+from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.no_answer import foresees_nothing
+from analysis.diagnosis.output_error import evaluated
+from analysis.diagnosis.rivalry import Contender
+from analysis.diagnosis.standing import standing
+from equalizer.effects.catalogue import CATALOGUE
+
+GAIN = next(effect for effect in CATALOGUE if effect.name == "force_gain")
+
+
+@pytest.mark.parametrize(("gain", "nothing"), [(0.7, False), (1e-6, True)])
+def test_a_force_that_never_reaches_the_device_foresees_nothing(arena_of, gain, nothing):
+    arena = arena_of()
+    held = claimed(Claim(GAIN, "one", (0,)), [{"gain": gain}])
+    assert foresees_nothing(arena.whole, _contender(arena, held)) is nothing
+
+
+def test_a_model_as_it_is_foresees_something(arena_of):
+    arena = arena_of()
+    assert not foresees_nothing(arena.whole, _contender(arena, NOTHING))
+
+
+def _contender(arena, hypothesis):
+    fitted = evaluated(arena.whole, arena.tuning, np.zeros(len(arena.tuning.names)), hypothesis)
+    return Contender(fitted, standing(arena.whole, fitted.residuals))
