@@ -27,7 +27,7 @@ EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 3.0, "engine": 0.0}
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
 """Strength. Singles go from invisible to strong; the others ask what is said of something that is there."""
 GOLDEN = 0.5 * (5**0.5 - 1)
-SIZES = (0.70, 0.15)
+SIZES = (0.80, 0.12)
 """Parts of the bank with one and with two driven axes."""
 ALL_AXES = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes")
 """Less than three axes do not show them for what they are."""

@@ -21,6 +21,8 @@ from study.workflows.worker_processes import worker_processes
 from study.workflows.write_cases import truths
 
 SALT_BYTES = 16
+PROCESSOR_S = 60.0
+"""For the search of one case: what was found until then is its answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ def seal_one(folder: ProofFolder, one: Draw) -> None:
     place.mkdir()
     write_recording(place / RECORDING, case.recording, precision="float32")
     write_mechanical_model(place / MODEL, case.model)
-    write_text(place / SETTINGS, json.dumps({"without": list(one.without)}) + "\n")
+    write_text(place / SETTINGS, json.dumps({"without": list(one.without), "processor_s": PROCESSOR_S}) + "\n")
     write_text(folder.label(one.number), json.dumps(_label(one, case, place), indent=1, allow_nan=False) + "\n")
 
 
