@@ -16,7 +16,7 @@ def real(
     seconds: Annotated[
         float,
         typer.Option(min=1.0, help="Processor time for a sub-folder: a search that is not done by then ends there."),
-    ] = 240.0,
+    ] = 180.0,
     inject: Annotated[
         int, typer.Option(min=0, help="So many faults of sensor or clock are injected under a seal, and looked for.")
     ] = 0,

@@ -23,7 +23,7 @@ from study.workflows.write_real import RealResults, WrittenReal, write_real
 ANSWER_NAME, RETUNED_NAME, INJECTED_NAME = "answer.json", "retuned.toml", "injected"
 DIAGNOSED_OF_BOTH = 0.5
 """Share of the work that is done when faults begin to be injected."""
-SECONDS = 240.0
+SECONDS = 180.0
 """Of processor time, for a folder's recordings together: a search that is not done by then ends with what it has. The
 clock on the wall would make answers hang on what else the machine does."""
 BESIDE_S = 25.0
