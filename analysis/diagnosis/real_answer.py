@@ -150,4 +150,9 @@ def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
         raise RealAnswerError(str(error)) from error
 
 
+def real_answer_schema() -> dict[str, Any]:
+    """JSON Schema of what `real_answer_to_json` gives."""
+    return _ADAPTER.json_schema(mode="serialization")
+
+
 _ADAPTER: TypeAdapter[RealAnswer] = TypeAdapter(RealAnswer)

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter
 
-from analysis.diagnosis import document
+from analysis.diagnosis import document, real_answer
 from analysis.reproduction import document as reproduction_document
 from analysis.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
@@ -66,6 +66,11 @@ SCHEMAS: tuple[Schema, ...] = (
         "diagnosis.json",
         "`diagnosis.json`",
         lambda: document_schema(document.diagnosis_schema(), document.FORMAT, document.VERSION),
+    ),
+    Schema(
+        "real_answer.json",
+        "`answer.json`, what `hapteq real` says of one recording",
+        lambda: document_schema(real_answer.real_answer_schema(), real_answer.FORMAT, real_answer.VERSION),
     ),
     Schema(
         "repeats.json",

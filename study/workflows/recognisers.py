@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
+from analysis.diagnosis.real_answer import FORMAT as REAL_ANSWER_FORMAT
 from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from equalizer.tracking.trajectory import TRAJECTORY
 from protocols.loading import ProtocolError, load_protocol
@@ -15,6 +16,7 @@ from study.store.diagnosis_file import read_diagnosis
 from study.store.file_errors import UnusableFileError
 from study.store.identified_model_file import read_identified_model
 from study.store.mechanical_model_file import read_mechanical_model
+from study.store.real_answer_file import read_real_answer
 from study.store.recording_file import read_recording
 from study.store.repeats_file import FORMAT as REPEATS_FORMAT
 from study.store.repeats_file import read_repeats
@@ -106,6 +108,13 @@ def recognise_repeats(content: FileContent) -> str | None:
     )
 
 
+def recognise_real_answer(content: FileContent) -> str | None:
+    if content.json_format != REAL_ANSWER_FORMAT:
+        return None
+    found = read_real_answer(content.path)
+    return f"answer to the real recording {found.recording} of {found.folder}: {found.verdict.replace('_', ' ')}"
+
+
 def recognise_reproduction(content: FileContent) -> str | None:
     if content.json_format != REPRODUCTION_FORMAT:
         return None
@@ -144,6 +153,7 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     recognise_identified_model,
     recognise_mechanical_model,
     recognise_diagnosis,
+    recognise_real_answer,
     recognise_reproduction,
     recognise_repeats,
     recognise_trajectory,

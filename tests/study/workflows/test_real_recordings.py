@@ -12,6 +12,7 @@ from study.store.real_answer_file import read_real_answer
 from study.workflows.real_folder import read_real_folder
 from study.workflows.real_recordings import RealPlan, diagnose_folder
 from study.workflows.real_summary import real_lines
+from study.workflows.validate import validate_file
 
 RATE_HZ, SECONDS = 500.0, 8.0
 MASS, DAMPING, STIFFNESS = 0.2, 4.0, 900.0
@@ -115,6 +116,7 @@ def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_pat
     assert any("sensor_offset" in line for line in real_lines(done))
     kept = tmp_path / "out" / "axis" / "run" / "answer.json"
     assert read_real_answer(kept) == axis
+    assert validate_file(kept).kind.startswith("answer to the real recording run of axis")
     before = kept.stat().st_mtime_ns
     assert diagnose_folder(RealPlan(folder, tmp_path / "out"), silent).results.answers[0] == axis
     assert kept.stat().st_mtime_ns == before
