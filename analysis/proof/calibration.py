@@ -11,7 +11,7 @@ from equalizer.signals.signal import FloatArray
 
 BINS = 10
 TIED = 3
-"""Decimals to which probabilities are told apart. Names that tie are right in equal parts, whichever bin they are in."""
+"""Decimals to which probabilities are told apart. Names that tie are right in equal parts, whatever bin they are in."""
 ANSWERABLE = ("nothing", "single", "pair")
 """Kinds of which the catalogue holds the answer; a probability is one among what it holds."""
 

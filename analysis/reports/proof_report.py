@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.figures.picture import Picture
+from analysis.proof.controlled import Controlled
 from analysis.proof.outcome import Outcome
 from analysis.proof.score import Score
 from analysis.proof.share import Figure
@@ -29,6 +30,7 @@ class ProofFacts:
     commit: str
     engines: tuple[str, ...]
     remarks: tuple[str, ...]
+    controls: tuple[Controlled, ...] = ()
 
 
 def render_proof_report(
@@ -43,6 +45,7 @@ def render_proof_report(
     sections = (
         Section(f"Misses: {len(score.misses)}", tables=(_misses(score.misses),) if score.misses else ()),
         Section("Figures", tables=(_figures(score),)),
+        *_controls(facts.controls),
         Section("Which, from where on, how sure", pictures=tuple(pictures)),
         Section("How it was done", HOW, points=_points(facts)),
     )
@@ -57,6 +60,14 @@ def render_proof_report(
             provenance=provenance,
         )
     )
+
+
+def _controls(controls: Sequence[Controlled]) -> tuple[Section, ...]:
+    if not controls:
+        return ()
+    rows = tuple((one.name, one.claim, "held" if one.held else "did not hold", "; ".join(one.said)) for one in controls)
+    table = Table("What is changed, and what must come of it", ("control", "claim", "outcome", "said"), rows)
+    return (Section("Controls", tables=(table,)),)
 
 
 def _points(facts: ProofFacts) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ class DrivePlan:
 def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD) -> FloatArray:
     """One period, (period,), with peak `level_n`: odd lines of amplitude f^-1/2 and random phase, one of every four
     neighbours left silent, so that it shows what odd distortion puts there."""
-    lines = np.arange(FIRST_LINE, LAST_LINE * period // PERIOD + 1, 2)
+    lines = np.arange(FIRST_LINE * period // PERIOD | 1, LAST_LINE * period // PERIOD + 1, 2)
     silent = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
     spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / np.sqrt(lines)

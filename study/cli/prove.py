@@ -15,6 +15,9 @@ def prove(
     seed: Annotated[int, typer.Option(min=0, help="Seed of all draws but the salt of the labels.")] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     brief: Annotated[bool, typer.Option("--brief", help="Short recordings: a quick look.")] = False,
+    controls: Annotated[
+        bool, typer.Option("--controls", help="Also ask what must change, or must not: minutes more.")
+    ] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings, 1 to 4 MB each.")] = False,
     table: Annotated[Path | None, typer.Option(help="A small table of the figures, CSV, to be kept.")] = None,
     as_json: JsonOption = False,
@@ -25,6 +28,7 @@ def prove(
     """
     from study.cli.progress import steps
     from study.workflows.proof_summary import proof_lines, summary
+    from study.workflows.prove import Wishes
     from study.workflows.prove import prove as proved
     from study.workflows.seal_cases import BankPlan
     from study.workflows.write_proof import write_proof, write_table
@@ -33,9 +37,8 @@ def prove(
         proof = proved(
             out,
             BankPlan(seed, cases, brief),
-            workers,
+            Wishes(workers, keep, controls),
             lambda what, done, of: show(f"{what} {done} of {of}", done / max(of, 1)),
-            keep,
         )
     write_proof(proof)
     if table is not None:

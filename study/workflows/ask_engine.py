@@ -9,14 +9,16 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
-from study.store.text_file import write_text
-from study.workflows.proof_folder import ANSWER, ProofFolder
+from study.store.text_file import read_text, write_text
+from study.workflows.proof_folder import ANSWER, RECORDING, ProofFolder
 
 PATIENCE_S = 1200.0
 """For one case; it takes seconds to a minute."""
 GLANCE_S = 0.5
 TRIES = 2
 """A process that died may have been killed by somebody."""
+DIED = "died"
+"""Key of an answer that no process gave."""
 
 
 class Engine:
@@ -79,7 +81,7 @@ class Engine:
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answered: Callable[[str], None]) -> None:
     """Blocks until all cases without an answer have one; `on_answered(name)` as they come, in this thread."""
     left, answered = SimpleQueue[str](), SimpleQueue[str]()
-    wanted = [name for name in names if not (folder.open / name / ANSWER).exists()]
+    wanted = [name for name in names if not is_answered(folder.open / name)]
     for name in wanted:
         left.put(name)
     with _engines(folder, min(workers, len(wanted)), left, answered) as threads:
@@ -128,6 +130,20 @@ def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered:
         answered.put(name)
 
 
+def is_answered(place: Path) -> bool:
+    """A process that died may have been killed: its case is asked again when the bank goes on."""
+    answer = place / ANSWER
+    return answer.exists() and DIED not in json.loads(read_text(answer))
+
+
 def _given_up(place: Path) -> None:
-    said = {"name": place.name, "failed": f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"}
+    how = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
+    said = {"name": place.name, "failed": how, DIED: True}
     write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
+
+
+def forget_recording(place: Path) -> None:
+    """Megabytes each; the label keeps their hash, and the seed gives them again. Kept where nobody answered."""
+    if is_answered(place):
+        with suppress(OSError):
+            (place / RECORDING).unlink(missing_ok=True)

@@ -14,6 +14,7 @@ def proof_lines(proof: Proof) -> Iterator[str]:
         strength = strength_text(one)
         drawn = f"{concealed_text(one)}{f' at {strength}' if strength else ''}"
         yield f"  {one.number:5d} {one.kind}, {one.bank}: {drawn} -> {said_text(one)}"
+    yield from control_lines(proof)
     yield ""
     for figure in score.figures:
         yield f"{figure.name:52s} {figure_text(figure)}"
@@ -25,6 +26,15 @@ def proof_lines(proof: Proof) -> Iterator[str]:
     yield from remarks(proof)
     yield f"Seal of the labels (SHA-256 of labels.sha256): {proof.seal}"
     yield f"Everything is in {proof.folder.path}"
+
+
+def control_lines(proof: Proof) -> Iterator[str]:
+    """Those that did not hold one by one."""
+    if proof.controls:
+        yield f"{sum(one.held for one in proof.controls)} of {len(proof.controls)} controls held"
+    for one in proof.controls:
+        if not one.held:
+            yield f"  {one.name}: {', then '.join(one.said)}"
 
 
 def remarks(proof: Proof) -> Iterator[str]:
@@ -49,5 +59,6 @@ def summary(proof: Proof) -> dict[str, Any]:
             for figure in proof.score.figures
         },
         "expected_calibration_error": proof.score.calibration.error,
+        "controls": {one.name: one.held for one in proof.controls},
         "misses": [one.number for one in proof.score.misses],
     }

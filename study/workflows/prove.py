@@ -1,16 +1,17 @@
 """A bank of concealed physics from start to end: sealed, answered by processes that know nothing, revealed."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.proof.controlled import Controlled
 from analysis.proof.outcome import Outcome
 from analysis.proof.score import Score, score
 from study.errors import LeftError
-from study.workflows.ask_engine import ask_engine
-from study.workflows.proof_folder import ANSWER, RECORDING, ProofFolder, opened
+from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
+from study.workflows.proof_folder import ProofFolder, opened
 from study.workflows.reveal_cases import engines, reveal_cases
+from study.workflows.run_controls import run_controls
 from study.workflows.seal_cases import BankPlan, seal_cases, sealed_names, to_draw
 
 Progress = Callable[[str, int, int], None]
@@ -26,29 +27,43 @@ class Proof:
     outcomes: tuple[Outcome, ...]
     score: Score
     engines: tuple[str, ...]
+    controls: tuple[Controlled, ...]
     left_out: int
     """Cases of the second physics engine, where it is not installed."""
 
 
-def prove(path: Path, plan: BankPlan, workers: int, on_progress: Progress, keep: bool = False) -> Proof:
-    """Interrupted, the same call goes on. keep: recordings stay once they are answered. Raises StudyError."""
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    workers: int = 2
+    keep: bool = False
+    """Recordings stay once they are answered."""
+    controls: bool = False
+    """What must change, or must not, is asked too."""
+
+
+def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> Proof:
+    """Interrupted, the same call goes on. Raises StudyError."""
     folder = opened(path, plan.seed, plan.brief)
     numbers = [one.number for one in to_draw(plan)]
     try:
-        seal = seal_cases(folder, plan, workers, lambda done: on_progress("sealing", done, len(numbers)))
+        seal = seal_cases(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = sealed_names(folder, numbers)
-        answered = [name for name in names if (folder.open / name / ANSWER).exists()]
-        done = len(answered)
+        done = sum(is_answered(folder.open / name) for name in names)
         on_progress("diagnosing", done, len(names))
 
         def on_answered(name: str) -> None:
             nonlocal done
             done += 1
-            if not keep:
+            if not wishes.keep:
                 forget_recording(folder.open / name)
             on_progress("diagnosing", done, len(names))
 
-        ask_engine(folder, names, workers, on_answered)
+        ask_engine(folder, names, wishes.workers, on_answered)
+        controls: tuple[Controlled, ...] = ()
+        if wishes.controls:
+            controls = run_controls(
+                path / "controls", plan.seed, wishes.workers, lambda done, of: on_progress("controls", done, of)
+            )
     except KeyboardInterrupt as interruption:
         raise LeftError(
             "Interrupted",
@@ -57,10 +72,6 @@ def prove(path: Path, plan: BankPlan, workers: int, on_progress: Progress, keep:
             saved=f"All that is sealed and answered so far is in {path}.",
         ) from interruption
     outcomes = reveal_cases(folder, plan.cases)
-    return Proof(folder, plan, seal, outcomes, score(outcomes), engines(folder, set(names)), plan.cases - len(numbers))
-
-
-def forget_recording(place: Path) -> None:
-    """Megabytes each; the label keeps their hash, and the seed gives them again."""
-    with suppress(OSError):
-        (place / RECORDING).unlink(missing_ok=True)
+    return Proof(
+        folder, plan, seal, outcomes, score(outcomes), engines(folder, set(names)), controls, plan.cases - len(numbers)
+    )

@@ -72,6 +72,7 @@ def write_proof(proof: Proof) -> None:
         "commit": commit(),
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
+        "controls": [asdict(one) for one in proof.controls],
         "misses": [one.number for one in score.misses],
     }
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
@@ -79,7 +80,7 @@ def write_proof(proof: Proof) -> None:
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
     pictures = proof_pictures(proof.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
-    facts = ProofFacts(seeds(proof), proof.seal, commit(), proof.engines, tuple(remarks(proof)))
+    facts = ProofFacts(seeds(proof), proof.seal, commit(), proof.engines, tuple(remarks(proof)), proof.controls)
     page = render_proof_report(
         proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, RealClock().utc()
     )

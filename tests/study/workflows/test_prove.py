@@ -11,7 +11,7 @@ from study.challenge.draw_bank import draw
 from study.errors import LeftError, StudyError
 from study.workflows.proof_folder import ANSWER, RECORDING, ProofFolder, opened
 from study.workflows.proof_summary import proof_lines, summary
-from study.workflows.prove import prove
+from study.workflows.prove import Wishes, prove
 from study.workflows.reveal_cases import reveal_cases
 from study.workflows.seal_cases import BankPlan, to_draw
 from study.workflows.write_proof import write_proof, write_table
@@ -25,7 +25,7 @@ PLAN = BankPlan(SEED, 3, brief=True)
 def proof(tmp_path_factory):
     seen = []
     path = tmp_path_factory.mktemp("bank") / "proof"
-    return prove(path, PLAN, 2, lambda what, done, of: seen.append((what, done, of))), seen
+    return prove(path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of))), seen
 
 
 def test_a_bank_is_sealed_answered_and_revealed(proof):
@@ -77,7 +77,7 @@ def test_the_process_that_answers_reaches_no_label(proof, does, refused):
 def test_the_same_command_goes_on_without_doing_anything_twice(proof):
     folder, seen = proof[0].folder, []
     before = {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")}
-    again = prove(folder.path, PLAN, 2, lambda what, done, of: seen.append((what, done, of)))
+    again = prove(folder.path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of)))
     assert {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")} == before
     assert again.seal == proof[0].seal
     assert [one.number for one in again.outcomes] == [one.number for one in proof[0].outcomes]
@@ -117,7 +117,7 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(LeftError, match="Interrupted"):
-        prove(tmp_path / "bank", PLAN, 1, interrupt)
+        prove(tmp_path / "bank", PLAN, Wishes(workers=1), interrupt)
     assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(to_draw(PLAN))
 
 

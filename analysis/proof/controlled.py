@@ -1,0 +1,77 @@
+"""Controls of a diagnosis: claims about its answers when what it is given is changed."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Diagnosis
+
+CONFIDENT = 0.5
+"""A probability from which a name is a confident one."""
+SAME_NUMBER = 0.02
+"""Relative: answers to mirrored recordings may differ by so much more than their sign."""
+
+
+@dataclass(frozen=True, slots=True)
+class Controlled:
+    name: str
+    claim: str
+    held: bool
+    said: tuple[str, ...]
+    """Each answer in words."""
+
+
+def controlled(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> Controlled:
+    """answers: None = refused or broken down, which names nothing. Raises KeyError for a claim nobody knows."""
+    return Controlled(name, claim, CLAIMS[claim](answers), tuple(map(_words, answers)))
+
+
+def _no_name(answers: Sequence[Diagnosis | None]) -> bool:
+    return not any(effect.probability >= CONFIDENT for one in answers if one is not None for effect in one.effects)
+
+
+def _not_explained(answers: Sequence[Diagnosis | None]) -> bool:
+    return all(one is None or one.verdict != "explained" for one in answers)
+
+
+def _nothing(answers: Sequence[Diagnosis | None]) -> bool:
+    return all(one is not None and one.verdict in ("no_mismatch", "parameters") for one in answers)
+
+
+def _same(answers: Sequence[Diagnosis | None]) -> bool:
+    """The same verdict, effects and axes, and at least one effect."""
+    said = {_place(one, with_axes=True) for one in answers if one is not None}
+    return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
+
+
+def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
+    said = {_place(one, with_axes=False) for one in answers if one is not None}
+    return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
+
+
+def _opposite(answers: Sequence[Diagnosis | None]) -> bool:
+    """One effect, its main number with the other sign."""
+    mains = [next(iter(one.effects[0].parameters.values())).value for one in answers if one and one.effects]
+    if len(mains) != len(answers) or not _same(answers):
+        return False
+    return abs(mains[0] + mains[1]) <= SAME_NUMBER * abs(mains[0])
+
+
+def _place(one: Diagnosis, with_axes: bool) -> tuple[object, ...]:
+    return one.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in one.effects)
+
+
+def _words(one: Diagnosis | None) -> str:
+    if one is None:
+        return "no answer"
+    named = ", ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in one.effects)
+    return one.verdict.replace("_", " ") + (f": {named}" if named else "")
+
+
+CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
+    "no name": _no_name,
+    "not explained": _not_explained,
+    "nothing": _nothing,
+    "same": _same,
+    "same but axes": _same_but_axes,
+    "opposite": _opposite,
+}

@@ -1,0 +1,70 @@
+"""Controls of a diagnosis, asked of the same processes as a bank: files in, answers out, claims checked."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
+from analysis.proof.controlled import Controlled, controlled
+from study.challenge.controls import CONTROLS, Asked, Control
+from study.challenge.rig import Rig
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.recording_file import write_recording
+from study.store.text_file import read_text, write_text
+from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
+from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder
+
+SHORT = Rig((0,), 1000, 3)
+
+
+def run_controls(
+    path: Path,
+    seed: int,
+    workers: int,
+    on_done: Callable[[int, int], None],
+    controls: Sequence[Control] = CONTROLS,
+    rig: Rig = SHORT,
+) -> tuple[Controlled, ...]:
+    """`on_done(answers so far, of all)`. In `path`; interrupted, the same call goes on. Raises StudyError."""
+    folder = ProofFolder(path)
+    folder.open.mkdir(parents=True, exist_ok=True)
+    names = {control.name: _given(folder, seed, control, rig) for control in controls}
+    every = [name for each in names.values() for name in each]
+    done = sum(is_answered(folder.open / name) for name in every)
+    on_done(done, len(every))
+
+    def on_answered(name: str) -> None:
+        nonlocal done
+        done += 1
+        forget_recording(folder.open / name)
+        on_done(done, len(every))
+
+    ask_engine(folder, every, workers, on_answered)
+    return tuple(
+        controlled(one.name, one.claim, [_said(folder.open / name) for name in names[one.name]]) for one in controls
+    )
+
+
+def _given(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[str, ...]:
+    """Writes what is not written yet; the settings come last."""
+    known = folder.path / f"{control.name.replace(' ', '-')}.json"
+    if known.exists():
+        return tuple(json.loads(read_text(known)))
+    asked = control.draw(seed, rig)
+    names = tuple(f"{CONTROLS.index(control):02d}{number}" for number in range(len(asked)))
+    for name, one in zip(names, asked, strict=True):
+        _write(folder.open / name, one)
+    write_text(known, json.dumps(names) + "\n")
+    return names
+
+
+def _write(place: Path, one: Asked) -> None:
+    place.mkdir(exist_ok=True)
+    write_recording(place / RECORDING, one.recording, precision="float32", overwrite=True)
+    write_mechanical_model(place / MODEL, one.model, overwrite=True)
+    write_text(place / SETTINGS, json.dumps({"without": list(one.without)}) + "\n", overwrite=True)
+
+
+def _said(place: Path) -> Diagnosis | None:
+    answer = json.loads(read_text(place / ANSWER))
+    return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])
