@@ -78,7 +78,7 @@ def _silent(seed: int, rig: Rig) -> tuple[Asked, ...]:
 
 def _permuted(seed: int, rig: Rig) -> tuple[Asked, ...]:
     """The channels of command, response and position in reverse; each keeps its name."""
-    two = Rig((0, 1), rig.period, rig.periods)
+    two = replace(rig, axes=(0, 1))
     case = _strong(seed, two)
     recording, model = case.recording, case.model
     if recording.position is None:

@@ -13,7 +13,7 @@ from study.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, move
 from study.challenge.sensor import Sensor, read
 
 STEPS = 20
-"""Of the integrator in a sample."""
+"""Of the integrator in a sample, where nothing else is said."""
 
 
 def _no_forces() -> FloatArray:
@@ -52,6 +52,8 @@ class Device:
     skipped: int = 0
     """Every so many commands one is not written; 0 = never."""
     sensor: Sensor = field(default_factory=Sensor)
+    steps: int = STEPS
+    """Of the integrator in a sample."""
 
     def mechanism(self) -> Mechanism:
         mass, damping, stiffness = self.bench.matrices()
@@ -62,7 +64,7 @@ class Device:
         return Mechanism(
             inverse_mass, damping, stiffness,
             self.friction, self.forces, self.inertia_per_m, self.axis_mass_per_m, self.varying, self.play,
-            self.creep_stiffness, 1.0 / (RATE_HZ * STEPS * self.creep_time_s), self.coupling,
+            self.creep_stiffness, 1.0 / (RATE_HZ * self.steps * self.creep_time_s), self.coupling,
         )  # fmt: skip
 
 
@@ -74,8 +76,8 @@ def motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]
     written = command.copy()
     if device.skipped:
         written[device.skipped :: device.skipped] = written[device.skipped - 1 : -1 : device.skipped]
-    force = drive(written, device.amplifiers, STEPS, RATE_HZ)
-    acceleration, position = move(device.mechanism(), force, STEPS, RATE_HZ)
+    force = drive(written, device.amplifiers, device.steps, RATE_HZ)
+    acceleration, position = move(device.mechanism(), force, device.steps, RATE_HZ)
     if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
         raise ValueError("the simulated device ran away: a stiffness, mass or per_m is too large for its step")
     return acceleration, position

@@ -23,12 +23,14 @@ COUNTS: dict[tuple[Kind, Bank], int] = {
     ("pair", "main"): 4, ("outside", "main"): 4, ("without", "main"): 4,
 }  # fmt: skip
 TURN: tuple[tuple[Kind, Bank], ...] = tuple(one for one, count in COUNTS.items() for _ in range(count))
-EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 3.0, "engine": 0.0}
+EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
 """Strength. Singles go from invisible to strong; the others ask what is said of something that is there."""
 GOLDEN = 0.5 * (5**0.5 - 1)
 SIZES = (0.80, 0.12)
 """Parts of the bank with one and with two driven axes."""
+STEPS = 80
+"""Of the bench's integrator in a sample: its error must not be what is found."""
 ALL_AXES = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes")
 """Less than three axes do not show them for what they are."""
 ONE_ROW = (
@@ -65,8 +67,9 @@ def draw(seed: int, number: int, brief: bool = False) -> Draw:
     # How many of this kind came before: effects take their turns, and each one's strengths spread evenly.
     before = turn * TURN.count((kind, bank)) + sum(TURN[k] == (kind, bank) for k in order[:place])
     effects, strengths = _effects(seed, kind, bank, before, random)
-    rig = Rig(_axes(effects, random), 1000 if brief else 2000, 3, EXTRAS[bank])
-    rig = rig if len(rig.axes) < 3 or brief else Rig(rig.axes, extras=rig.extras)
+    axes = _axes(effects, random)
+    short = len(axes) < 3 or brief
+    rig = Rig(axes, 1000 if brief else 2000, 3 if short else 4, EXTRAS[bank], STEPS)
     held = "hand_impedance" in effects
     concealed = cast(Concealed, "calibrated" if held else str(random.choice(["calibrated", "retuned"])))
     return Draw(number, seed + number, kind, bank, effects, strengths, concealed, rig)

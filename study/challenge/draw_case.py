@@ -79,7 +79,7 @@ def draw_case(
         raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
     random = np.random.default_rng([seed, len(hidden)])
     bench, plan = draw_bench(random), draw_plan(random, rig)
-    bare = with_extras(Device(bench), rig.extras, seed)
+    bare = with_extras(Device(bench, steps=rig.steps), rig.extras, seed)
     strengths = _strengths(strength, len(hidden), random)
     free = motion(bare, plan.command)
     device, truth = _concealed(bare, free, (hidden, strengths), random, rig)

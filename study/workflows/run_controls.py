@@ -14,7 +14,7 @@ from study.store.text_file import read_text, write_text
 from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
 from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder
 
-SHORT = Rig((0,), 1000, 3)
+SHORT = Rig((0,), 1000, 3, steps=80)
 
 
 def run_controls(
