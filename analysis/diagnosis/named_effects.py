@@ -9,12 +9,11 @@ from analysis.diagnosis.document import Estimate, NamedEffect, Rival
 from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.hypothesis import Claim, Hypothesis
 from analysis.diagnosis.impact_wording import BY_CHANCE, BY_NOISE
-from analysis.diagnosis.parsimony import only_refines
+from analysis.diagnosis.parsimony import both_stand, only_refines
 from analysis.diagnosis.probability import probabilities
 from analysis.diagnosis.rivalry import Contender
-from analysis.diagnosis.same_within_errors import inseparable
 from analysis.diagnosis.verdict import BY_CHANCE as OF_CHANCE
-from analysis.diagnosis.verdict import share_of_mismatch
+from analysis.diagnosis.verdict import shares_taken
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -49,16 +48,16 @@ def said_of(recording: Recording, model: MechanicalModel) -> Said:
 def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
     """errors: (numbers,), standard errors of the final hypothesis's point."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
+    shares = shares_taken(found.retuned, found.steps)
     for number, claim in enumerate(whole.claims):
         size = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
         rivals, likely = _rivals(found, number, said)
-        before = found.retuned if number == 0 else found.steps[number - 1]
         named.append(
             NamedEffect(
                 effect=claim.effect.name,
                 place=EFFECTS_BY_NAME[claim.effect.name].place,
                 axis=axis_of(claim, said),
-                share=share_of_mismatch(before, found.steps[number]),
+                share=shares[number],
                 probability=likely,
                 parameters=_estimates(whole, number, errors, slice(first, first + size), said),
                 rivals=rivals,
@@ -88,7 +87,7 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
         claim = other.fitted.hypothesis.claims[-1]
         if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
             continue
-        same = inseparable(best, other) and not only_refines(other, best)
+        same = both_stand(best, other)
         rivals[claim.effect.name] = Rival(
             claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (said, unit))
         )

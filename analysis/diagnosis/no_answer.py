@@ -7,15 +7,12 @@ from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.standing import rms_over
 
 NO_BETTER = 0.9
-"""Share of its signal that an explanation may leave in every channel,"""
-LOUD = 3.0
-"""where that is so many times the noise, at least in one."""
+"""Share of its signal that an explanation may leave in every channel: also where noise is no less, for then nothing
+can be told by name."""
 
 
 def foresees_nothing(measure: ErrorMeasure, contender: Contender) -> bool:
-    """On the samples that decisions may see: in no channel is it better than no prediction, and it is not the noise."""
-    if contender.standing.seen <= LOUD:
-        return False
+    """On the samples that decisions may see: in no channel is it better than no prediction."""
     masks = [record.fit | record.choose for record in measure.records]
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
     size = rms_over(measure.records, signals, masks)

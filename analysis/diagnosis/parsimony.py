@@ -29,7 +29,7 @@ def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
 
 
 def _is_plainer(one: Contender, other: Contender) -> bool:
-    return _price(one) < _price(other) or only_refines(other, one)
+    return only_refines(other, one) or (_price(one) < _price(other) and not only_refines(one, other))
 
 
 def _price(contender: Contender) -> float:
@@ -41,6 +41,11 @@ def _price(contender: Contender) -> float:
 def only_refines(other: Contender, one: Contender) -> bool:
     """Whether the other's last effect holds the one's as a special case, at the same place."""
     return _contained(one, other)
+
+
+def both_stand(named: Contender, other: Contender) -> bool:
+    """Whether the other belongs to the answer, too: as good, and no mere refinement."""
+    return inseparable(named, other) and not only_refines(other, named)
 
 
 def _contained(one: Contender, other: Contender) -> bool:

@@ -7,8 +7,8 @@ from analysis.diagnosis.experiment_menu import experiment_menu
 from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.next_experiment import Bench, as_document, foresee
 from analysis.diagnosis.output_error import fitting, own_columns
+from analysis.diagnosis.parsimony import both_stand
 from analysis.diagnosis.rivalry import Arena, Contender, sensitivity_at
-from analysis.diagnosis.same_within_errors import inseparable
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
@@ -29,16 +29,18 @@ def proposed_experiment(arena: Arena, found: Explanation) -> NextExperiment | No
         bench = Bench(arena.tuning, rate_hz, record.recording.hold, arena.measure.noise)
         menu = experiment_menu(arena.tuning.model, rate_hz, axis, level)
         foreseen = foresee(bench, named, other, _known(arena, rival), menu)
-        return as_document(foreseen[0], (claims[0].effect.name, claims[1].effect.name))
+        proposed = as_document(foreseen[0], (claims[0].effect.name, claims[1].effect.name))
+        if proposed is not None:
+            return proposed
     return None
 
 
 def _rival(contenders: tuple[Contender, ...]) -> Contender | None:
-    """The best that is as good as the named one, and another effect."""
+    """The best of those that the answer holds beside the named effect."""
     best = contenders[0]
     name = best.fitted.hypothesis.claims[-1].effect.name
     for other in contenders[1:]:
-        if other.fitted.hypothesis.claims[-1].effect.name != name and inseparable(best, other):
+        if other.fitted.hypothesis.claims[-1].effect.name != name and both_stand(best, other):
             return other
     return None
 

@@ -41,7 +41,7 @@ class Searched:
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
     found = explain(arena, catalogue, progress, patient)
     judged = _judged(arena, found)
-    if found.ended_early or judged.named or not _sealed_alone(found):
+    if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
         early = (OUT_OF_TIME,) if found.ended_early else ()
         return Searched(arena, found, judged, early + ((ONLY_REFINES,) if found.barred else ()))
     half = arena.half_opened()

@@ -1,5 +1,6 @@
 """What a finished search allows to be said: nothing is missing, parameters were off, physics is named, or is not."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,3 +70,9 @@ def share_of_mismatch(without: Contender, with_it: Contender) -> float:
     """Between 0 and 1: how far the errors came down from where they were to the noise, in logarithms of power."""
     whole = excess(without)
     return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
+
+
+def shares_taken(without: Contender, steps: Sequence[Contender]) -> tuple[float, ...]:
+    """Of the mismatch that was there without any of them, what each step took away: together no more than all."""
+    left = [0.0, *(share_of_mismatch(without, one) for one in steps)]
+    return tuple(max(after - before, 0.0) for before, after in zip(left, left[1:], strict=False))

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,3 +28,12 @@ def test_a_model_as_it_is_foresees_something(arena_of):
 def _contender(arena, hypothesis):
     fitted = evaluated(arena.whole, arena.tuning, np.zeros(len(arena.tuning.names)), hypothesis)
     return Contender(fitted, standing(arena.whole, fitted.residuals))
+
+
+def test_where_noise_is_as_large_as_the_signal_a_foreseen_course_is_asked_for_all_the_same(arena_of):
+    arena = arena_of()
+    record = arena.whole.records[0]
+    shuffled = replace(record, measured=np.random.default_rng(1).permutation(record.measured))
+    measure = replace(arena.whole, records=(shuffled,), noise=shuffled.measured.std(axis=0))
+    held = claimed(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
+    assert foresees_nothing(measure, _contender(replace(arena, whole=measure), held))

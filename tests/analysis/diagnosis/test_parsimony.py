@@ -1,8 +1,11 @@
 """Which of nearly equal explanations is preferred, over invented errors."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from analysis.diagnosis.parsimony import only_refines, plainest_first
+from analysis.diagnosis.parsimony import both_stand, only_refines, plainest_first
 from analysis.diagnosis.same_within_errors import excess, inseparable
 
 
@@ -77,3 +80,17 @@ def test_noise_has_no_excess(standing_at):
     assert excess(standing_at(1.0)) == 0.0
     assert excess(standing_at(0.9)) == 0.0
     assert excess(standing_at(2.0)) == pytest.approx(2 * 0.693, abs=0.02)
+
+
+def test_a_refined_law_is_not_preferred_for_sparing_the_calibration(standing_at):
+    plain, refined = standing_at(1.02, "added_mass"), standing_at(1.02, "hand_impedance")
+    strained = replace(plain, fitted=replace(plain.fitted, deviations=np.array([3.5])))
+    assert first_of(strained, refined) == first_of(refined, strained) == "added_mass"
+    assert first_of(strained, standing_at(1.02, "force_gain")) == "force_gain"
+
+
+def test_a_refinement_that_brings_nothing_is_no_second_answer(standing_at):
+    plain, refined = standing_at(1.001, "coulomb_friction"), standing_at(1.001, "stribeck_friction")
+    assert inseparable(plain, refined)
+    assert not both_stand(plain, refined)
+    assert both_stand(plain, standing_at(1.001, "amplifier_lag"))
