@@ -46,8 +46,8 @@ class Foreseen:
 def foresee(
     bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
 ) -> tuple[Foreseen, ...]:
-    """The most telling for its cost first, those that tell too little last. known: (t + numbers, twice), the information on the rival's numbers that
-    has been recorded so far, calibration included."""
+    """The most telling for its cost first, those that tell too little last. known: (t + numbers, twice), the
+    information on the rival's numbers that has been recorded so far, calibration included."""
     found = [Foreseen(one, _gain(bench, named, rival, known, one)) for one in menu]
     return tuple(sorted(found, key=lambda one: (one.gain < TELLING, -one.gain / one.experiment.minutes)))
 

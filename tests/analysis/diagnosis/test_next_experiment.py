@@ -140,3 +140,13 @@ def test_a_weight_is_the_same_along_every_driven_axis():
     model = MechanicalModel("three", "acceleration", eye, eye, eye, turn, turn.T)
     axes = driven_axes(model)
     assert axes.T @ (heavier(model, 0.03).mass - model.mass) @ axes == pytest.approx(0.03 * eye)
+
+
+def test_a_cheap_recording_that_tells_too_little_stands_behind_a_dear_one_that_tells():
+    bench, named, rival = mass_or_gain(LOOSE)
+    sweep, *_, weight = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
+    known = np.diag([1e9] * (len(bench.tuning.names) + 1))
+    dear = replace(weight, minutes=1e6)
+    first, second = foresee(bench, named, rival, known, (replace(sweep, commands=sweep.commands / 50), dear))
+    assert first.experiment is dear
+    assert second.gain < TELLING < first.gain
