@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -75,4 +76,4 @@ def share_of_mismatch(without: Contender, with_it: Contender) -> float:
 def shares_taken(without: Contender, steps: Sequence[Contender]) -> tuple[float, ...]:
     """Of the mismatch that was there without any of them, what each step took away: together no more than all."""
     left = [0.0, *(share_of_mismatch(without, one) for one in steps)]
-    return tuple(max(after - before, 0.0) for before, after in zip(left, left[1:], strict=False))
+    return tuple(max(after - before, 0.0) for before, after in pairwise(left))

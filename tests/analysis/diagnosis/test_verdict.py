@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.explain import Explanation
-from analysis.diagnosis.verdict import judge, share_of_mismatch
+from analysis.diagnosis.verdict import judge, share_of_mismatch, shares_taken
 
 RUBS = "coulomb_friction"
 
@@ -83,3 +83,10 @@ def test_the_share_is_that_of_the_logarithm_and_stays_between_nothing_and_all(st
     assert share_of_mismatch(standing_at(10.0), standing_at(20.0)) == 0.0
     assert share_of_mismatch(standing_at(10.0), standing_at(0.9)) == 1.0
     assert share_of_mismatch(standing_at(1.0), standing_at(0.9)) == 0.0
+
+
+def test_what_two_effects_take_adds_up_to_what_both_take(standing_at):
+    bare, steps = standing_at(30.0), (standing_at(10.0, RUBS), standing_at(1.05, RUBS, "sensor_lag"))
+    shares = shares_taken(bare, steps)
+    assert 0 < shares[0] < shares[1]
+    assert sum(shares) == pytest.approx(share_of_mismatch(bare, steps[1]))
