@@ -8,6 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.answering import SURE, answer
 from analysis.diagnosis.growth import GROWTH, growth_rate, motions
+from analysis.diagnosis.observed_parts import samples_to_fit
 from equalizer.effects.placing import PlacingError, placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -17,6 +18,8 @@ LEAST_SAMPLES = 256
 """With a response, in all recordings together: fewer carry neither a fit nor a test."""
 SHORT_S, SHORT_SAMPLES = 1.5, 2000
 """What lasts less and holds fewer does neither: one course explains it as well as another."""
+LEAST_FITTED = 64
+"""With a response, of what may be fitted to."""
 LEAST_CYCLES = 3.0
 """Of the commands' middle frequency, in all recordings together."""
 LARGEST = 1e12
@@ -64,6 +67,11 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
             problems.append(
                 f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording; at least "
                 f"{SHORT_S:g} s or {SHORT_SAMPLES} samples are needed, one part to fit and one to test"
+            )
+        elif (fitted := samples_to_fit(recordings)) < LEAST_FITTED:
+            problems.append(
+                f"only {fitted} samples of what may be fitted to hold a response, and a position where there is one; "
+                "the rest of it is missing, or has the role of a test"
             )
         elif cycles < LEAST_CYCLES:
             problems.append(

@@ -29,7 +29,7 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     for one in recordings:
         measured, known = measured_of(one, responses)
         fit, choose, test = roles(one.segments, len(one), tested)
-        masks = tuple(mask & known for mask in (*_without_repeats(fit, choose, ~_repeated(one)), test))
+        masks = (*_without_repeats(fit & known, choose & known, ~_repeated(one)), test & known)
         for start, stop in parts_of(one):
             cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
             part = part_of(one, start, stop)
@@ -37,8 +37,14 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     return tuple(found)
 
 
+def samples_to_fit(recordings: Sequence[Recording]) -> int:
+    """With a response, and a position where it has one per response channel."""
+    return sum(int(one.fit.sum()) for one in observed_parts(recordings, len(recordings[0].response.channels)))
+
+
 def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
-    """Where all that was to choose by only repeats what was fitted to, the last quarter of what is left is."""
+    """Where all that was to choose by is missing or only repeats what was fitted to, the last quarter of what is left
+    is."""
     if (choose & new).any() or not (fit & new).any():
         return fit & new, choose & new
     places = np.flatnonzero(fit & new)

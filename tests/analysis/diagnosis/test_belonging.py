@@ -13,7 +13,7 @@ from analysis.diagnosis.belonging import (
     require_something,
 )
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 RATE_HZ = 500.0
@@ -94,6 +94,17 @@ def test_too_few_samples_and_too_few_cycles_are_too_short():
     t = np.arange(5000)[:, None] / 5000
     slow = with_samples(recording(), "command", np.sin(2 * np.pi * 1.5 * t))
     assert "cycles of what was commanded, which is too short" in refusal(require_something, [slow], ["a"])
+
+
+def test_where_only_the_test_holds_a_response_nothing_can_be_fitted():
+    whole = recording()
+    roles = (Segment(0, 4000, "noise", 1.0, 0, "fit"), Segment(4000, 5000, "noise", 1.0, 0, "test"))
+    missing = whole.response.samples.copy()
+    missing[:4000] = np.nan
+    gaps = with_samples(replace(whole, segments=roles), "response", missing)
+    assert "only 0 samples of what may be fitted to hold a response" in refusal(require_something, [gaps], ["a"])
+    missing[:2000] = whole.response.samples[:2000]
+    require_something([with_samples(gaps, "response", missing)], ["a"])
 
 
 def test_a_recording_counts_once():

@@ -1,28 +1,43 @@
-"""Of what repeats, only the first periods count, and something is always left to choose by."""
+"""Parts of recordings as they are compared."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.observed_parts import MOST_PERIODS, observed_parts
+from analysis.diagnosis.observed_parts import observed_parts, samples_to_fit
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
 
-PERIOD = 1000
-
-
-def of_many_periods(device, periods):
-    """One level after another, each to fit by, so that nothing but late periods would be chosen by."""
-    recording = device(levels=(1.0,), axes=1, periods=periods, rest=0).recorded()
-    (segment,) = recording.segments
-    return replace(recording, segments=(replace(segment, role="fit"),))
+RATE_HZ, LONG = 1000.0, 1000
+LEVELS_N = (0.5, 1.5, 3.0)
 
 
-def test_a_segment_of_few_periods_counts_whole(device):
-    (one,) = observed_parts([of_many_periods(device, MOST_PERIODS)], 1)
-    assert (one.fit | one.choose | one.test).sum() == MOST_PERIODS * PERIOD
+def three_levels() -> Recording:
+    random = np.random.default_rng(1)
+    samples = random.standard_normal((len(LEVELS_N) * LONG, 1))
+    segments = tuple(
+        Segment(k * LONG, (k + 1) * LONG, "noise", level, 0, "") for k, level in enumerate(LEVELS_N)
+    )  # fmt: skip
+    return Recording(
+        "three levels",
+        Signal(samples, RATE_HZ, "force", "N", ("fx",)),
+        Signal(4 * samples, RATE_HZ, "acceleration", "m/s^2", ("ax",)),
+        segments=segments,
+    )
 
 
-def test_of_many_periods_the_first_ones_are_fitted_to_and_the_last_of_these_chosen_by(device):
-    (one,) = observed_parts([of_many_periods(device, 4 * MOST_PERIODS)], 1)
-    fitted, chosen = np.flatnonzero(one.fit), np.flatnonzero(one.choose)
-    assert len(fitted) > len(chosen) > 0
-    assert fitted.max() < chosen.min() <= chosen.max() < MOST_PERIODS * PERIOD
+def test_the_middle_level_is_chosen_by():
+    (one,) = observed_parts([three_levels()], 1)
+    assert one.choose[LONG : 2 * LONG].all()
+    assert not one.choose[:LONG].any()
+
+
+def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
+    whole = three_levels()
+    lost = whole.response.samples.copy()
+    lost[LONG : 2 * LONG] = np.nan
+    recording = replace(whole, response=replace(whole.response, samples=lost))
+    (one,) = observed_parts([recording], 1)
+    assert one.choose.any() and one.fit.any() and one.test.any()
+    assert np.isfinite(lost[one.fit | one.choose | one.test]).all()
+    assert samples_to_fit([recording]) == one.fit.sum()
