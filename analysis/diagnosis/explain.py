@@ -9,6 +9,7 @@ from analysis.diagnosis.candidates import candidates
 from analysis.diagnosis.families import excludes
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import NOTHING
+from analysis.diagnosis.no_answer import silences
 from analysis.diagnosis.output_error import Fitted, evaluated, fit
 from analysis.diagnosis.parsimony import plainest_first
 from analysis.diagnosis.patience import OutOfPatienceError, Patience, always, impatient
@@ -89,7 +90,7 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
             break
         named = tuple(one for one in contenders if one.fitted.hypothesis.claims[-1].effect.name not in arena.barred)
         rounds.append(named)
-        if not named or not _worthwhile(base, named[0]):
+        if not named or not worthwhile(base, named[0]):
             break
         if named[0] is not contenders[0]:
             barred = contenders[0].fitted.hypothesis.claims[-1].effect.name
@@ -135,11 +136,15 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
     step.at(0.2)
     screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
     step.at(0.6)
-    return plainest_first(contest(arena, base, known, screened))
+    contenders = contest(arena, base, known, screened)
+    return plainest_first([one for one in contenders if not silences(arena.measure, base, one.fitted)])
 
 
-def _worthwhile(base: Contender, better: Contender) -> bool:
-    gained = base.standing.chosen_by - better.standing.chosen_by
+def worthwhile(base: Contender, better: Contender) -> bool:
+    """Where only the worst channel is above the noise, and not their mean, it must come down by half of that."""
+    gained, over = base.standing.chosen_by - better.standing.chosen_by, np.log(base.standing.seen)
+    if excess(base) == 0 and over > np.log(CLEAN) and np.log(better.standing.seen) > over / 2:
+        return False
     return gained > max(WORTHWHILE * excess(base), NOTICED)
 
 

@@ -3,18 +3,43 @@
 import numpy as np
 
 from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.observed import Mask
+from analysis.diagnosis.output_error import Fitted
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.standing import rms_over
+from equalizer.signals.signal import FloatArray
 
 NO_BETTER = 0.9
 """Share of its signal that an explanation may leave in every channel: also where noise is no less, for then nothing
 can be told by name."""
+FAR = 3.0
+"""Times the noise."""
+_TINY = 1e-300
 
 
 def foresees_nothing(measure: ErrorMeasure, contender: Contender) -> bool:
     """On the samples that decisions may see: in no channel is it better than no prediction."""
-    masks = [record.fit | record.choose for record in measure.records]
+    return bool((_left(measure, contender.fitted) >= NO_BETTER * _signal(measure)).all())
+
+
+def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
+    """Whether what is new gains most in a channel by foreseeing nothing there, far above the noise: a low pass that
+    lets nothing through explains nothing."""
+    before, left = _left(measure, base), _left(measure, fitted)
+    most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
+    return bool(left[most] >= max(NO_BETTER * _signal(measure)[most], FAR * measure.noise[most]))
+
+
+def _left(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
+    """(c,): rms"""
+    return np.asarray(rms_over(measure.records, fitted.residuals, _seen(measure)) * measure.unit)
+
+
+def _signal(measure: ErrorMeasure) -> FloatArray:
+    """(c,): rms"""
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
-    size = rms_over(measure.records, signals, masks)
-    left = rms_over(measure.records, contender.fitted.residuals, masks) * measure.unit
-    return bool((left >= NO_BETTER * size).all())
+    return rms_over(measure.records, signals, _seen(measure))
+
+
+def _seen(measure: ErrorMeasure) -> list[Mask]:
+    return [record.fit | record.choose for record in measure.records]

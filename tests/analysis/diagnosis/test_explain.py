@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.explain import NOTICED, worthwhile
 from analysis.diagnosis.search import ONLY_REFINES
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -145,3 +146,12 @@ def test_a_refined_law_is_named_where_its_refinement_shows(diagnosed):
     uneven = PlacedEffect(EFFECTS["asymmetric_friction"], (0,), {"level_positive": 0.3, "level_negative": 0.1})
     found = found_in(diagnosed.recorded(1, (uneven,)), diagnosed.device(1), ("asymmetric_friction",))
     assert named(found) == [("asymmetric_friction", "x")]
+
+
+@pytest.mark.parametrize(("left", "worth"), [(1.13, False), (1.02, True)])
+def test_an_effect_that_leaves_the_one_bad_channel_as_bad_is_not_added(standing_at, left, worth):
+    """Three channels whose noise was taken for larger than it is make up for the worst one."""
+    base = standing_at([1.16, 0.9, 0.9, 0.95])
+    better = standing_at([left, 0.9, 0.9, 0.94], "quadratic_damping")
+    assert base.standing.chosen_by - better.standing.chosen_by > NOTICED
+    assert worthwhile(base, better) is worth

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed
-from analysis.diagnosis.no_answer import foresees_nothing
+from analysis.diagnosis.no_answer import foresees_nothing, silences
 from analysis.diagnosis.output_error import evaluated
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.standing import standing
 from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.effect import PlacedEffect
 
+LAG = next(effect for effect in CATALOGUE if effect.name == "sensor_lag")
 GAIN = next(effect for effect in CATALOGUE if effect.name == "force_gain")
 
 
@@ -37,3 +39,21 @@ def test_where_noise_is_as_large_as_the_signal_a_foreseen_course_is_asked_for_al
     measure = replace(arena.whole, records=(shuffled,), noise=shuffled.measured.std(axis=0))
     held = claimed(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
     assert foresees_nothing(measure, _contender(replace(arena, whole=measure), held))
+
+
+def test_a_low_pass_that_lets_nothing_through_silences_its_channel(arena_of):
+    arena = arena_of()
+    record = arena.whole.records[0]
+    backwards = record.measured.copy()
+    backwards[:, 0] = 2 * backwards[::-1, 0]
+    assert _silences(replace(arena.whole, records=(replace(record, measured=backwards),)), arena.tuning, 0.01)
+
+
+def test_a_low_pass_that_is_there_silences_nothing(arena_of):
+    arena = arena_of(effects=(PlacedEffect(LAG, (0,), {"bandwidth": 10.0}),))
+    assert not _silences(arena.whole, arena.tuning, 10.0)
+
+
+def _silences(measure, tuning, bandwidth):
+    lag = claimed(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
+    return silences(measure, *(evaluated(measure, tuning, np.zeros(len(tuning.names)), one) for one in (NOTHING, lag)))
