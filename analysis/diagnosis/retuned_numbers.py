@@ -66,13 +66,21 @@ def retuned_sentence(moved: Sequence[MovedNumber]) -> str:
 
 
 def doubtful_sentences(moved: Sequence[MovedNumber]) -> tuple[str, ...]:
-    """Numbers that left what their calibration makes likely: they may stand for physics that was not named."""
+    """Numbers that left what their calibration makes likely: they may stand for physics that was not named. Many are
+    counted, for all of them stand in the table of numbers."""
+    far = [one for one in moved if abs(one.deviations) >= FAR]
+    if len(far) > _NAMED:
+        edge = sum(abs(one.deviations) >= BOUND - 1e-6 for one in far)
+        return (
+            f"{len(far)} numbers were moved by {FAR:g} standard deviations of their calibration or more"
+            f"{f', {edge} of them as far as they may' if edge else ''}: "
+            "either the calibration is wrong, or they stand for physics that was not named.",
+        )
     return tuple(
         f"The {one.name} was moved by {abs(one.deviations):.2g} standard deviations of its calibration"
         f"{_AS_FAR if abs(one.deviations) >= BOUND - 1e-6 else ''}: "
         "either the calibration is wrong, or it stands for physics that was not named."
-        for one in moved
-        if abs(one.deviations) >= FAR
+        for one in far
     )
 
 

@@ -229,6 +229,12 @@ def test_numbers_of_the_model_that_moved_too_far_are_doubted():
     assert "of its calibration, as far as it may: either" in edge
 
 
+def test_many_doubtful_numbers_are_counted_in_one_sentence():
+    moved = (*(replace(MOVED, deviations=4.0) for _ in range(8)), *(replace(MOVED, deviations=-3.5) for _ in range(3)))
+    (said,) = doubtful_sentences(moved)
+    assert said.startswith("11 numbers were moved by 3 standard deviations of their calibration or more, 8 of them")
+
+
 def test_a_relative_change_is_read_as_per_cent():
     assert MovedNumber("mass of the mode at 82 Hz", -0.021, "1", -2.1).text == (
         "mass of the mode at 82 Hz −2.1 % (2.1 standard deviations)"
