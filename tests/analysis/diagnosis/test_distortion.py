@@ -8,7 +8,6 @@ from analysis.diagnosis.detection_lines import detection_lines, held_samples
 from analysis.diagnosis.distortion import distortion
 from analysis.diagnosis.level_trends import PRESENT, level_trends
 from analysis.diagnosis.noise_floor import noise_floor
-from analysis.diagnosis.reading_rule import LinearMismatch, readings
 
 CASES = Path(__file__).parents[3].parent / "shared" / "cases"
 
@@ -115,25 +114,6 @@ def test_images_of_a_held_command_are_no_driven_lines():
     driven = detection_lines(np.fft.rfft(held, axis=0)[1:500] / 1000, held_samples(held)).driven
     assert driven[:240].mean() > 0.9
     assert not driven[250:].any()
-
-
-def test_the_reading_rule_names_what_the_numbers_suggest(device):
-    trends = level_trends(found_in(device(coulomb=0.3, axes=1).recorded()).cells)
-    words = {r.words for r in readings(trends) if r.output == "ax"}
-    assert any("friction or a dead zone" in each for each in words)
-
-
-@pytest.mark.parametrize(("in_position", "words"), [(True, "parameters, a mode or a lag"), (False, "a sensor")])
-def test_a_purely_linear_mismatch_is_placed_by_position(in_position, words):
-    band = (16.0, 32.0)
-    mismatches = [
-        LinearMismatch("ax", "acceleration", "fx", band, 0.2, True),
-        LinearMismatch("x", "position", "fx", band, 0.2 if in_position else 0.0, in_position),
-    ]
-    reading = next(r for r in readings((), mismatches) if r.output == "ax")
-    assert words in reading.words
-    assert reading.linear_mismatch == 0.2
-    assert reading.odd_db_per_doubling is None
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.entry_point import Entry, entry_point
-from analysis.diagnosis.equivalent_force import equivalent_forces, force_shares
 from analysis.diagnosis.mismatch_cells import Prediction
 from analysis.diagnosis.noise_floor import noise_floor
 from analysis.diagnosis.residual_spectra import ResidualSpectra, residual_spectra
@@ -93,17 +92,6 @@ def test_without_position_the_rule_is_silent_and_directions_still_speak():
     found = entry_point(bare, forces)
     assert found.rule is None
     assert found.ranking[0].name == "force y"
-
-
-def test_forces_are_recovered_and_shared_out():
-    g = directions()
-    spectra = spectra_of(g * np.array([1.0, 0.1]))
-    forces = equivalent_forces(spectra, g)
-    assert np.sqrt(np.mean(np.abs(forces[..., 0]) ** 2)) == pytest.approx(0.05, rel=0.1)
-    assert np.sqrt(np.mean(np.abs(forces[..., 1]) ** 2)) == pytest.approx(0.005, rel=0.3)
-    shares = force_shares(spectra, g)
-    assert shares.sum() == pytest.approx(1)
-    assert shares[0] > 0.9
 
 
 def test_directions_of_another_shape_are_refused():
