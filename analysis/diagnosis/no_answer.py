@@ -7,6 +7,7 @@ from analysis.diagnosis.observed import Mask
 from analysis.diagnosis.output_error import Fitted
 from analysis.diagnosis.rivalry import Contender
 from analysis.diagnosis.standing import rms_over
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 NO_BETTER = 0.9
@@ -23,11 +24,14 @@ def foresees_nothing(measure: ErrorMeasure, contender: Contender) -> bool:
 
 
 def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
-    """Whether what is new gains most in a channel by foreseeing nothing there, far above the noise: a low pass that
-    lets nothing through explains nothing."""
+    """Whether what is new foresees nothing, far above the noise, in the channel where it gains most or whose sensor it
+    is said to be: a low pass that lets nothing through explains nothing, though it leaves the model free for others."""
     before, left = _left(measure, base), _left(measure, fitted)
     most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
-    return bool(left[most] >= max(NO_BETTER * _signal(measure)[most], FAR * measure.noise[most]))
+    claim = fitted.hypothesis.claims[-1]
+    sensed = claim.sites if EFFECTS_BY_NAME[claim.effect.name].place == "sensor" else ()
+    nothing = left >= np.maximum(NO_BETTER * _signal(measure), FAR * measure.noise)
+    return bool(nothing[most] or any(nothing[site] for site in sensed if site < len(nothing)))
 
 
 def _left(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:

@@ -49,6 +49,14 @@ def test_a_low_pass_that_lets_nothing_through_silences_its_channel(arena_of):
     assert _silences(replace(arena.whole, records=(replace(record, measured=backwards),)), arena.tuning, 0.01)
 
 
+def test_a_silenced_channel_is_no_answer_though_another_gains_more_by_it(arena_of):
+    arena = arena_of()
+    none = np.zeros(len(arena.tuning.names))
+    lag = evaluated(arena.whole, arena.tuning, none, claimed(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}]))
+    wrenched = replace(lag, residuals=tuple(one * [1.1, 1e6] for one in lag.residuals))
+    assert silences(arena.whole, wrenched, lag)
+
+
 def test_a_low_pass_that_is_there_silences_nothing(arena_of):
     arena = arena_of(effects=(PlacedEffect(LAG, (0,), {"bandwidth": 10.0}),))
     assert not _silences(arena.whole, arena.tuning, 10.0)
