@@ -11,7 +11,6 @@ from analysis.diagnosis.tuning import Tuning
 from equalizer.signals.signal import FloatArray
 
 STRETCH_S = 0.5
-_NINETY_FIVE = 1.96
 
 
 def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray:
@@ -28,14 +27,6 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
-
-
-def interval95(fitted: Fitted, number: int, standard_error: float) -> tuple[float, float]:
-    """Of a number of the hypothesis's point, in its own unit."""
-    of, at = fitted.hypothesis.numbers[number], float(fitted.hypothesis.point[number])
-    reach = _NINETY_FIVE * standard_error
-    low, high = of.value(at - reach), of.value(at + reach)
-    return min(low, high), max(low, high)
 
 
 def _stretches(measure: ErrorMeasure, columns: FloatArray, errors: FloatArray) -> FloatArray:

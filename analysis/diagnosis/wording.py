@@ -134,20 +134,22 @@ def place_of(mismatch: Mismatch) -> str:
 def next_experiment_sentence(diagnosis: Diagnosis) -> str:
     wanted = diagnosis.next_experiment
     if wanted is None:
-        return ""
+        alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)
+        return "No further recording is foreseen to tell apart what these data cannot." if alike else ""
     splits = f"would tell {listed([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
     return f"The recording that {splits}: {wanted.command}. {capital(ended(wanted.why))}"
 
 
-def black_box_sentence(box: BlackBox | None) -> str:
+def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     if box is None:
         return ""
+    physics = "the physics" if named else "the re-tuned model"
     fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
-    errors = f"{error_text(box.test)} of the signal on the held-out data; the physics leaves {error_text(box.physics)}"
+    errors = f"{error_text(box.test)} of the signal on the held-out data; {physics} leaves {error_text(box.physics)}"
     if black_box_beats(box):
         return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
     if box.physics * _ALIKE < box.test:
-        return f"{fitted} {errors}. The physics predicts better."
+        return f"{fitted} {errors}. {capital(physics)} predicts better."
     return f"{fitted} {errors}: no better."
 
 
@@ -192,7 +194,11 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
     if diagnosis.verdict in ("explained", "partly_explained"):
         lines.append(confirmation_sentence(diagnosis.fit.fit, diagnosis.fit.test))
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
-        lines += [retuned_sentence(moved), remainder_sentence(diagnosis), black_box_sentence(found.black_box)]
+        lines += [
+            retuned_sentence(moved),
+            remainder_sentence(diagnosis),
+            black_box_sentence(found.black_box, bool(diagnosis.effects)),
+        ]
     lines += [next_experiment_sentence(diagnosis), *doubtful_sentences(moved), *implausible_sentences(found)]
     lines += found.remarks
     return tuple(line for line in lines if line)

@@ -51,7 +51,7 @@ def render_diagnosis_report(
         _errors(found, pictures),
         _remainder(found, pictures),
         _own_numbers(found),
-        *_one_sentence("A black box beside it", black_box_sentence(found.black_box)),
+        *_one_sentence("A black box beside it", black_box_sentence(found.black_box, bool(diagnosis.effects))),
         *_one_sentence("The next recording", next_experiment_sentence(diagnosis)),
         *_remarks(found),
         Section("How this was done", paragraphs=method_paragraphs(found)),
@@ -73,7 +73,7 @@ def _banner(found: Findings) -> str:
     named = bool(found.diagnosis.effects)
     doubts = [confirmation_sentence(found.diagnosis.fit.fit, found.diagnosis.fit.test)] if named else []
     if named and found.black_box is not None and black_box_beats(found.black_box):
-        doubts.append(black_box_sentence(found.black_box))
+        doubts.append(black_box_sentence(found.black_box, named))
     return " ".join(doubt for doubt in doubts if doubt)
 
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.diagnosis.hypothesis import Claim, claimed
-from analysis.diagnosis.intervals import interval95, standard_errors
+from analysis.diagnosis.intervals import standard_errors
 from analysis.diagnosis.observed import Observed
 from analysis.diagnosis.output_error import evaluated, fit, sensitivity
 from analysis.diagnosis.tuning import Tuning
@@ -82,8 +82,8 @@ def test_ninety_five_of_a_hundred_intervals_hold_the_truth(colour, strength):
     held = 0
     for seed in range(DRAWS):
         found, errors, _ = fitted_and_errors(seed, colour, strength)
-        low, high = interval95(found, 0, errors[1])
-        held += low <= FORCE_N <= high
+        of, at = found.hypothesis.numbers[0], found.hypothesis.point[0]
+        held += of.value(at - 1.96 * errors[1]) <= FORCE_N <= of.value(at + 1.96 * errors[1])
     assert 0.88 <= held / DRAWS <= 0.99
 
 

@@ -191,7 +191,10 @@ def test_the_next_recording_says_what_it_would_tell_apart():
         "The recording that would tell dry friction and friction that is larger at rest (Stribeck) apart: hapteq "
         "record slow.toml --out slow.h5. Only slow motion shows the hump."
     )
-    assert next_experiment_sentence(diagnosis("explained", (DRY,))) == ""
+    assert next_experiment_sentence(diagnosis("explained", (DRY,))) == (
+        "No further recording is foreseen to tell apart what these data cannot."
+    )
+    assert next_experiment_sentence(diagnosis("explained", (replace(DRY, rivals=()),))) == ""
 
 
 @pytest.mark.parametrize(
@@ -203,9 +206,10 @@ def test_the_next_recording_says_what_it_would_tell_apart():
     ],
 )
 def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
-    said = black_box_sentence(BlackBox("ARX", 12, test, physics))
+    said = black_box_sentence(BlackBox("ARX", 12, test, physics), named=True)
     assert said.startswith("A black box (ARX, 12 numbers), fitted to the same samples, leaves")
     assert said.endswith(end)
+    assert "the re-tuned model leaves" in black_box_sentence(BlackBox("ARX", 12, test, physics), named=False)
 
 
 def test_held_out_data_that_do_not_confirm_are_said_not_to():
