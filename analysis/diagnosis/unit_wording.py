@@ -64,6 +64,10 @@ def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
     return f"{value} %{bracket}{interval}"
 
 
+def probability_text(probability: float) -> str:
+    return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
+
+
 def share_text(share: float) -> str:
     """As per cent with two digits; all of them from a hundred on."""
     return f"{100 * share:.2g} %" if 100 * share < 99.5 else f"{100 * share:.0f} %"

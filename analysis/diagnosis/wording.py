@@ -244,9 +244,5 @@ def _noise(errors: Errors, error: float) -> str:
     return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
 
 
-def probability_text(probability: float) -> str:
-    return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
-
-
 def ended(sentence: str) -> str:
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."

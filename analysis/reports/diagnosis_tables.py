@@ -7,8 +7,8 @@ from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.retuned_numbers import all_numbers
-from analysis.diagnosis.unit_wording import share_text, value_text
-from analysis.diagnosis.wording import capital, ended, error_text, probability_text
+from analysis.diagnosis.unit_wording import probability_text, share_text, value_text
+from analysis.diagnosis.wording import capital, ended, error_text
 from analysis.reports.page import Table
 from analysis.wording import NONE, p_value
 
