@@ -8,7 +8,7 @@ from analysis.diagnosis.findings import BlackBox, Findings
 from analysis.diagnosis.impact_wording import impact_sentence
 from analysis.diagnosis.plausibility import implausible_sentences
 from analysis.diagnosis.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
-from analysis.diagnosis.unit_wording import share_text
+from analysis.diagnosis.unit_wording import probability_text, share_text
 from analysis.wording import listed, p_text
 
 _PLACES_NAMED = 3
