@@ -8,6 +8,7 @@ import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.explain import NOTICED, worthwhile
+from analysis.diagnosis.named_effects import EXACT
 from analysis.diagnosis.search import ONLY_REFINES
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -46,6 +47,13 @@ def test_friction_is_found_to_its_interval_and_the_noise(found, diagnosed):
     assert level(found) == pytest.approx(diagnosed.FRICTION_N, rel=5e-3)
     test = found.diagnosis.fit.test
     assert test.after == pytest.approx(test.noise, rel=0.08)
+
+
+def test_an_interval_holds_the_truth_and_claims_no_more_than_a_law_is_exact_to(found, diagnosed):
+    estimate = found.diagnosis.effects[0].parameters["level"]
+    low, high = estimate.ci95
+    assert low < diagnosed.FRICTION_N < high
+    assert 2 * EXACT * estimate.value <= high - low < 0.1 * estimate.value
 
 
 def test_the_same_recording_gives_the_same_answer(found, rubs, diagnosed):
