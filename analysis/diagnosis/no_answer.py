@@ -15,6 +15,8 @@ NO_BETTER = 0.9
 can be told by name."""
 FAR = 3.0
 """Times the noise."""
+SILENT = 0.3
+"""Share of the signal below which a prediction is none."""
 _TINY = 1e-300
 
 

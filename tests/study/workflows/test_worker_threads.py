@@ -46,7 +46,9 @@ def test_one_worker_works_in_the_thread_that_asks():
 @pytest.mark.timeout(60)
 def test_ctrl_c_ends_a_program_while_its_workers_are_busy():
     program = (
-        "import time\n"
+        "import signal, time\n"
+        # A shell that starts this in the background has it ignored, and children inherit that.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from study.workflows.worker_threads import worker_threads\n"
         "with worker_threads(2) as threads:\n"
         "    print('busy', flush=True)\n"
