@@ -9,6 +9,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 DIAGNOSIS := tests/stories/test_missing_physics_is_named.py \
 	tests/stories/test_friction_is_named_and_then_compensated.py
+FIRST := tests/study/tui tests/equalizer tests/contracts tests/stories
 CASES ?= 600
 SEED ?= 90000
 BANK ?= bank-$(SEED)
@@ -27,9 +28,9 @@ test: $(VENV)/.installed-test ## Set up, then run all checks and tests
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	@# Two halves side by side: screens, which mostly wait, with the equalizer's numbers, and all the others.
-	@$(BIN)/python -m pytest -m "not slow" -p no:cacheprovider tests/study/tui tests/equalizer & first=$$!; \
-		$(BIN)/python -m pytest -m "not slow" --ignore=tests/study/tui --ignore=tests/equalizer; others=$$?; \
+	@# Two halves side by side, about as long: screens, which mostly wait, with numbers, and all the others.
+	@$(BIN)/python -m pytest -m "not slow" -p no:cacheprovider $(FIRST) & first=$$!; \
+		$(BIN)/python -m pytest -m "not slow" $(FIRST:%=--ignore=%); others=$$?; \
 		wait $$first && exit $$others
 
 check: $(VENV)/.installed-test ## Format, lint, types and import contracts: the fast half of `make test`
