@@ -78,7 +78,8 @@ def sensitivity(
         # Neither way is a model: the number stays where it is.
         return np.zeros_like(base)
 
-    columns, numbers = (np.zeros((len(at), len(base))), range(len(at))) if beside is None else beside
+    known, numbers = (np.zeros((len(at), len(base))), range(len(at))) if beside is None else beside
+    columns = known.copy()
     columns[numbers] = np.array(list(map_(moved, numbers))).reshape(len(numbers), len(base))  # type: ignore[operator]
     return Sensitivity(at, columns, columns @ columns.T)
 

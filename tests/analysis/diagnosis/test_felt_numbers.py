@@ -48,3 +48,10 @@ def test_columns_beside_friction_are_those_of_all_numbers_moved_beside_it(arena,
     without = sensitivity_at(arena, at, rubbing(0))
     told = arena.tuning.names.index("mass fx")
     assert np.linalg.norm(whole.columns[told] - without.columns[told]) > np.linalg.norm(apart)
+
+
+def test_columns_that_were_known_stay_as_they_were(arena, at):
+    plain = sensitivity(arena.measure, arena.tuning, at, NOTHING)
+    before = plain.columns.copy()
+    sensitivity(arena.measure, arena.tuning, at, rubbing(0), beside=(plain.columns, [0]))
+    assert np.array_equal(plain.columns, before)
