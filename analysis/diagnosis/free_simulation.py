@@ -53,7 +53,7 @@ class FreeSimulation:
     ) -> Played:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
-        seen = Seen(record.measured[:, :p], self.noise[:p], position)
+        seen = Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
 
     def evidence(

@@ -86,7 +86,7 @@ class Windows:
             record.command,
             (recording.sample_rate_hz, recording.hold),
             effects,
-            Seen(record.measured[:, :p], self.noise[:p], position),
+            Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length, states),
         )
         left = (record.measured - channels(played, record.measured.shape[1])) / self.unit

@@ -103,6 +103,8 @@ class OnResponse:
     """Orders those on the same side of the low pass: alignment, range, what is added, numbers, clock."""
     shared: bool = False
     """It cannot befall one channel alone."""
+    of_whole: bool = False
+    """It hangs on how long the recording is, so that a part of it must know."""
     bandwidth_hz: Callable[[float, Values], float] | None = None
     """Of its channels' low pass, from what the model says it is; 0 = none."""
     on_position: Callable[[FloatArray, float, Values], FloatArray] | None = None

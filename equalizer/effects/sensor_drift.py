@@ -53,7 +53,7 @@ EFFECT = Effect(
         Parameter("bend", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
         Parameter("start", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
     ),
-    acts=OnResponse(_drifted, stage=2),
+    acts=OnResponse(_drifted, stage=2, of_whole=True),
     starts=_starts,
     sites=("one", "each"),
 )

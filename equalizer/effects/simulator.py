@@ -24,6 +24,8 @@ class Seen:
     """(p,): rms"""
     position: FloatArray | None = None
     """(n, p), of the same rows"""
+    whole: int = 0
+    """Samples of the recording that these are the first of; 0 = these are all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,13 +121,23 @@ def _sensed(
             if seen is not None and acts.given is not None:
                 response = acts.given(response, seen.response, seen.noise, placed.sites, placed.values)
             else:
-                response = acts.change(response, sample_rate_hz, placed.sites, placed.values)
+                response = _changed(acts, placed, response, sample_rate_hz, seen)
             if acts.on_position is not None:
                 position = acts.on_position(position, sample_rate_hz, placed.values)
             if seen is not None and seen.position is not None and acts.given_position is not None:
                 position = acts.given_position(before, response, position, seen.position)
     response = within_range(response, model.sensor.range)
     return Played(response, position, played.axis_position, played.axis_velocity, played.axis_force)
+
+
+def _changed(
+    acts: OnResponse, placed: PlacedEffect, response: FloatArray, sample_rate_hz: float, seen: Seen | None
+) -> FloatArray:
+    left_out = seen.whole - len(response) if acts.of_whole and seen is not None else 0
+    if left_out <= 0:
+        return acts.change(response, sample_rate_hz, placed.sites, placed.values)
+    whole = np.pad(response, ((0, left_out), (0, 0)), mode="edge")
+    return acts.change(whole, sample_rate_hz, placed.sites, placed.values)[: len(response)]
 
 
 def _filtered(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:

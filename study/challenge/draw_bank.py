@@ -27,7 +27,7 @@ EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
 """Strength. Singles go from invisible to strong; the others ask what is said of something that is there."""
 GOLDEN = 0.5 * (5**0.5 - 1)
-SIZES = (0.80, 0.12)
+SIZES = (0.72, 0.14)
 """Parts of the bank with one and with two driven axes."""
 STEPS = 80
 """Of the bench's integrator in a sample: its error must not be what is found."""

@@ -73,7 +73,8 @@ def _curve(device: Device, axis: int, values: Values) -> Device:
 def _shares(at: Circumstances) -> dict[str, float]:
     """Of the three channels, the largest that is read 1."""
     drawn = at.direction()
-    drawn /= np.abs(drawn[list(at.axes)]).max() * at.sign()
+    read = drawn[list(at.axes)]
+    drawn /= read[np.argmax(np.abs(read))]
     return dict(zip(("share_x", "share_y", "share_z"), map(float, drawn), strict=True))
 
 
@@ -82,7 +83,7 @@ def _in_shares(values: Values) -> FloatArray:
 
 
 def _draw_drift(at: Circumstances) -> dict[str, float]:
-    return {"total": at.between(0.01, 2.0)} | _shares(at)
+    return {"total": at.sign() * at.between(0.01, 2.0)} | _shares(at)
 
 
 def _drift(device: Device, axis: int, values: Values) -> Device:
