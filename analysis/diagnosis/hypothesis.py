@@ -1,7 +1,7 @@
 """A claim about what is missing: effects of the catalogue, each at an axis or channel, with numbers to be found."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -126,6 +126,18 @@ def together(one: Hypothesis, other: Hypothesis) -> Hypothesis:
 
 
 NOTHING = Hypothesis((), (), np.zeros(0))
+
+
+def alike(whole: Hypothesis) -> Iterator[Hypothesis]:
+    """The same with other numbers that do almost the same, one effect at a time."""
+    numbers, begin = whole.numbers, 0
+    for placed in whole.placed():
+        end = begin + sum(not p.fixed for p in placed.effect.parameters)
+        for other in placed.effect.alike(placed.values):
+            point = whole.point.copy()
+            point[begin:end] = [number.coordinate(other[number.parameter.name]) for number in numbers[begin:end]]
+            yield replace(whole, point=point)
+        begin = end
 
 
 def _unit(p: Parameter, start: Values) -> float:

@@ -4,19 +4,25 @@ The sandwich of Huber (1967) and White (1980), its middle summed over stretches 
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from analysis.diagnosis.error_measure import ErrorMeasure
+from analysis.diagnosis.hypothesis import Hypothesis
 from analysis.diagnosis.output_error import Fitted, Sensitivity, fitting, own_columns
 from analysis.diagnosis.tuning import Tuning
 from equalizer.signals.signal import FloatArray
 
 STRETCH_S = 0.5
+AT_AN_END = 1e-6
+"""Of a coordinate, where a move makes a difference by about 1."""
 
 
 def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray:
-    """(t + numbers,), of deviations and of the hypothesis's point; inf where the data say nothing."""
+    """(t + numbers,), of deviations and of the hypothesis's point; 0 where a number stands at an end of its range: it
+    is held there."""
     errors = fitting(measure, fitted.residuals)
-    columns = np.vstack([known.columns, own_columns(measure, tuning, fitted, errors)])
+    own = own_columns(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
+    columns = np.vstack([known.columns, own])
     pulls = _stretches(measure, columns, errors)
     middle = pulls @ pulls.T
     t = len(fitted.deviations)
@@ -27,6 +33,12 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
+
+
+def _at_an_end(hypothesis: Hypothesis) -> npt.NDArray[np.bool_]:
+    ends = [number.bounds for number in hypothesis.numbers]
+    held = [np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(hypothesis.point, ends, strict=True)]
+    return np.array(held, dtype=np.bool_)
 
 
 def _stretches(measure: ErrorMeasure, columns: FloatArray, errors: FloatArray) -> FloatArray:

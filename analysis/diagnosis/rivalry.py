@@ -7,8 +7,8 @@ import numpy as np
 
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.felt_numbers import felt_numbers
-from analysis.diagnosis.hypothesis import Hypothesis, without_claim
-from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
+from analysis.diagnosis.hypothesis import Hypothesis, alike, without_claim
+from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, fitting, sensitivity
 from analysis.diagnosis.screening import Mapper, Screened
 from analysis.diagnosis.standing import Standing, standing
 from analysis.diagnosis.tuning import Tuning
@@ -29,6 +29,8 @@ noise, such a share of the logarithm of what is left; and only where one of them
 deviations since, for it costs a simulation for each."""
 NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
+ALIKE = 4.0
+"""Squares of the noise, in sum, that more numbers must gain over plain ones that do almost the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,11 +91,25 @@ def refine(arena: Arena, fitted: Fitted) -> Fitted:
     """To the end, with what the model's numbers do recomputed there; where that leaves more than noise, also from the
     calibration as it was, for what re-tuning had to hide may have taken it far away."""
     here, known = _refined_from(arena, fitted, None)
+    here, known = _of_alike(arena, here, known)
     if arena.contender(here).standing.seen <= NEARLY_CLEAN:
         return here
     calibrated = evaluated(arena.measure, arena.tuning, np.zeros_like(here.deviations), here.hypothesis)
     there, _ = _refined_from(arena, calibrated, known)
     return there if there.cost < here.cost else here
+
+
+def _of_alike(arena: Arena, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
+    """The best of what does almost the same, each fitted to the end; the plain one where it is as good as any."""
+    best = fitted, known
+    for other in alike(fitted.hypothesis):
+        beside = _refined_from(arena, evaluated(arena.measure, arena.tuning, fitted.deviations, other), known)
+        best = beside if beside[0].cost < best[0].cost else best
+    for other in alike(best[0].hypothesis):
+        plain = evaluated(arena.measure, arena.tuning, best[0].deviations, other)
+        samples = len(fitting(arena.measure, plain.residuals))
+        best = (plain, best[1]) if plain.cost < best[0].cost + ALIKE / samples else best
+    return best
 
 
 def sensitivity_at(

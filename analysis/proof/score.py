@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.document import NamedEffect
 from analysis.proof.calibration import Calibration, calibration
 from analysis.proof.outcome import Concealed, Outcome
+from analysis.proof.same_number import as_said
 from analysis.proof.share import Figure, share, statistic
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
@@ -106,8 +107,11 @@ def _numbers(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
 def main_error(true: Concealed, said: NamedEffect) -> float | None:
     """Relative; None where the label holds no such number."""
     name = EFFECTS_BY_NAME[true.effect].main.name
-    value = true.values.get(name)
-    return abs(said.parameters[name].value - value) / abs(value) if value else None
+    if not true.values.get(name):
+        return None
+    estimate = said.parameters[name].value
+    value = as_said(name, estimate, true.values)
+    return abs(estimate - value) / abs(value)
 
 
 def within(true: Concealed, said: NamedEffect) -> dict[str, bool]:
@@ -115,7 +119,8 @@ def within(true: Concealed, said: NamedEffect) -> dict[str, bool]:
     found = {}
     for name, estimate in said.parameters.items():
         if estimate.ci95 is not None and name in true.values:
-            found[name] = estimate.ci95[0] <= true.values[name] <= estimate.ci95[1]
+            value = as_said(name, estimate.value, true.values)
+            found[name] = estimate.ci95[0] <= value <= estimate.ci95[1]
     return found
 
 

@@ -138,6 +138,8 @@ class Effect:
     """Effects that it contains as a special case."""
     report: Callable[[Values], Values] = dict
     """The vocabulary's numbers from the fitted ones, where these say more than a reader wants."""
+    alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
+    """Other numbers that do almost the same as given ones, so that a fit may have ended at the wrong of them."""
 
 
 @dataclass(frozen=True, slots=True)

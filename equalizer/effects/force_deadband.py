@@ -28,6 +28,12 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     return tuple(found)
 
 
+def _without_jump(of: Values) -> tuple[Values, ...]:
+    """Beyond the band both command the same; few samples lie between."""
+    jump = of.get("jump", 0.0)
+    return ({"width": of["width"] * (1 - jump), "jump": 0.0},) if 0.0 < jump < 1.0 else ()
+
+
 EFFECT = Effect(
     name="force_deadband",
     equation="F = 0 where |u| <= width, else u - (1 - jump) width sgn(u)",
@@ -41,4 +47,5 @@ EFFECT = Effect(
     acts=OnCommand(_beyond),
     starts=_starts,
     sites=("one", "all"),
+    alike=_without_jump,
 )

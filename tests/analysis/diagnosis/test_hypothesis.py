@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.candidates import STARTS, candidates
 from analysis.diagnosis.gather_evidence import gather_evidence
-from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed, together, without_claim
+from analysis.diagnosis.hypothesis import NOTHING, Claim, alike, claimed, together, without_claim
 from analysis.diagnosis.output_error import evaluated
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -87,3 +87,20 @@ def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
         for number, at in zip(one.numbers, one.point, strict=True):
             low, high = number.bounds
             assert low - 1e-9 <= at <= high + 1e-9
+
+
+def test_numbers_that_do_almost_the_same_are_tried_in_place_of_an_effects_own():
+    parts = [
+        claimed(Claim(EFFECTS["sensor_lag"], "one", (0,)), [{"bandwidth": 60.0}]),
+        claimed(Claim(EFFECTS["force_deadband"], "one", (1,)), [{"width": 0.02, "jump": 0.25}]),
+        claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
+    ]
+    (other,) = alike(together(together(parts[0], parts[1]), parts[2]))
+    lag, band, force = other.placed()
+    assert band.values == pytest.approx({"width": 0.015, "jump": 0.0})
+    assert (lag.values["bandwidth"], force.values["force"]) == pytest.approx((60.0, 0.1))
+
+
+def test_plain_numbers_have_nothing_else_to_try():
+    plain = claimed(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.02, "jump": 0.0}])
+    assert not list(alike(plain))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulator import Seen, simulate_mechanism
 from equalizer.plant.mechanical_model import SensorLimits
 
 ALL = (0, 1, 2)
@@ -141,3 +141,11 @@ def test_an_offset_alone_is_no_drift(bench, command):
     model = bench.three_axes()
     seen = bench.measured(model, bench.placed("sensor_offset", {"offset": 0.3}, 1), command, seed=2)
     assert EFFECTS["sensor_drift"].starts(bench.evidence(model, seen), 1) == ()
+
+
+def test_a_drift_is_one_over_the_whole_recording_also_where_its_beginning_alone_is_played(bench, command):
+    model, drift = bench.three_axes(), bench.placed("sensor_drift", {"total": 1.0, "bend": 0.4, "start": 0.1}, 0)
+    whole = simulate_mechanism(model, command, 1000.0, drift).response
+    n = len(command) // 3
+    seen = Seen(whole[:n], np.ones(3), whole=len(command))
+    assert np.allclose(simulate_mechanism(model, command[:n], 1000.0, drift, seen=seen).response, whole[:n], atol=1e-9)
