@@ -24,7 +24,7 @@ from analysis.diagnosis.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.noise_floor import NoiseFloor
 from analysis.diagnosis.observed import Mask
 from analysis.diagnosis.output_error import evaluated
-from analysis.diagnosis.proposed_experiment import proposed_experiment
+from analysis.diagnosis.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.rivalry import Arena, sensitivity_at
 from analysis.diagnosis.signature_curves import Names, signature_of
 from analysis.diagnosis.unit_doubt import unit_sentences
@@ -51,7 +51,10 @@ def assembled(
     channels = channel_names(recording, len(measure.noise))
     maps, courses = maps_of(measure, found, floors, learned), _courses(measure, found, names)
     local = localised(measure, tuning, found, floors, maps.cells)
-    document = _document(arena, found, judged, maps, local)
+    proposal = _proposal(arena, found, judged)
+    document = replace(
+        _document(arena, found, judged, maps, local), next_experiment=None if proposal is None else proposal.document
+    )
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
@@ -74,6 +77,7 @@ def assembled(
         floor=floors[0],
         tuning=tuning,
         axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
+        proposal=proposal,
         split_s=_split_s(measure),
     )
 
@@ -111,10 +115,13 @@ def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps, l
         or whole_mismatch(measure, found.after),
         fit=errors_of(measure, found),
         error=measure.name,
-        next_experiment=proposed_experiment(arena, found)
-        if judged.named and measure.name == "free simulation" and found.statistic is None
-        else None,
+        next_experiment=None,
     )
+
+
+def _proposal(arena: Arena, found: Explanation, judged: Judgement) -> Proposal | None:
+    foretold = judged.named and arena.whole.name == "free simulation" and found.statistic is None
+    return proposed_experiment(arena, found) if foretold else None
 
 
 def channel_names(recording: Recording, count: int) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from analysis.diagnosis.answering import SURE, answer
+from analysis.diagnosis.carried_weight import weight_problems
 from analysis.diagnosis.growth import GROWTH, growth_rate, motions
 from analysis.diagnosis.observed_parts import samples_to_fit
 from equalizer.effects.placing import PlacingError, placed_effects
@@ -102,7 +103,9 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
     """recordings: alike. Raises NothingToDiagnose where the model cannot be of their device."""
     first = recordings[0]
+    names = [one.device or f"recording {number}" for number, one in enumerate(recordings, 1)]
     problems = (*_size(model, first), *_kind(model, first), *_absurd_model(model))
+    problems = problems or weight_problems(model, recordings, names)
     if not problems:
         problems = (*_idle(model, first), *_runaway(model, recordings), *_fast(model, first), *_effects(model, first))
     if problems:

@@ -1,7 +1,6 @@
 """Recordings that a laboratory could make next, as commands to play on paper first."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +9,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.excitation import faded, log_sweep, sine
 from equalizer.signals.signal import FloatArray
 
-LENGTH_S = 8.0
+LENGTH_S, LONG_S = 8.0, 40.0
+USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
+"""How far sweeps go: to the first, or such a share of the sample rate."""
 ADDED_SHARE = 0.12
 """Of the grounded mass: a weight that is known and strapped on."""
 _FADE_S = 0.5
@@ -22,52 +23,45 @@ class Experiment:
     """What to record; ends the sentence "record …"."""
     commands: FloatArray
     """(n, m)"""
-    change: Callable[[MechanicalModel], MechanicalModel] | None = None
-    """What is done to the device beforehand."""
+    added: float = 0.0
+    """Mass (or inertia) that is strapped on beforehand."""
     minutes: float = 1.0
     """What it costs."""
 
 
 def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, level: float) -> tuple[Experiment, ...]:
     """axis: where the rivals sit. level: the highest that was recorded; nothing louder is proposed."""
-    n, m = int(LENGTH_S * sample_rate_hz), model.inputs
-    highest_hz = min(240.0, 0.24 * sample_rate_hz)
-    # Half a period and four: slow and fast, in shares of the band that a record of this length can hold.
+    usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
+    fastest_hz = FASTEST_SHARE * sample_rate_hz
     slow_hz = 4.0 / LENGTH_S
+    added = ADDED_SHARE * float(np.diagonal(driven_axes(model).T @ model.mass @ driven_axes(model)).mean())
 
     def along(wave: FloatArray) -> FloatArray:
-        commands = np.zeros((n, m))
+        commands = np.zeros((len(wave), model.inputs))
         commands[:, axis] = faded(wave, int(_FADE_S * sample_rate_hz), int(_FADE_S * sample_rate_hz))
         return commands
 
-    def swept(of: float) -> FloatArray:
-        return along(log_sweep(1.0, highest_hz, of, n, sample_rate_hz))
+    def swept(of: float, to_hz: float = usual_hz, length_s: float = LENGTH_S) -> FloatArray:
+        return along(log_sweep(1.0, to_hz, of, int(length_s * sample_rate_hz), sample_rate_hz))
 
     def slow(of: float) -> FloatArray:
-        return along(sine(slow_hz, of, n, sample_rate_hz))
+        return along(sine(slow_hz, of, int(LENGTH_S * sample_rate_hz), sample_rate_hz))
 
-    mass = ADDED_SHARE * float(np.diagonal(driven_axes(model).T @ model.mass @ driven_axes(model)).mean())
-    sweep = f"a sweep from 1 to {highest_hz:.0f} Hz"
+    sweep, wide = f"a sweep from 1 to {usual_hz:.0f} Hz", f"a sweep from 1 to {fastest_hz:.0f} Hz"
+    weight = (
+        f"{1e3 * added:.0f} g strapped to the handle"
+        if not model.rotational
+        else f"a known inertia of {added:.2g} kg m^2 on the lever"
+    )
     return (
         Experiment(f"{sweep} at {level:.3g}, the highest level so far", swept(level)),
         Experiment(f"{sweep} at {level / 4:.3g}, a quarter of the highest level", swept(level / 4)),
         Experiment(f"{sweep} at {level / 20:.3g}, a twentieth of the highest level", swept(level / 20)),
+        Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz)),
         Experiment(f"a slow sinusoid of {slow_hz:g} Hz at {level:.3g}", slow(level)),
         Experiment(
             f"a slow sinusoid of {slow_hz:g} Hz at {level / 10:.3g}, so small that it hardly moves", slow(level / 10)
         ),
-        Experiment(
-            f"{sweep} at {level:.3g} with {1e3 * mass:.0f} g strapped to the handle"
-            if not model.rotational
-            else f"{sweep} at {level:.3g} with a known inertia of {mass:.2g} kg m^2 on the lever",
-            swept(level),
-            lambda bare: heavier(bare, mass),
-            minutes=3.0,
-        ),
+        Experiment(f"{wide} at {level:.3g} that lasts {LONG_S:g} s", swept(level, fastest_hz, LONG_S), minutes=1.5),
+        Experiment(f"{sweep} at {level:.3g} with {weight}", swept(level), added, minutes=3.0),
     )
-
-
-def heavier(model: MechanicalModel, added: float) -> MechanicalModel:
-    """With as much more mass (or inertia) along every driven axis."""
-    axes = driven_axes(model)
-    return replace(model, mass=model.mass + added * axes @ axes.T)

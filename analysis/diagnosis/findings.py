@@ -8,6 +8,7 @@ from analysis.diagnosis.explain import Explanation
 from analysis.diagnosis.localisation import Localisation
 from analysis.diagnosis.mismatch_cells import MismatchCell
 from analysis.diagnosis.noise_floor import NoiseFloor
+from analysis.diagnosis.proposed_experiment import Proposal
 from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.evidence import Evidence
@@ -95,5 +96,7 @@ class Findings:
     """What the deviations of `explanation` count: names, units, sizes."""
     axes: tuple[str, ...] = ()
     """The driven axes, as a reader calls them; empty = x, y, z."""
+    proposal: Proposal | None = None
+    """Of what to record next, where rivals are as good as what is named."""
     split_s: Mapping[str, float] = field(default_factory=dict)
     """Seconds by "fit", "choose", "test"."""

@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from analysis.diagnosis.carried_weight import carrying
 from analysis.diagnosis.observed import Observed
 from analysis.diagnosis.unexplained_motion import evidence_of
 from equalizer.effects.effect import Effect, PlacedEffect
@@ -54,17 +55,18 @@ class FreeSimulation:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         seen = Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording))
+        model = carrying(model, signals)
         return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        return tuple(
-            evidence_of(
-                model, record, self._played(model, effects, record, simulate_mechanism), left, (self.unit, self.noise)
-            )
-            for record, left in zip(self.records, residuals, strict=True)
-        )
+        found = []
+        for record, left in zip(self.records, residuals, strict=True):
+            played = self._played(model, effects, record, simulate_mechanism)
+            there = carrying(model, record.recording)
+            found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
+        return tuple(found)
 
 
 def channels(played: Played, count: int) -> FloatArray:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.carried_weight import heavier
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.experiment_menu import Experiment
 from analysis.diagnosis.hypothesis import Hypothesis
@@ -111,7 +112,7 @@ def _predicted(
     bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, one: Experiment
 ) -> FloatArray:
     model: MechanicalModel = bench.tuning.tuned(deviations)
-    model = model if one.change is None else one.change(model)
+    model = heavier(model, one.added) if one.added else model
     played = simulate_mechanism(model, one.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold)
     signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
     return np.asarray((signals / bench.noise).ravel())

@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from analysis.diagnosis.carried_weight import carrying
 from analysis.diagnosis.needed_force import NeededForce, needed_force
 from analysis.diagnosis.observed import Observed
 from equalizer.effects.along_motion import entered_force, force_along
@@ -81,6 +82,7 @@ class PredictedForce:
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: FloatArray
     ) -> "_Balance":
         rate_hz = record.recording.sample_rate_hz
+        model = carrying(model, record.recording)
         structure = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, Structure)]).structure
         needed = needed_force(structure, motion, rate_hz, self.band_hz)
         entered = entered_force(model, record.command, rate_hz, effects, record.recording.hold)
@@ -99,7 +101,7 @@ class PredictedForce:
     ) -> Evidence:
         found = self._balance(model, effects, record, motion)
         return Evidence(
-            model=model,
+            model=carrying(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
             command=record.command,
             axis_position=found.needed.axis_position,

@@ -1,11 +1,13 @@
 """The next recording for a finished search whose data could not tell two effects apart."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.experiment_menu import experiment_menu
 from analysis.diagnosis.explain import Explanation
-from analysis.diagnosis.next_experiment import Bench, as_document, foresee
+from analysis.diagnosis.next_experiment import Bench, Foreseen, as_document, foresee
 from analysis.diagnosis.output_error import fitting, own_columns
 from analysis.diagnosis.parsimony import both_stand
 from analysis.diagnosis.rivalry import Arena, Contender, sensitivity_at
@@ -13,8 +15,27 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 
-def proposed_experiment(arena: Arena, found: Explanation) -> NextExperiment | None:
-    """None where no rival is as good as what is named, or no recording of the menu would tell."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """For two that the data hold alike."""
+
+    names: tuple[str, str]
+    axis: int
+    level: float
+    """With which the menu was made."""
+    foreseen: tuple[Foreseen, ...]
+    """All of the menu, the best first."""
+
+    @property
+    def document(self) -> NextExperiment | None:
+        """None where no recording of the menu would tell."""
+        return as_document(self.foreseen[0], self.names)
+
+
+def proposed_experiment(arena: Arena, found: Explanation) -> Proposal | None:
+    """For the first pair of rivals that some recording would tell apart, else for the last pair; None where no rival
+    is as good as what is named."""
+    proposal = None
     for contenders in found.rounds[: len(found.steps)]:
         rival = _rival(contenders)
         if rival is None:
@@ -29,10 +50,10 @@ def proposed_experiment(arena: Arena, found: Explanation) -> NextExperiment | No
         bench = Bench(arena.tuning, rate_hz, record.recording.hold, arena.measure.noise)
         menu = experiment_menu(arena.tuning.model, rate_hz, axis, level)
         foreseen = foresee(bench, named, other, _known(arena, rival), menu)
-        proposed = as_document(foreseen[0], (claims[0].effect.name, claims[1].effect.name))
-        if proposed is not None:
-            return proposed
-    return None
+        proposal = Proposal((claims[0].effect.name, claims[1].effect.name), axis, level, foreseen)
+        if proposal.document is not None:
+            break
+    return proposal
 
 
 def _rival(contenders: tuple[Contender, ...]) -> Contender | None:

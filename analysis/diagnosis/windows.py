@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from analysis.diagnosis.carried_weight import carrying
 from analysis.diagnosis.free_simulation import channels
 from analysis.diagnosis.motion_smoother import SmoothedMotion, smoothed_motion
 from analysis.diagnosis.observed import Observed
@@ -79,6 +80,7 @@ class Windows:
     ) -> tuple[Played, FloatArray]:
         """And what is left, (n, c)."""
         recording, p = record.recording, model.outputs
+        model = carrying(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         length = samples_of(self.window_s, recording.sample_rate_hz)
         played = simulate_windows(
@@ -116,6 +118,7 @@ class Windows:
     ) -> Evidence:
         played, left = self._seen(model, effects, record, states)
         recording, p = record.recording, model.outputs
+        model = carrying(model, recording)
         entered = entered_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
         found = smoothed_motion(model, record, entered + played.axis_force, self.unit)
         measured, predicted = without_gaps(record.measured, left * self.unit, played)
@@ -146,7 +149,7 @@ def windows_of(
     for record in records:
         rate_hz = record.recording.sample_rate_hz
         entered = entered_force(model, record.command, rate_hz, (), record.recording.hold)
-        motion: SmoothedMotion = smoothed_motion(model, record, entered, unit)
+        motion: SmoothedMotion = smoothed_motion(carrying(model, record.recording), record, entered, unit)
         states.append(motion.states[:: samples_of(window_s, rate_hz)])
     return Windows(records, tuple(states), unit, noise, window_s)
 

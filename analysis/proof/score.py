@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.proof.calibration import Calibration, calibration
+from analysis.proof.follow_up import FollowUp, follow_up_figures
 from analysis.proof.outcome import Concealed, Outcome
 from analysis.proof.same_number import as_said
 from analysis.proof.share import Figure, share, statistic
@@ -24,9 +25,10 @@ class Score:
     """Everything that is not as it should be; what cannot be detected is none."""
 
 
-def score(outcomes: Sequence[Outcome]) -> Score:
+def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:
     figures = (
-        *_singles(outcomes), *_nothing(outcomes), *_open_set(outcomes), *_pairs(outcomes), *_numbers(outcomes),
+        *_singles(outcomes), *_nothing(outcomes), *_open_set(outcomes), *_pairs(outcomes),
+        *follow_up_figures(followed), *_numbers(outcomes),
     )  # fmt: skip
     return Score(figures, calibration(outcomes), tuple(one for one in outcomes if is_miss(one)))
 

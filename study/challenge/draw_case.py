@@ -1,14 +1,14 @@
 """Concealed-physics cases: a recording, a model that lacks something, and what it lacks. All from one seed."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 from study.challenge.bench import draw_bench
 from study.challenge.device import Device, motion
@@ -47,11 +47,16 @@ class Truth:
     """Numbers that the vocabulary has no name for: which of several readings of the effect was drawn."""
 
 
+Again = Callable[[FloatArray, float, int], Recording]
+"""One more recording of the same device: commands (samples, axes) in N, a mass in kg on it, the noise's seed."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
     recording: Recording
     model: MechanicalModel
     truth: tuple[Truth, ...]
+    again: Again
     adds: float = 0.0
     """What the concealed effects change of the readings, in the worst channel: rms over that of the noise."""
 
@@ -92,7 +97,14 @@ def draw_case(
     label = name or f"bench {seed}"
     model = as_model(label, known, tolerance, rig.axes)
     recording = recording_of(label, plan, response, position, rig)
-    return Case(recording, model, truth, added(bare, device, (free, moved), rig) if hidden else 0.0)
+
+    def again(command: FloatArray, added_kg: float, noise: int) -> Recording:
+        further = further_plan(command, rig)
+        heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
+        seen = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(recording_of(label, further, *seen, rig), meta=carried(added_kg))
+
+    return Case(recording, model, truth, again, added(bare, device, (free, moved), rig) if hidden else 0.0)
 
 
 def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
@@ -140,6 +152,18 @@ def _concealed(
         device = effect.build(device, axis, values)
         truth.append(truth_of(effect, axis, values))
     return device, tuple(truth)
+
+
+def further_plan(command: FloatArray, rig: Rig) -> DrivePlan:
+    """command: (samples, axes)"""
+    whole = np.zeros((len(command), 3))
+    whole[:, rig.axes] = command
+    return DrivePlan(whole, (Segment(0, len(whole), "proposed", float(np.abs(whole).max()), 0, "fit"),))
+
+
+def carried(added_kg: float) -> dict[str, float]:
+    """As a recording says it."""
+    return {"added_mass_kg": added_kg} if added_kg else {}
 
 
 def truth_of(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:

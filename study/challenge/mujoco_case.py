@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.challenge.bench import draw_bench
 from study.challenge.device import Device
-from study.challenge.draw_case import EFFECTS, Case, Concealed, added, recording_of, truth_of
+from study.challenge.draw_case import EFFECTS, Case, Concealed, added, carried, further_plan, recording_of, truth_of
 from study.challenge.drive_plan import RATE_HZ, draw_plan
 from study.challenge.hidden import Circumstances, Values
 from study.challenge.mujoco_bench import MujocoBench, bare, linear, moved, with_delay
@@ -50,8 +51,16 @@ def draw_mujoco_case(
     else:
         known, tolerance = retuned(bench, response, plan, rig.axes)
     recording = recording_of(name, plan, response, position, rig)
+
+    def again(command: FloatArray, added_kg: float, noise: int) -> Recording:
+        further = further_plan(command, rig)
+        heavier = replace(device, mass_kg=device.mass_kg + added_kg)
+        felt = moved(heavier, further.command)
+        seen = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(recording_of(name, further, *seen, rig), meta=carried(added_kg))
+
     adds = added(Device(bench), sensing, (still, motion), rig) if effects else 0.0
-    return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), adds)
+    return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), again, adds)
 
 
 def _at(of: FloatArray, axis: int, value: float) -> FloatArray:

@@ -103,7 +103,11 @@ def _diagnosed(place: Path) -> dict[str, Any]:
     )
     found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
     errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
-    return {"diagnosis": diagnosis_to_json(found.diagnosis), "channel_errors": errors}
+    said = {"diagnosis": diagnosis_to_json(found.diagnosis), "channel_errors": errors}
+    if (proposal := found.proposal) is not None:
+        best = proposal.document and proposal.foreseen[0].experiment.words
+        said["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
+    return said
 
 
 if __name__ == "__main__":

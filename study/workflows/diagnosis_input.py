@@ -13,6 +13,7 @@ from analysis.diagnosis.belonging import (
     require_model_of,
     require_something,
 )
+from analysis.diagnosis.carried_weight import weighted
 from analysis.diagnosis.force_driven import all_force_driven
 from analysis.diagnosis.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.wording import listed
@@ -92,6 +93,11 @@ def fitted_model(
     found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear one, and what must be known of it. Raises StudyError where the recordings do not carry one."""
+    if weighted(found.recordings):
+        raise nothing_to_diagnose(
+            ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",),
+            "Give a model of the device without it with --model.",
+        )
     if wants_rigid_model(found.recordings) and (rigid := _rigid(found.recordings, whose)) is not None:
         return rigid, (RIGID_SAID,)
     try:

@@ -1,6 +1,7 @@
 """What a proof amounts to, for the terminal: misses first."""
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 from analysis.proof.wording import concealed_text, figure_text, said_text, strength_text
@@ -59,6 +60,7 @@ def summary(proof: Proof) -> dict[str, Any]:
             for figure in proof.score.figures
         },
         "expected_calibration_error": proof.score.calibration.error,
+        "followed": [asdict(one) for one in proof.followed],
         "controls": {one.name: one.held for one in proof.controls},
         "misses": [one.number for one in proof.score.misses],
     }

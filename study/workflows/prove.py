@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.proof.controlled import Controlled
+from analysis.proof.follow_up import FollowUp
 from analysis.proof.outcome import Outcome
 from analysis.proof.score import Score, score
 from study.errors import LeftError
 from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
+from study.workflows.follow_up import follow_up
 from study.workflows.proof_folder import ProofFolder, opened
 from study.workflows.reveal_cases import engines, reveal_cases
 from study.workflows.run_controls import run_controls
@@ -28,6 +30,7 @@ class Proof:
     score: Score
     engines: tuple[str, ...]
     controls: tuple[Controlled, ...]
+    followed: tuple[FollowUp, ...]
     left_out: int
     """Cases of the second physics engine, where it is not installed."""
 
@@ -59,6 +62,10 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
             on_progress("diagnosing", done, len(names))
 
         ask_engine(folder, names, wishes.workers, on_answered)
+        outcomes = reveal_cases(folder, plan.cases)
+        followed = follow_up(
+            folder, plan, outcomes, wishes.workers, lambda done, of: on_progress("following up", done, of)
+        )
         controls: tuple[Controlled, ...] = ()
         if wishes.controls:
             controls = run_controls(
@@ -71,7 +78,7 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
             "Run the same command again: it goes on where it stopped.",
             saved=f"All that is sealed and answered so far is in {path}.",
         ) from interruption
-    outcomes = reveal_cases(folder, plan.cases)
     return Proof(
-        folder, plan, seal, outcomes, score(outcomes), engines(folder, set(names)), controls, plan.cases - len(numbers)
-    )
+        folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, set(names)), controls,
+        followed, plan.cases - len(numbers),
+    )  # fmt: skip

@@ -72,6 +72,7 @@ def write_proof(proof: Proof) -> None:
         "commit": commit(),
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
+        "followed": [asdict(one) for one in proof.followed],
         "controls": [asdict(one) for one in proof.controls],
         "misses": [one.number for one in score.misses],
     }

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.experiment_menu import experiment_menu, heavier
+from analysis.diagnosis.carried_weight import heavier
+from analysis.diagnosis.experiment_menu import experiment_menu
 from analysis.diagnosis.hypothesis import Claim, claimed
 from analysis.diagnosis.next_experiment import TELLING, Bench, as_document, foresee
 from analysis.diagnosis.output_error import Fitted

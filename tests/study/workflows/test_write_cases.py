@@ -1,11 +1,12 @@
 """A case's three files, in the format of the labelled ones."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from study.challenge.draw_case import Case, Truth, draw_case
+from study.challenge.draw_case import Truth, draw_case
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
 from study.workflows.write_cases import truth_text, write_case
@@ -30,10 +31,10 @@ def test_files_hold_the_case(case, tmp_path):
 
 
 def test_nothing_missing_is_an_empty_list(case):
-    assert json.loads(truth_text(Case(case.recording, case.model, ()))) == []
+    assert json.loads(truth_text(replace(case, truth=()))) == []
 
 
 def test_what_the_vocabulary_has_no_name_for_stands_apart(case):
     truth = Truth("end_stop", "mechanism", "x", {"position": 0.01}, {"sides": 1.0})
-    (entry,) = json.loads(truth_text(Case(case.recording, case.model, (truth,))))
+    (entry,) = json.loads(truth_text(replace(case, truth=(truth,))))
     assert entry["unseen"] == {"sides": 1.0}

@@ -1,0 +1,53 @@
+"""A known weight that a device carried while one recording was made: the model carries it there, too."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+
+ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
+"""Keys of a recording's `meta`: along every driven axis, beside what the model has."""
+
+
+def carrying(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+    added = recording.meta.get(_key(model), 0.0)
+    return heavier(model, float(added)) if added else model
+
+
+def heavier(model: MechanicalModel, added: float) -> MechanicalModel:
+    """With as much more mass (or inertia) along every driven axis."""
+    axes = driven_axes(model)
+    return replace(model, mass=model.mass + added * axes @ axes.T)
+
+
+def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
+    """Sentences without a full stop."""
+    key = _key(model)
+    other = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
+    problems = [
+        f"{name} says {other}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
+        for one, name in zip(recordings, names, strict=True)
+        if other in one.meta
+    ]
+    problems += [
+        f"{name} says {key} = {one.meta[key]!r}, which must be a number from 0 on"
+        for one, name in zip(recordings, names, strict=True)
+        if key in one.meta and not _is_weight(one.meta[key])
+    ]
+    return tuple(problems)
+
+
+def weighted(recordings: Sequence[Recording]) -> bool:
+    """Whether any says that it was made with a weight."""
+    return any(key in one.meta for one in recordings for key in (ADDED_MASS, ADDED_INERTIA))
+
+
+def _key(model: MechanicalModel) -> str:
+    return ADDED_INERTIA if model.rotational else ADDED_MASS
+
+
+def _is_weight(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and value >= 0
