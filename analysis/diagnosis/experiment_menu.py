@@ -1,6 +1,7 @@
 """Recordings that a laboratory could make next, as commands to play on paper first."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,8 @@ class Experiment:
     """What to record; ends the sentence "record …"."""
     commands: FloatArray
     """(n, m)"""
+    kind: Literal["sweep", "slow"]
+    """As a recording's segment says it."""
     added: float = 0.0
     """Mass (or inertia) that is strapped on beforehand."""
     minutes: float = 1.0
@@ -54,14 +57,18 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
         else f"a known inertia of {added:.2g} kg m^2 on the lever"
     )
     return (
-        Experiment(f"{sweep} at {level:.3g}, the highest level so far", swept(level)),
-        Experiment(f"{sweep} at {level / 4:.3g}, a quarter of the highest level", swept(level / 4)),
-        Experiment(f"{sweep} at {level / 20:.3g}, a twentieth of the highest level", swept(level / 20)),
-        Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz)),
-        Experiment(f"a slow sinusoid of {slow_hz:g} Hz at {level:.3g}", slow(level)),
+        Experiment(f"{sweep} at {level:.3g}, the highest level so far", swept(level), "sweep"),
+        Experiment(f"{sweep} at {level / 4:.3g}, a quarter of the highest level", swept(level / 4), "sweep"),
+        Experiment(f"{sweep} at {level / 20:.3g}, a twentieth of the highest level", swept(level / 20), "sweep"),
+        Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz), "sweep"),
+        Experiment(f"a slow sinusoid of {slow_hz:g} Hz at {level:.3g}", slow(level), "slow"),
         Experiment(
-            f"a slow sinusoid of {slow_hz:g} Hz at {level / 10:.3g}, so small that it hardly moves", slow(level / 10)
+            f"a slow sinusoid of {slow_hz:g} Hz at {level / 10:.3g}, so small that it hardly moves",
+            slow(level / 10),
+            "slow",
         ),
-        Experiment(f"{wide} at {level:.3g} that lasts {LONG_S:g} s", swept(level, fastest_hz, LONG_S), minutes=1.5),
-        Experiment(f"{sweep} at {level:.3g} with {weight}", swept(level), added, minutes=3.0),
+        Experiment(
+            f"{wide} at {level:.3g} that lasts {LONG_S:g} s", swept(level, fastest_hz, LONG_S), "sweep", minutes=1.5
+        ),
+        Experiment(f"{sweep} at {level:.3g} with {weight}", swept(level), "sweep", added, minutes=3.0),
     )

@@ -47,8 +47,8 @@ class Truth:
     """Numbers that the vocabulary has no name for: which of several readings of the effect was drawn."""
 
 
-Again = Callable[[FloatArray, float, int], Recording]
-"""One more recording of the same device: commands (samples, axes) in N, a mass in kg on it, the noise's seed."""
+Again = Callable[[FloatArray, str, float, int], Recording]
+"""One more recording of the same device: commands (samples, axes) in N, their kind, a mass in kg, the noise's seed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +98,8 @@ def draw_case(
     model = as_model(label, known, tolerance, rig.axes)
     recording = recording_of(label, plan, response, position, rig)
 
-    def again(command: FloatArray, added_kg: float, noise: int) -> Recording:
-        further = further_plan(command, rig)
+    def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+        further = further_plan(command, kind, rig)
         heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
         seen = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
         return replace(recording_of(label, further, *seen, rig), meta=carried(added_kg))
@@ -154,11 +154,11 @@ def _concealed(
     return device, tuple(truth)
 
 
-def further_plan(command: FloatArray, rig: Rig) -> DrivePlan:
+def further_plan(command: FloatArray, kind: str, rig: Rig) -> DrivePlan:
     """command: (samples, axes)"""
     whole = np.zeros((len(command), 3))
     whole[:, rig.axes] = command
-    return DrivePlan(whole, (Segment(0, len(whole), "proposed", float(np.abs(whole).max()), 0, "fit"),))
+    return DrivePlan(whole, (Segment(0, len(whole), kind, float(np.abs(whole).max()), 0, "fit"),))
 
 
 def carried(added_kg: float) -> dict[str, float]:

@@ -52,8 +52,8 @@ def draw_mujoco_case(
         known, tolerance = retuned(bench, response, plan, rig.axes)
     recording = recording_of(name, plan, response, position, rig)
 
-    def again(command: FloatArray, added_kg: float, noise: int) -> Recording:
-        further = further_plan(command, rig)
+    def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+        further = further_plan(command, kind, rig)
         heavier = replace(device, mass_kg=device.mass_kg + added_kg)
         felt = moved(heavier, further.command)
         seen = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))

@@ -95,7 +95,7 @@ def _written(again: ProofFolder, plan: BankPlan, start: tuple[int, Path], experi
             "Run the bank with the versions that it was begun with (proof.json names them), or anew.",
             saved="All answers are kept.",
         )
-    further = case.again(experiment.commands, experiment.added, NOISE_SEED)
+    further = case.again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED)
     write_recording(place / FURTHER, further, precision="float32")
     for kept in (MODEL, SETTINGS):
         write_text(place / kept, read_text(first / kept))
