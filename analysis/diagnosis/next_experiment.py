@@ -57,11 +57,12 @@ def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None
     """None where even the most telling recording would leave the rivals as good as each other."""
     if best.gain < TELLING:
         return None
+    said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
     return NextExperiment(
         command=f"record {best.experiment.words}",
         splits=names,
         why=f"there the two differ by more than the noise and the tolerances can hide: the right one would win by "
-        f"{best.gain:.3g} in log likelihood",
+        f"{best.gain:.3g} in log likelihood{said if best.experiment.added else ''}",
     )
 
 
