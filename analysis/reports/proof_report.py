@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from analysis.figures.picture import Picture
 from analysis.proof.controlled import Controlled
+from analysis.proof.follow_up import FollowUp
 from analysis.proof.outcome import Outcome
 from analysis.proof.score import Score
 from analysis.proof.share import Figure
@@ -31,6 +32,7 @@ class ProofFacts:
     engines: tuple[str, ...]
     remarks: tuple[str, ...]
     controls: tuple[Controlled, ...] = ()
+    followed: tuple[FollowUp, ...] = ()
 
 
 def render_proof_report(
@@ -45,6 +47,7 @@ def render_proof_report(
     sections = (
         Section(f"Misses: {len(score.misses)}", tables=(_misses(score.misses),) if score.misses else ()),
         Section("Figures", tables=(_figures(score),)),
+        *_followed(facts.followed),
         *_controls(facts.controls),
         Section("Which, from where on, how sure", pictures=tuple(pictures)),
         Section("How it was done", HOW, points=_points(facts)),
@@ -68,6 +71,26 @@ def _controls(controls: Sequence[Controlled]) -> tuple[Section, ...]:
     rows = tuple((one.name, one.claim, "held" if one.held else "did not hold", "; ".join(one.said)) for one in controls)
     table = Table("What is changed, and what must come of it", ("control", "claim", "outcome", "said"), rows)
     return (Section("Controls", tables=(table,)),)
+
+
+def _followed(found: Sequence[FollowUp]) -> tuple[Section, ...]:
+    if not found:
+        return ()
+    rows = tuple(
+        (
+            str(one.number), one.effect, ", ".join(one.returned), one.proposed or "nothing would tell",
+            _said(one.proposed, one.after_proposed), one.drawn or "-", _said(one.drawn, one.after_drawn),
+        )
+        for one in found
+    )  # fmt: skip
+    header = ("number", "concealed", "left at first", "proposed", "left then", "drawn at random", "left then")
+    notes = ("A random recording comes from the same menu, and may be the proposed one.",)
+    table = Table("Single effects whose first recording left several names", header, rows, notes)
+    return (Section("The next experiment", tables=(table,)),)
+
+
+def _said(recorded: str, returned: Sequence[str]) -> str:
+    return (", ".join(returned) or "no name") if recorded else "-"
 
 
 def _points(facts: ProofFacts) -> tuple[str, ...]:

@@ -81,7 +81,9 @@ def write_proof(proof: Proof) -> None:
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
     pictures = proof_pictures(proof.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
-    facts = ProofFacts(seeds(proof), proof.seal, commit(), proof.engines, tuple(remarks(proof)), proof.controls)
+    facts = ProofFacts(
+        seeds(proof), proof.seal, commit(), proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
+    )
     page = render_proof_report(
         proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, RealClock().utc()
     )

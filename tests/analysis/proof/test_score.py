@@ -7,6 +7,7 @@ from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismat
 from analysis.figures.proof_pictures import proof_pictures
 from analysis.proof.calibration import calibration
 from analysis.proof.detection import detection_strips, shares_by_size, what_became_of
+from analysis.proof.follow_up import FollowUp
 from analysis.proof.outcome import Concealed, Outcome
 from analysis.proof.score import is_miss, score
 from analysis.proof.share import share, statistic
@@ -139,10 +140,16 @@ def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
     whole = score(ALL)
     pictures = proof_pictures(ALL, whole.calibration)
     assert [one.name for one in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
-    facts = ProofFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",))
+    both = ("sensor_lag", "logger_offset")
+    followed = (
+        FollowUp(5, "sensor_lag", both, "a sweep from 1 to 450 Hz", ("sensor_lag",), "a slow sinusoid", both),
+        FollowUp(6, "sensor_lag", both, "", (), "a slow sinusoid", ()),
+    )
+    facts = ProofFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
     page = render_proof_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
     assert page.index("Misses: 6") < page.index("Figures")
     assert "One remark." in page and "ab" * 32 in page
+    assert "sensor_lag, logger_offset" in page and "nothing would tell" in page and "no name" in page
 
 
 def test_a_bank_of_nothing_has_no_pictures():
