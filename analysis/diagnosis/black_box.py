@@ -25,12 +25,13 @@ def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: 
     """physics: the named effects' error on the test samples, as `document.Errors`. None where nothing is sealed."""
     if physics is None or not any(record.test.any() for record in measure.records):
         return None
-    terms = [
+    fitted = [record.fit for record in measure.records]
+    courses = [
         # Where nothing was measured, nothing is fitted or tested either.
-        _terms(record.command, np.nan_to_num(record.measured - left * measure.unit))
+        _courses(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
-    fitted = [record.fit for record in measure.records]
+    terms = [_terms(one) for one in _within_what_was_fitted(courses, fitted)]
     rows = np.vstack([one[mask] for one, mask in zip(terms, fitted, strict=True)])
     left = np.vstack([one[mask] for one, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
     scale = _scale(rows)
@@ -47,14 +48,24 @@ def _scale(rows: FloatArray) -> FloatArray:
     return np.where(rms > _SEEN_AT_ALL, rms, np.inf)
 
 
-def _terms(command: FloatArray, predicted: FloatArray) -> FloatArray:
-    """(n, terms): powers and products of commands, predictions, and their changes."""
+def _within_what_was_fitted(courses: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
+    """Held at the ends of the range that was fitted to: beyond it, powers would be anything, and easy to beat."""
+    seen = np.vstack([one[mask] for one, mask in zip(courses, fitted, strict=True)])
+    return [np.clip(one, seen.min(axis=0), seen.max(axis=0)) for one in courses]
+
+
+def _courses(command: FloatArray, predicted: FloatArray) -> FloatArray:
+    """(n, 2 signals): commands and predictions, and their changes."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
     before = np.vstack([signals[:1], signals[:-1]])
     base = np.hstack([before, signals - before])
-    base = base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY)
-    half = signals.shape[1]
+    return np.asarray(base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY))
+
+
+def _terms(base: FloatArray) -> FloatArray:
+    """(n, terms): powers and products."""
+    half = base.shape[1] // 2
     products = [base[:, i] * base[:, j] for i in range(half) for j in range(i + 1, half)]
     return np.hstack([base, base**2, base * np.abs(base), base**3, np.stack(products, axis=1)])
 

@@ -73,3 +73,17 @@ def test_without_sealed_samples_there_is_nothing_to_compare_on(arena_of):
     retuned = arena.contender(bare)
     assert black_box(arena.measure, retuned, 3, 0.1) is None
     assert black_box(arena.whole, replace(retuned), 3, None) is None
+
+
+def test_beyond_what_it_was_fitted_to_the_black_box_is_no_easy_prey(bent):
+    """Fitted to the quietest level, tested on one six times as loud."""
+    arena, _ = bent
+    (record,) = arena.whole.records
+    quiet, _, loud, *_ = record.recording.segments
+    masks = [np.zeros(len(record.fit), dtype=bool) for _ in range(2)]
+    masks[0][quiet.start : quiet.stop] = masks[1][loud.start : loud.stop] = True
+    whole = arena.whole.with_records((replace(record, fit=masks[0], test=masks[1]),))
+    arena = replace(arena, measure=whole, whole=whole)
+    retuned = arena.contender(evaluated(whole, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
+    alone = black_box(whole, retuned, 0, 0.0)
+    assert black_box(whole, retuned, 4, 0.0).test < 1.5 * alone.test
