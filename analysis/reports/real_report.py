@@ -74,7 +74,7 @@ def _row(one: RealAnswer) -> tuple[str, ...]:
     named = ", ".join(one.effects) or "-"
     box = "-" if one.black_box is None else error_text(one.black_box)
     return (
-        f"{one.folder}: {one.recording}", VERDICT_WORDS[one.verdict], named,
+        _title(one), VERDICT_WORDS[one.verdict], named,
         before, retuned, after, box, noise, f"{one.seconds:.0f}",
     )  # fmt: skip
 
@@ -97,7 +97,7 @@ def _section(one: RealAnswer, picture: Picture | None) -> Section:
         *((one.left,) if one.left else ()),
     )
     return Section(
-        f"{one.folder}: {one.recording}",
+        _title(one),
         paragraphs=paragraphs,
         points=(*points, *further, *one.remarks, *objections),
         pictures=(picture,) if picture is not None and error_rows(one) else (),
@@ -158,3 +158,8 @@ def _further_sentence(recording: str, error: str, retuned: float | None, after: 
         f"A further test, {recording}, nothing fitted to it, by {error}: re-tuned {error_text(retuned)}, with what was "
         f"found {error_text(after)}."
     )
+
+
+def _title(one: RealAnswer) -> str:
+    """A folder's only recording is often called like it."""
+    return one.recording if one.recording == one.folder else f"{one.folder}: {one.recording}"
