@@ -66,13 +66,17 @@ class Chosen:
     remarks: tuple[str, ...]
 
 
-def measure_of(recordings: Sequence[Recording], model: MechanicalModel) -> Chosen:
-    """The error measure that the rule chooses, of every part of the recordings."""
-    records = tuple(_settled(one, model) for one in observed_parts(recordings, model.outputs))
+def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: Sequence[Recording] = ()) -> Chosen:
+    """The error measure that the rule chooses, of every part of the recordings. beside: others that must be measured
+    alike, and are not part of it."""
+    records, others = (
+        tuple(_settled(one, model) for one in observed_parts(these, model.outputs)) if these else ()
+        for these in (recordings, beside)
+    )
     floors = tuple(noise_floor(one.recording) for one in records)
     noise = _noise(floors, records)
     unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
-    choice = choose_measure(records, model)
+    choice = choose_measure((*records, *others), model)
     known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
     remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
     if choice.measure == "free simulation":

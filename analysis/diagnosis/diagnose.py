@@ -4,18 +4,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from analysis.diagnosis.assemble_findings import assembled
-from analysis.diagnosis.choose_measure import Chosen, measure_of
+from analysis.diagnosis.choose_measure import measure_of
 from analysis.diagnosis.clean_floor import CleanFloor
 from analysis.diagnosis.explain import Progress
 from analysis.diagnosis.findings import Findings
 from analysis.diagnosis.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.impacts import rattling
-from analysis.diagnosis.learn_clean_floor import floored, learned_from
+from analysis.diagnosis.learn_clean_floor import learned_from
 from analysis.diagnosis.observed_parts import names_of_parts
 from analysis.diagnosis.patience import Patience, always
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.screening import Mapper
 from analysis.diagnosis.search import Searched, searched
+from analysis.diagnosis.search_beside_sound import searched_beside_sound
+from analysis.diagnosis.seen_directly import seen_directly
 from analysis.diagnosis.tuning import tuning_of
 from analysis.diagnosis.verdict import judge
 from equalizer.effects.catalogue import CATALOGUE
@@ -45,30 +47,25 @@ def diagnose(
     """recordings: of one device, alike in channels, units and rate; see `belonging` for what is refused. Raises
     NothingLearned where the clean recordings say nothing of these."""
     progress("measuring the noise", 0.0)
-    chosen = measure_of(recordings, model)
+    chosen = measure_of(recordings, model, settings.clean)
     tuning = tuning_of(model, recordings[0].command.channels)
-    learned = _learned(settings.clean, model, chosen, map_, progress)
-    measure = floored(chosen.measure, learned)
     catalogue = [one for one in CATALOGUE if one.name not in settings.without]
     refined = {name for one in catalogue for name in one.simpler}
-    arena = Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without))
+    arena = Arena(chosen.measure.shortened(), chosen.measure, tuning, map_, frozenset(settings.without))
     catalogue += [one for one in CATALOGUE if one.name in refined & arena.barred]
-    seen = searched(arena, catalogue, progress, settings.patient)
+    may_be_named = [one for one in catalogue if one.name not in arena.barred]
+    if settings.clean:
+        learned = learned_from(settings.clean, model, recordings, map_, progress)
+        told = [one for one in may_be_named if chosen.measure.tells(one)]
+        arena = replace(arena, certain=seen_directly(recordings, settings.clean, told))
+        seen, floor = searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor
+    else:
+        seen, floor = searched(arena, catalogue, progress, settings.patient), CleanFloor()
     if seen.judged.verdict in ("unexplained", "partly_explained") and settings.patient():
         progress("looking for play that rattles", 0.9)
-        rattled = rattling(
-            seen.arena, seen.found, chosen.floors, [one for one in catalogue if one.name not in arena.barred]
-        )
+        rattled = rattling(seen.arena, seen.found, chosen.floors, may_be_named)
         seen = seen if rattled is None else Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,))
     progress("writing down what was found", 0.95)
     found = seen.found if seen.judged.named else replace(seen.found, after=seen.found.retuned)
-    whole = assembled(
-        seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names), learned
-    )
+    whole = assembled(seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names), floor)
     return replace(whole, remarks=(*chosen.remarks, *seen.remarks, *whole.remarks))
-
-
-def _learned(
-    clean: Sequence[Recording], model: MechanicalModel, chosen: Chosen, map_: Mapper, progress: Progress
-) -> CleanFloor:
-    return learned_from(clean, model, chosen.measure.name, map_, progress) if clean else CleanFloor()

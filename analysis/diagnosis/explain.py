@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.candidates import candidates
+from analysis.diagnosis.clock_drift_by_trial import NAME as DRIFTS
+from analysis.diagnosis.clock_drift_by_trial import clock_drift_by_trial
 from analysis.diagnosis.families import excludes
 from analysis.diagnosis.gather_evidence import gather_evidence
-from analysis.diagnosis.hypothesis import NOTHING
+from analysis.diagnosis.hypothesis import NOTHING, Hypothesis, together
 from analysis.diagnosis.no_answer import silences
 from analysis.diagnosis.output_error import Fitted, evaluated, fit
 from analysis.diagnosis.parsimony import plainest_first
@@ -79,8 +81,14 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
     steps: list[Contender] = []
     barred = ""
     hasty, ended_early = replace(arena, map_=impatient(arena.map_, patient)), False
+    for one in arena.certain:
+        base = _with(arena, base, one)
+        rounds.append((base,))
+        steps.append(base)
+    surprised |= arena.sound is not None
+    more = MORE * (1.0 if arena.sound is None else arena.sound.beyond)
     while len(rounds) < MOST_EFFECTS and (
-        base.standing.seen > (MORE if rounds else CLEAN) or (surprised and not rounds)
+        base.standing.seen > (more if rounds else CLEAN) or (surprised and not rounds)
     ):
         step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
@@ -99,6 +107,13 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
         steps.append(base)
     ends = (arena.confirmed(arena.contender(before)), confirmed, arena.confirmed(base))
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
+
+
+def _with(arena: Arena, base: Contender, one: Hypothesis) -> Contender:
+    """Whatever it gains."""
+    start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, one))
+    known = sensitivity_at(arena, start.deviations, start.hypothesis)
+    return arena.contender(fit(arena.measure, arena.tuning, start, known, RETUNING_ROUNDS))
 
 
 def retuned_alone(arena: Arena) -> Fitted:
@@ -132,6 +147,8 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
         for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
         if not any(excludes(claim, one.claims[0]) for claim in held)
     ]
+    if arena.sound is not None and not any(claim.effect.name == DRIFTS for claim in held):
+        suggested += clock_drift_by_trial([one for one in catalogue if arena.measure.tells(one)], evidence[0])
     known = sensitivity_at(arena, base.deviations, base.hypothesis)
     step.at(0.2)
     screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)

@@ -7,13 +7,16 @@ import numpy as np
 
 from analysis.diagnosis.choose_measure import Chosen, measure_of
 from analysis.diagnosis.clean_floor import CleanFloor
+from analysis.diagnosis.coloured_measure import ColouredMeasure, coloured
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.explain import Progress, retuned_alone
 from analysis.diagnosis.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.mismatch_maps import cells_of
+from analysis.diagnosis.residual_colour import Colour, colour_of
 from analysis.diagnosis.rivalry import Arena, Contender
 from analysis.diagnosis.screening import Mapper
-from analysis.diagnosis.tuning import tuning_of
+from analysis.diagnosis.sound_recordings import SoundRecordings, sound_recording
+from analysis.diagnosis.tuning import Tuning, tuning_of
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -32,37 +35,99 @@ class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Lesson:
+    measure: ErrorMeasure
+    tuning: Tuning
+    retuned: Contender
     cells: tuple[MismatchCell, ...]
     channels: FloatArray
     """(c,): share of the signal."""
 
+    @property
+    def courses(self) -> tuple[FloatArray, ...]:
+        """What is left, (n, c) each, in the channels' own units; NaN where it is not compared."""
+        return tuple(
+            np.where((record.fit | record.choose | record.test)[:, None], one * self.measure.unit, np.nan)
+            for record, one in zip(self.measure.records, self.retuned.fitted.residuals, strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learned:
+    floor: CleanFloor
+    colour: Colour
+    share: FloatArray
+    """(c,): what is left without its colour, of the signal that the model foresees."""
+    sound: SoundRecordings
+
+    def beside(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
+        """Of recordings to diagnose."""
+        return coloured(measure, self.colour, self.share * _foreseen(measure, measure.residuals(model, ())))
+
 
 def learned_from(
-    clean: Sequence[Recording], model: MechanicalModel, error: str, map_: Mapper, progress: Progress
-) -> CleanFloor:
+    clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
+) -> Learned:
     """clean: of the same device, alike in channels and units; the model is re-tuned to each by itself, for days differ.
-    error: how the recordings to diagnose are measured. Raises NothingLearned where these cannot be measured so."""
+    diagnosed: what is to be diagnosed, measured alike. Raises NothingLearned where that cannot be."""
+    error = measure_of(diagnosed, model, clean).measure.name
     lessons: list[_Lesson] = []
     for number, one in enumerate(clean):
         progress(LEARNING, BEGUN * number / len(clean))
-        chosen = measure_of((one,), model)
-        if chosen.measure.name != error:
-            raise NothingLearned(
-                f"the clean recordings can only be compared by {chosen.measure.name}, those to diagnose by {error}, so "
-                "that one says nothing of the other"
-            )
+        chosen = measure_of((one,), model, (*diagnosed, *clean))
+        require_alike(chosen.measure.name, error)
         lessons.append(_lesson(chosen, model, one, map_))
     floor = learn_floor([one.cells for one in lessons])
     largest = np.max([one.channels for one in lessons], axis=0)
-    floor = replace(floor, error=error, recordings=len(clean))
-    return replace(floor, channels=tuple((floor.beyond * largest).tolist()))
+    floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
+    return _with_colour(floor, lessons, map_)
+
+
+def require_alike(learned_by: str, error: str) -> None:
+    """Raises NothingLearned."""
+    if learned_by != error:
+        raise NothingLearned(
+            f"the clean recordings can only be compared by {learned_by}, those to diagnose by {error}, so that one "
+            "says nothing of the other"
+        )
+
+
+def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> Learned:
+    courses = [course for one in lessons for course in one.courses]
+    colour = colour_of(courses, np.min([one.measure.noise for one in lessons], axis=0))
+    shares = [_rms([colour.taken_off(course) for course in one.courses]) / _signal(one) for one in lessons]
+    share = np.max(shares, axis=0)
+    sound = [
+        sound_recording(
+            coloured(floored(one.measure, floor), colour, share * _signal(one)),
+            one.tuning,
+            one.retuned.fitted.deviations,
+            map_,
+        )
+        for one in lessons
+    ]
+    return Learned(floor, colour, share, SoundRecordings(tuple(sound), floor.beyond))
+
+
+def _signal(lesson: _Lesson) -> FloatArray:
+    return _foreseen(lesson.measure, lesson.retuned.fitted.residuals)
+
+
+def _foreseen(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
+    """(c,): rms of what a model foresees, about its mean: no fault of the recording is in it."""
+    courses = [one.measured - left * measure.unit for one, left in zip(measure.records, residuals, strict=True)]
+    return np.asarray(np.maximum(np.nanstd(np.vstack(courses), axis=0), np.finfo(float).tiny))
+
+
+def _rms(courses: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(np.sqrt(np.nanmean(np.vstack(courses) ** 2, axis=0)))
 
 
 def _lesson(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
-    whole = chosen.measure
-    arena = Arena(whole.shortened(), whole, tuning_of(model, recording.command.channels), map_)
+    whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
+    arena = Arena(whole.shortened(), whole, tuning, map_)
     retuned = arena.confirmed(arena.contender(retuned_alone(arena)))
-    return _Lesson(cells_of(whole, retuned, chosen.floors), _channel_shares(whole, retuned))
+    cells = cells_of(whole, retuned, chosen.floors)
+    return _Lesson(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
 
 
 def _channel_shares(measure: ErrorMeasure, retuned: Contender) -> FloatArray:
@@ -90,9 +155,10 @@ def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
     count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
     said = (
         f"What a sound device differs by from its re-tuned model was learned from {count}: {shares} of the channel's "
-        f"signal (the largest that was seen, times {floor.beyond:.2g}). So much counts as noise here, and as no "
-        "mismatch in the map, octave by octave."
+        f"signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise here, more "
+        "of it where in frequency more of it lies. Named is only what explains more of what is diagnosed than "
+        f"{floor.beyond:.2g} times what it explains of a clean recording."
     )
     if max(floor.channels) <= MUCH:
         return said
-    return f"{said} That is much: what the clean recordings hold, too, and what is smaller, cannot be found."
+    return f"{said} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."

@@ -10,6 +10,7 @@ from analysis.diagnosis.felt_numbers import felt_numbers
 from analysis.diagnosis.hypothesis import Hypothesis, alike, without_claim
 from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, fitting, sensitivity
 from analysis.diagnosis.screening import Mapper, Screened
+from analysis.diagnosis.sound_recordings import SoundRecordings
 from analysis.diagnosis.standing import Standing, standing
 from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.effect import AxisForce, JointForce
@@ -52,6 +53,10 @@ class Arena:
     barred: frozenset[str] = frozenset()
     """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
     only where its refinement shows, and without it that law is the barred one."""
+    sound: SoundRecordings | None = None
+    """Contenders stand as they would without what they gain on these."""
+    certain: tuple[Hypothesis, ...] = ()
+    """Seen without any model: no search, and no comparison, is needed for these."""
 
     def half_opened(self) -> "Arena":
         """With the first half of every sealed stretch to fit and to choose by."""
@@ -60,12 +65,15 @@ class Arena:
 
     def contender(self, fitted: Fitted) -> Contender:
         """As decisions see it; its `test` is NaN."""
-        return Contender(fitted, standing(self.measure, fitted.residuals))
+        return Contender(fitted, self._beside_sound(fitted, standing(self.measure, fitted.residuals)))
 
     def confirmed(self, contender: Contender) -> Contender:
         """With the sealed samples."""
         fitted = evaluated(self.whole, self.tuning, contender.fitted.deviations, contender.fitted.hypothesis)
-        return Contender(fitted, standing(self.whole, fitted.residuals))
+        return Contender(fitted, self._beside_sound(fitted, standing(self.whole, fitted.residuals)))
+
+    def _beside_sound(self, fitted: Fitted, stands: Standing) -> Standing:
+        return stands if self.sound is None else self.sound.beside(fitted.hypothesis, stands)
 
 
 def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> tuple[Contender, ...]:

@@ -14,6 +14,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 MAINS_HZ = (50.0, 60.0)
+FASTEST_PPM = 2e4
+"""No clock is further off: so far are oscillators without a crystal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +137,9 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection("lost_samples", lambda at, s, r: {"fraction": _between(0.003, 0.3, s)}, _lose),
     Injection(
         "clock_drift",
-        lambda at, s, r: {"ppm": _either(r) * 1e6 * _between(0.02, 1.0, s) / at.middle_hz / at.seconds},
+        lambda at, s, r: {
+            "ppm": _either(r) * min(1e6 * _between(0.02, 1.0, s) / at.middle_hz / at.seconds, FASTEST_PPM)
+        },
         _other_clock,
     ),
     Injection("sensor_misalignment", _draw_turn, _turn, axes=3),

@@ -8,12 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.diagnosis.choose_measure import measure_of
+from analysis.diagnosis.explain import retuned_alone
 from analysis.diagnosis.observed_parts import part_of
 from analysis.diagnosis.played_errors import played_error
 from analysis.diagnosis.real_answer import RealAnswer
-from analysis.proof.injected import InjectedOutcome, outcome_of
+from analysis.diagnosis.rivalry import Arena
+from analysis.diagnosis.standing import rms_over
+from analysis.diagnosis.tuning import tuning_of
+from analysis.proof.injected import DETECTABLE, InjectedOutcome, outcome_of
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
 from study.challenge.injections import fitting_injections, inject
 from study.errors import StudyError
 from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
@@ -25,8 +31,8 @@ from study.workflows.diagnose_real import imported
 from study.workflows.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, opened
 from study.workflows.real_folder import RealRecording
 
-MOST_SAMPLES = 20_000
-"""Of each half of a recording."""
+MOST_SAMPLES, LEAD = 10_000, 8_000
+"""Of each half of a recording, and that are played before it."""
 NOTHING = 1 / 6
 """Share of draws into which nothing is injected."""
 SECONDS = 60.0
@@ -43,6 +49,7 @@ class Carrier:
     """What the device is known to be by now, effects and all."""
     sound: Recording
     rest: Recording
+    """Both with their lead, see `halves`; what came out in it is left out of the rest once a fault is in."""
     missed: float
     """Share of the signal that the model misses in the first half."""
 
@@ -56,6 +63,7 @@ def carriers(out: Path, wanted: Sequence[RealRecording], answers: Sequence[RealA
             continue
         model = read_mechanical_model(out / one.folder.name / one.name / "improved.toml")
         sound, rest = halves(imported(one.found))
+        sound = without_lead(sound)
         missed = played_error(sound, model, "all").as_it_is
         if missed is not None and missed < 1.0:
             found.append(Carrier(one.name, model, sound, rest, missed))
@@ -63,7 +71,11 @@ def carriers(out: Path, wanted: Sequence[RealRecording], answers: Sequence[RealA
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:
-    """The last samples of a recording in two, without roles: which are fitted to is drawn anew in each."""
+    """The last samples of a recording in two, without roles: which are fitted to is drawn anew in each.
+
+    A half begins in the middle of a motion. So that it can be played from rest all the same, what was there until then
+    goes before it, outside all segments.
+    """
     plain = replace(
         recording,
         segments=tuple(replace(one, role="") for one in recording.segments),
@@ -71,7 +83,31 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     )
     stop = len(recording)
     half = min(stop // 2, MOST_SAMPLES)
-    return part_of(plain, stop - 2 * half, stop - half), part_of(plain, stop - half, stop)
+    return _led(plain, stop - 2 * half, stop - half), _led(plain, stop - half, stop)
+
+
+def _led(recording: Recording, start: int, stop: int) -> Recording:
+    lead = min(start, LEAD)
+    whole = part_of(recording, start - lead, stop)
+    own = [replace(one, start=max(one.start, lead)) for one in whole.segments if one.stop > lead]
+    return replace(whole, segments=tuple(own) or (Segment(lead, len(whole), "noise", 0.0),))
+
+
+def without_lead(recording: Recording) -> Recording:
+    """What was commanded is known there, and nothing else (NaN)."""
+    lead = _lead_of(recording)
+    position = None if recording.position is None else _unknown(recording.position, lead)
+    return replace(recording, response=_unknown(recording.response, lead), position=position)
+
+
+def _lead_of(recording: Recording) -> int:
+    return min(one.start for one in recording.segments)
+
+
+def _unknown(signal: Signal, lead: int) -> Signal:
+    samples = signal.samples.copy()
+    samples[:lead] = np.nan
+    return replace(signal, samples=samples)
 
 
 def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int, seed: int) -> tuple[str, ...]:
@@ -98,10 +134,11 @@ def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: 
     effects = fitting_injections(carrier.rest)
     effect = "" if random.random() < NOTHING else str(random.choice(effects))
     done = inject(carrier.rest, effect, float(random.random()), random)
+    as_it_is, adds = _adds(carrier, done.recording)
     name = secrets.token_hex(6)
     place = folder.open / name
     (place / CLEAN).mkdir(parents=True)
-    write_recording(place / RECORDING, _nameless(done.recording), precision="float64")
+    write_recording(place / RECORDING, _nameless(without_lead(done.recording)), precision="float64")
     write_recording(place / CLEAN / RECORDING, _nameless(carrier.sound), precision="float64")
     write_mechanical_model(place / MODEL, carrier.model)
     write_text(place / SETTINGS, json.dumps({"without": [], "seconds": SECONDS}) + "\n")
@@ -113,7 +150,8 @@ def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: 
         "effect": done.effect,
         "strength": done.strength,
         "values": done.values,
-        "adds": _adds(carrier, done.change),
+        "adds": adds,
+        "adds_as_it_is": as_it_is,
         "recording_sha256": sha256_of(place / RECORDING),
         "salt": secrets.token_hex(16),
     }
@@ -126,10 +164,26 @@ def _nameless(recording: Recording) -> Recording:
     return replace(recording, meta={key: value for key, value in recording.meta.items() if key == "feedback"})
 
 
-def _adds(carrier: Carrier, change: np.ndarray) -> float:
-    """In the channel where it shows most."""
-    left = carrier.missed * np.nanstd(carrier.rest.response.samples, axis=0)
-    return float(np.max(np.hypot(change, left) / np.maximum(left, np.finfo(float).tiny)))
+def _adds(carrier: Carrier, spoiled: Recording) -> tuple[float, float]:
+    """Times the error without the fault, in the channel where it shows most: of the model as it is, and at most that
+    of one whose own numbers are re-tuned within their tolerances. What these take up is no fault that can be seen."""
+    before, lead = carrier.rest.response.samples, _lead_of(carrier.rest)
+    change = np.sqrt(np.nanmean((spoiled.response.samples - before)[lead:] ** 2, axis=0))
+    left = carrier.missed * np.nanstd(before[lead:], axis=0)
+    as_it_is = float(np.max(np.hypot(change, left) / np.maximum(left, np.finfo(float).tiny)))
+    if as_it_is < DETECTABLE:
+        return as_it_is, as_it_is
+    retuned, sound = (_retuned_error(without_lead(one), carrier.model) for one in (spoiled, carrier.rest))
+    return as_it_is, min(as_it_is, float(np.max(retuned / sound)))
+
+
+def _retuned_error(recording: Recording, model: MechanicalModel) -> FloatArray:
+    """(c,): rms over what is compared."""
+    measure = measure_of((recording,), model).measure
+    arena = Arena(measure.shortened(), measure, tuning_of(model, recording.command.channels), map)
+    residuals = arena.confirmed(arena.contender(retuned_alone(arena))).fitted.residuals
+    masks = [one.fit | one.choose | one.test for one in measure.records]
+    return np.asarray(np.maximum(rms_over(measure.records, residuals, masks) * measure.unit, np.finfo(float).tiny))
 
 
 def injected_outcomes(
