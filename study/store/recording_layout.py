@@ -18,7 +18,12 @@ LAYOUT = (
     Entry("excitation", "(n, m) float32 or float64", "the part of the command that was decided beforehand", False),
     Entry("time_s", "(n) float32 or float64", "time stamps, where the device kept them", False),
     Entry("segments", "rows of `start, stop, kind, amplitude, period, role`", "samples outside are rest", False),
-    Entry("meta", "group of attributes, each JSON text", "place, sensor, feedback, grip, operator, a known weight (added_mass_kg or added_inertia_kg_m2), provenance", False),
+    Entry(
+        "meta",
+        "group of attributes, each JSON text",
+        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (a weight on it), provenance",
+        False,
+    ),
 )
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),

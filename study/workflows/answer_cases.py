@@ -6,6 +6,7 @@ answer.json lies in the case's folder. It cannot import what the cases were made
 
 import hashlib
 import json
+import os
 import signal
 import sys
 import time
@@ -17,11 +18,15 @@ from typing import Any, cast
 
 import analysis.diagnosis
 import equalizer
+import study
 from study.store.provenance import sha256_of
 from study.store.text_file import read_text, write_text
 from study.workflows.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS
 
 APART = "study.challenge"
+OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
+STARTED = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
+"""Events of Python's audit. Library code of C opens files without them (HDF5): it is handed paths of this module's."""
 
 
 def main(arguments: list[str]) -> None:
@@ -36,17 +41,31 @@ def main(arguments: list[str]) -> None:
 
 
 def stay_apart(cases: Path) -> None:
-    """From here on, what made the cases cannot be loaded, and no file beside them can be opened by Python."""
+    """From here on, what made the cases cannot be loaded or read, no file or folder beside them can be opened or
+    listed by Python, and no other program can be started."""
     sys.modules[APART] = cast(ModuleType, None)
-    beside, inside = f"{cases.parent}/", f"{cases}/"
+    beside, inside = os.path.realpath(cases.parent), os.path.realpath(cases)
+    maker = os.path.realpath(Path(study.__path__[0]) / APART.partition(".")[2])
+
+    def lies_in(path: str, folder: str) -> bool:
+        return path == folder or path.startswith(f"{folder}{os.sep}")
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "open" and isinstance(arguments[0], str):
-            path = str(Path(arguments[0]).absolute())
-            if path.startswith(beside) and not path.startswith(inside):
-                raise PermissionError(f"a diagnosis must not open {path}")
+        if event in STARTED:
+            raise PermissionError(f"a diagnosis must not start a program ({event})")
+        if event not in OPENED or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
+            return
+        path = os.path.realpath(os.fsdecode(arguments[0]))
+        if (lies_in(path, beside) and not lies_in(path, inside)) or lies_in(path, maker):
+            raise PermissionError(f"a diagnosis must not open {path}")
 
     sys.addaudithook(watch)
+
+
+def others_sha256(place: Path) -> dict[str, str]:
+    """Of all further recordings that a case has, by their names in its folder."""
+    paths = [path for path in sorted(place.rglob("*.h5")) if path != place / RECORDING]
+    return {str(path.relative_to(place)): sha256_of(path) for path in paths}
 
 
 def answer(place: Path, digest: str) -> None:
@@ -62,6 +81,7 @@ def answer(place: Path, digest: str) -> None:
         "cpu_seconds": time.process_time() - worked,
         "recording_sha256": sha256_of(place / RECORDING),
         "model_sha256": sha256_of(place / MODEL),
+        "others_sha256": others_sha256(place),
         "engine": digest,
         "knows_the_challenge": challenge_is_loaded(),
     }

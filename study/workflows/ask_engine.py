@@ -9,16 +9,15 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
-from study.store.text_file import read_text, write_text
-from study.workflows.proof_folder import ANSWER, RECORDING, ProofFolder
+from study.store.text_file import write_text
+from study.workflows.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
+from study.workflows.proof_seals import answer_at
 
 PATIENCE_S = 1200.0
 """For one case; it takes seconds to a minute."""
 GLANCE_S = 0.5
 TRIES = 2
 """A process that died may have been killed by somebody."""
-DIED = "died"
-"""Key of an answer that no process gave."""
 
 
 class Engine:
@@ -132,8 +131,7 @@ def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered:
 
 def is_answered(place: Path) -> bool:
     """A process that died may have been killed: its case is asked again when the bank goes on."""
-    answer = place / ANSWER
-    return answer.exists() and DIED not in json.loads(read_text(answer))
+    return (place / ANSWER).exists() and DIED not in answer_at(place)
 
 
 def _given_up(place: Path) -> None:

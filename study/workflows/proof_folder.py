@@ -37,6 +37,8 @@ class ProofFolder:
 
 RECORDING, MODEL, SETTINGS, ANSWER = "recording.h5", "model.toml", "settings.json", "answer.json"
 """In a case's folder under `open`; the last is what the diagnosis adds."""
+DIED = "died"
+"""Key of an answer that no process gave."""
 CLEAN = "clean"
 """A folder beside them, where the case has recordings of the device when it was in order."""
 

@@ -11,10 +11,11 @@ from analysis.proof.score import Score, score
 from study.errors import LeftError
 from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
 from study.workflows.follow_up import follow_up
-from study.workflows.proof_folder import ProofFolder, opened
+from study.workflows.proof_folder import RECORDING, ProofFolder, opened
+from study.workflows.proof_seals import label_at
 from study.workflows.reveal_cases import engines, reveal_cases
 from study.workflows.run_controls import run_controls
-from study.workflows.seal_cases import BankPlan, seal_cases, sealed_names, to_draw
+from study.workflows.seal_cases import BankPlan, redrawn, seal_cases, sealed_names, to_draw
 
 Progress = Callable[[str, int, int], None]
 """What is being done; how many are done, of how many."""
@@ -51,6 +52,9 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
     try:
         seal = seal_cases(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = sealed_names(folder, numbers)
+        for number, name in zip(numbers, names, strict=True):
+            if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
+                redrawn(folder.open / name, plan, label_at(folder.label(number)))
         done = sum(is_answered(folder.open / name) for name in names)
         on_progress("diagnosing", done, len(names))
 
@@ -64,7 +68,11 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
         ask_engine(folder, names, wishes.workers, on_answered)
         outcomes = reveal_cases(folder, plan.cases)
         followed = follow_up(
-            folder, plan, outcomes, wishes.workers, lambda done, of: on_progress("following up", done, of)
+            folder,
+            plan,
+            outcomes,
+            (wishes.workers, wishes.keep),
+            lambda done, of: on_progress("following up", done, of),
         )
         controls: tuple[Controlled, ...] = ()
         if wishes.controls:

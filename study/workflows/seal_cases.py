@@ -1,6 +1,5 @@
 """A bank's cases as files: what a diagnosis gets, and apart from it the truth, under a seal that comes first."""
 
-import hashlib
 import json
 import secrets
 from collections.abc import Callable, Sequence
@@ -12,11 +11,13 @@ from typing import Any
 from study.challenge import second_engine
 from study.challenge.draw_bank import Draw, case_of, draw
 from study.challenge.draw_case import Case
+from study.errors import StudyError
 from study.store.mechanical_model_file import write_mechanical_model
 from study.store.provenance import sha256_of
 from study.store.recording_file import write_recording
 from study.store.text_file import write_text
 from study.workflows.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.workflows.proof_seals import label_at, seal
 from study.workflows.worker_processes import worker_processes
 from study.workflows.write_cases import truths
 
@@ -51,10 +52,7 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
             finished.result()
             done += 1
             on_sealed(done)
-    lines = (f"{sha256_of(path)}  sealed/{path.name}\n" for path in sorted(folder.sealed.glob("*.json")))
-    text = "".join(lines)
-    write_text(folder.seals, text, overwrite=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return seal(folder)
 
 
 def seal_one(folder: ProofFolder, one: Draw) -> None:
@@ -64,8 +62,28 @@ def seal_one(folder: ProofFolder, one: Draw) -> None:
     place.mkdir()
     write_recording(place / RECORDING, case.recording, precision="float32")
     write_mechanical_model(place / MODEL, case.model)
-    write_text(place / SETTINGS, json.dumps({"without": list(one.without), "processor_s": PROCESSOR_S}) + "\n")
+    write_text(place / SETTINGS, settings_text(one.without, PROCESSOR_S))
     write_text(folder.label(one.number), json.dumps(_label(one, case, place), indent=1, allow_nan=False) + "\n")
+
+
+def settings_text(without: Sequence[str], processor_s: float | None = None) -> str:
+    """What a process of the diagnosis is told beside the files: effects that it must not consider, and how long the
+    search may take."""
+    return json.dumps({"without": list(without), "processor_s": processor_s}) + "\n"
+
+
+def redrawn(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
+    """Writes the recording of a sealed case again. Raises StudyError where it is not the one that was sealed."""
+    case = case_of(draw(plan.seed, label["number"], plan.brief), label["name"])
+    write_recording(place / RECORDING, case.recording, precision="float32", overwrite=True)
+    if sha256_of(place / RECORDING) != label["recording_sha256"]:
+        raise StudyError(
+            "A device of the bank cannot be drawn again",
+            f"Case {label['number']} gives another recording than the one that was sealed.",
+            "Run the bank with the versions that it was begun with (proof.json names them), or anew.",
+            saved="All answers are kept.",
+        )
+    return case
 
 
 def _label(one: Draw, case: Case, place: Path) -> dict[str, Any]:
@@ -87,5 +105,5 @@ def _label(one: Draw, case: Case, place: Path) -> dict[str, Any]:
 
 def sealed_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
     """What the cases are called under `open`, in the order of their numbers."""
-    found = [json.loads(folder.label(number).read_text(encoding="utf-8")) for number in numbers]
+    found = [label_at(folder.label(number)) for number in numbers]
     return tuple(str(label["name"]) for label in found)

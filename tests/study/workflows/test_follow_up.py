@@ -61,7 +61,7 @@ def started(path, best):
 def followed(tmp_path_factory):
     folder, outcome, menu = started(tmp_path_factory.mktemp("bank") / "proof", True)
     seen = []
-    found = follow_up(folder, PLAN, (outcome,), 2, lambda done, of: seen.append((done, of)))
+    found = follow_up(folder, PLAN, (outcome,), (2, False), lambda done, of: seen.append((done, of)))
     return folder, outcome, menu, found, seen
 
 
@@ -86,7 +86,7 @@ def test_both_cases_are_told_nothing_of_which_is_which(followed):
 def test_the_same_call_goes_on_without_doing_anything_twice(followed):
     folder, outcome, _, found, _ = followed
     before = {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()}
-    assert follow_up(folder, PLAN, (outcome,), 2, lambda done, of: None) == found
+    assert follow_up(folder, PLAN, (outcome,), (2, False), lambda done, of: None) == found
     assert {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()} == before
 
 
@@ -94,27 +94,27 @@ def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_pl
     folder, outcome, _ = started(tmp_path / "bank", False)
     asked = []
     monkeypatch.setattr("study.workflows.follow_up.ask_engine", lambda again, names, *_: asked.extend(names))
-    with pytest.raises(StudyError):  # nobody answered
-        follow_up(folder, PLAN, (outcome,), 1, lambda done, of: None)
+    with pytest.raises(StudyError, match="answer.json"):  # nobody answered
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
     assert (folder.path / NEXT / "open" / name / FURTHER).exists()
 
 
 def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
-    folder, outcome, _ = started(tmp_path / "bank", True)
+    folder, _, _ = started(tmp_path / "bank", True)
     place = folder.open / json.loads(folder.label(NUMBER).read_text())["name"]
     said = json.loads((place / ANSWER).read_text())
     said["diagnosis"]["effects"][0]["rivals"] = []
     alone = outcome_of(json.loads(folder.label(NUMBER).read_text()), said)
-    assert follow_up(folder, PLAN, (outcome, alone)[1:], 1, lambda done, of: None) == ()
+    assert follow_up(folder, PLAN, (alone,), (1, False), lambda done, of: None) == ()
 
 
 def test_a_device_that_cannot_be_drawn_again_is_said(tmp_path):
     folder, outcome, _ = started(tmp_path / "bank", True)
-    path = folder.open / json.loads(folder.label(NUMBER).read_text())["name"] / ANSWER
+    path = folder.label(NUMBER)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"recording_sha256": "0" * 64}))
     with pytest.raises(StudyError, match="cannot be drawn again"):
-        follow_up(folder, PLAN, (outcome,), 1, lambda done, of: None)
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
 
 
 def test_shares_count_all_starts_and_those_for_which_something_is_proposed():

@@ -63,6 +63,13 @@ def test_the_process_that_answers_never_loads_the_challenge(proof):
     [
         ("import study.challenge.draw_case", "ModuleNotFoundError"),
         ("(cases.parent / 'sealed' / '00000.json').read_text()", "PermissionError"),
+        ("open(f'{cases}/../sealed/00000.json')", "PermissionError"),
+        ("open(f'{cases}/../sealed/00000.json'.encode())", "PermissionError"),
+        ("import os; os.listdir(cases.parent / 'sealed')", "PermissionError"),
+        ("import os; list(os.scandir(cases.parent))", "PermissionError"),
+        ("import os; os.chdir(cases.parent)", "PermissionError"),
+        ("import subprocess; subprocess.run(['cat', f'{cases}/../sealed/00000.json'])", "PermissionError"),
+        ("import study; (Path(study.__path__[0]) / 'challenge' / 'draw_bank.py').read_text()", "PermissionError"),
     ],
 )
 def test_the_process_that_answers_reaches_no_label(proof, does, refused):
@@ -94,13 +101,55 @@ def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_p
     assert summary(done)["cases"] == len(done.outcomes)
 
 
-def test_a_label_that_was_changed_afterwards_breaks_its_seal(proof, tmp_path):
+@pytest.fixture
+def copied(proof, tmp_path):
     folder = ProofFolder(tmp_path / "copy")
     subprocess.run(["cp", "-r", str(proof[0].folder.path), str(folder.path)], check=True)
+    return folder
+
+
+def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
+    folder = copied
     path = next(folder.sealed.glob("*.json"))
     path.write_text(path.read_text().replace('"kind"', '"kind" '))
     with pytest.raises(StudyError, match="A seal is broken"):
         reveal_cases(folder, 100)
+    sealed = folder.seals.read_text()
+    with pytest.raises(StudyError, match="A seal is broken"):
+        prove(folder.path, PLAN, Wishes(), lambda *_: None)
+    assert folder.seals.read_text() == sealed
+
+
+def test_seals_that_are_none_break_the_proof(copied):
+    copied.seals.write_text("garbage\n")
+    with pytest.raises(StudyError, match="A seal is broken"):
+        prove(copied.path, PLAN, Wishes(), lambda *_: None)
+
+
+@pytest.mark.parametrize("without", ["recording_sha256", "knows_the_challenge", "model_sha256"])
+def test_an_answer_that_does_not_say_what_it_is_to_breaks_the_seal(copied, without):
+    path = next(copied.open.glob(f"*/{ANSWER}"))
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps({key: value for key, value in said.items() if key != without}))
+    with pytest.raises(StudyError, match="A seal is broken"):
+        reveal_cases(copied, 100)
+
+
+@pytest.mark.parametrize("torn", [ANSWER, "label"])
+def test_a_torn_file_is_named(copied, torn):
+    path = next(copied.open.glob(f"*/{ANSWER}")) if torn == ANSWER else next(copied.sealed.glob("*.json"))
+    path.write_text(path.read_text()[:40])
+    with pytest.raises(StudyError, match=path.name if torn == ANSWER else "A seal is broken"):
+        prove(copied.path, PLAN, Wishes(), lambda *_: None)
+
+
+def test_an_answer_that_was_removed_is_given_again(copied):
+    path = next(copied.open.glob(f"*/{ANSWER}"))
+    before = json.loads(path.read_text())
+    path.unlink()
+    again = prove(copied.path, PLAN, Wishes(workers=1), lambda *_: None)
+    assert len(again.outcomes) == len(to_draw(PLAN))
+    assert json.loads(path.read_text())["diagnosis"] == before["diagnosis"]
 
 
 def test_a_folder_of_another_bank_is_refused(proof, tmp_path):

@@ -3,8 +3,8 @@
 import pytest
 
 from study.challenge.controls import CONTROLS
-from study.workflows.ask_engine import DIED, is_answered
-from study.workflows.proof_folder import ANSWER
+from study.workflows.ask_engine import is_answered
+from study.workflows.proof_folder import ANSWER, DIED
 from study.workflows.run_controls import run_controls
 
 
