@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import hypot
 
 from analysis.diagnosis.document import Diagnosis, NamedEffect
 
@@ -59,6 +60,11 @@ class Outcome:
     def detectable(self) -> bool:
         """A diagnosis that broke down counts as one that should have seen something."""
         return self.said is None or self.left("retuned") > DETECTABLE
+
+    @property
+    def seen_by_oracle(self) -> bool:
+        """Who plays the same device with and without the effects sees as much, before a re-tuned model hides part."""
+        return hypot(1.0, self.adds) > DETECTABLE
 
     @property
     def right(self) -> bool:

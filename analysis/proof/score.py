@@ -8,12 +8,12 @@ import numpy as np
 from analysis.diagnosis.document import NamedEffect
 from analysis.proof.calibration import Calibration, calibration
 from analysis.proof.follow_up import FollowUp, follow_up_figures
+from analysis.proof.miss import NOT_EXPLAINED, has_wrong_name, is_miss, on_another_axis
 from analysis.proof.outcome import Concealed, Outcome
 from analysis.proof.same_number import as_said
-from analysis.proof.share import Figure, share, statistic
+from analysis.proof.share import Figure, pooled, share, statistic
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
-NOT_EXPLAINED = ("unexplained", "partly_explained")
 BANKS = ("main", "dirty", "engine")
 
 
@@ -31,20 +31,6 @@ def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Sco
         *follow_up_figures(followed), *_numbers(outcomes),
     )  # fmt: skip
     return Score(figures, calibration(outcomes), tuple(one for one in outcomes if is_miss(one)))
-
-
-def is_miss(one: Outcome) -> bool:
-    if one.said is None:
-        return True
-    if one.kind == "nothing":
-        return bool(one.named)
-    if one.kind == "without":
-        return one.verdict == "explained"
-    if not one.detectable:
-        return False
-    if one.kind == "outside":
-        return one.verdict not in NOT_EXPLAINED
-    return not one.right
 
 
 def _of(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
@@ -69,7 +55,13 @@ def _singles(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield share("right where one name is returned", alone, lambda one: one.right)
     yield share("place", named, lambda one: one.named[0].place == one.concealed[0].place)
     sided = [one for one in named if one.right and one.concealed[0].axis is not None and len(one.axes) > 1]
-    yield share("axis, of two or three", sided, lambda one: one.named[0].axis == one.concealed[0].axis)
+    yield share("axis, of two or three", sided, lambda one: not on_another_axis(one))
+    singles = _of(outcomes, "single")
+    seen = [one for one in singles if one.seen_by_oracle]
+    yield share("single effects that count as detectable", singles, lambda one: one.detectable)
+    yield share("named right, of those that an oracle sees", seen, lambda one: one.right)
+    hidden = [one for one in outcomes if one.kind != "nothing" and not one.detectable]
+    yield share("not detectable, yet a wrong name", hidden, has_wrong_name)
 
 
 def _nothing(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
@@ -83,8 +75,8 @@ def _open_set(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield share("outside the catalogue, not explained", outside, lambda one: one.verdict in NOT_EXPLAINED)
     yield share("outside the catalogue, no name at all", outside, lambda one: not one.named)
     without = _detectable(_of(outcomes, "without"))
-    yield share("without the true effect, yet explained", without, lambda one: one.verdict == "explained")
     yield share("without the true effect, any name", without, lambda one: bool(one.named))
+    yield share("without the true effect, yet explained", without, lambda one: one.verdict == "explained")
 
 
 def _pairs(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
@@ -97,8 +89,8 @@ def _numbers(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     right = [one for one in _detectable(_of(outcomes, "single")) if one.right]
     errors = [main_error(one.concealed[0], one.named[0]) for one in right]
     yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
-    covered = [inside for one in right for inside in within(one.concealed[0], one.named[0]).values()]
-    yield share("true value in the 95 % interval", covered, lambda inside: inside)
+    covered = [list(within(one.concealed[0], one.named[0]).values()) for one in right]
+    yield pooled("true value in the 95 % interval", covered)
     mains = [one for one in right if EFFECTS_BY_NAME[one.names[0]].main.name in within(one.concealed[0], one.named[0])]
     yield share("the same, main parameters", mains, lambda one: main_within(one.concealed[0], one.named[0]))
     after = [one.left("after") for one in right]

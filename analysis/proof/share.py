@@ -39,6 +39,17 @@ def wilson(hits: float, of: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def pooled(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
+    """The share of all, where those of a group hang together: groups are resampled whole."""
+    hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
+    of = np.array([len(group) for group in groups if group], dtype=np.float64)
+    if not len(of):
+        return Figure(name, None, None, None, 0, 0)
+    drawn = np.random.default_rng(21).integers(len(of), size=(RESAMPLED, len(of)))
+    low, high = np.quantile(hits[drawn].sum(axis=1) / of[drawn].sum(axis=1), (0.025, 0.975))
+    return Figure(name, float(hits.sum() / of.sum()), float(low), float(high), int(of.sum()), int(hits.sum()))
+
+
 def statistic(name: str, values: Iterable[float], of: Callable[..., FloatArray]) -> Figure:
     """of: takes (resamples, values) and axis=1, such as np.median. Bootstrap intervals, always the same."""
     known = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)

@@ -8,9 +8,10 @@ from analysis.figures.proof_pictures import proof_pictures
 from analysis.proof.calibration import calibration
 from analysis.proof.detection import detection_strips, shares_by_size, what_became_of
 from analysis.proof.follow_up import FollowUp
+from analysis.proof.miss import is_miss
 from analysis.proof.outcome import Concealed, Outcome
-from analysis.proof.score import is_miss, score
-from analysis.proof.share import share, statistic
+from analysis.proof.score import score
+from analysis.proof.share import pooled, share, statistic
 from analysis.proof.wording import concealed_text, figure_text, said_text
 from analysis.reports.proof_report import ProofFacts, render_proof_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -53,7 +54,7 @@ def outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="m
 RIGHT = outcome(answer=said("explained", named("coulomb_friction")))
 WRONG = outcome(answer=said("explained", named("viscous_damping", probability=0.6)))
 IN_SET = outcome(answer=said("explained", named("viscous_damping", inseparable=("coulomb_friction",))))
-UNSEEN = outcome(answer=said("parameters"), retuned=1.1)
+UNSEEN = outcome(answer=said("parameters"), retuned=1.1, adds=1.0)
 ALARM = outcome("nothing", (), said("explained", named("cogging")), strengths=())
 CLEAN = outcome("nothing", (), said("parameters"), strengths=())
 OUTSIDE = outcome("outside", ("creep",), said("unexplained"))
@@ -66,7 +67,9 @@ PAIR = outcome(
     strengths=(1, 1),
 )
 BROKEN = outcome()
-ALL = (RIGHT, WRONG, IN_SET, UNSEEN, ALARM, CLEAN, OUTSIDE, TAKEN_IN, WITHOUT, PAIR, BROKEN)
+GUESSED = outcome(answer=said("explained", named("cogging")), retuned=1.1, adds=0.4)
+PARTLY = outcome("without", answer=said("partly_explained", named("stribeck_friction")))
+ALL = (RIGHT, WRONG, IN_SET, UNSEEN, GUESSED, ALARM, CLEAN, OUTSIDE, TAKEN_IN, WITHOUT, PARTLY, PAIR, BROKEN)
 
 
 def figure(outcomes, name):
@@ -81,10 +84,14 @@ def figure(outcomes, name):
         ("right where one name is returned", 1, 2),
         ("nothing missing, yet named", 1, 2),
         ("outside the catalogue, not explained", 1, 2),
-        ("without the true effect, yet explained", 0, 1),
+        ("without the true effect, yet explained", 0, 2),
         ("pairs, both and no other", 0, 1),
         ("pairs, at least one", 1, 1),
         ("true value in the 95 % interval", 1, 1),
+        ("without the true effect, any name", 1, 2),
+        ("single effects that count as detectable", 4, 6),
+        ("named right, of those that an oracle sees", 1, 5),
+        ("not detectable, yet a wrong name", 1, 2),
     ],
 )
 def test_shares_count_what_their_names_say(name, hits, of):
@@ -93,12 +100,29 @@ def test_shares_count_what_their_names_say(name, hits, of):
 
 
 def test_every_answer_that_is_not_as_it_should_be_is_listed():
-    assert {id(one) for one in score(ALL).misses} == {id(o) for o in (WRONG, IN_SET, ALARM, TAKEN_IN, PAIR, BROKEN)}
+    assert {id(one) for one in score(ALL).misses} == {
+        id(o) for o in (WRONG, IN_SET, GUESSED, ALARM, TAKEN_IN, PARTLY, PAIR, BROKEN)
+    }
 
 
 def test_what_cannot_be_seen_is_no_miss_and_what_broke_down_is_one():
     assert not is_miss(UNSEEN)
     assert is_miss(BROKEN)
+
+
+def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
+    there = said("explained", named("coulomb_friction", axis="y"))
+    assert is_miss(outcome(answer=there))
+    assert not is_miss(outcome(answer=there, axes=("x",)))
+    assert not is_miss(outcome(answer=said("explained", named("coulomb_friction", axis=None))))
+
+
+def test_what_hangs_together_is_resampled_together():
+    whole = [[True] * 10, [False] * 10] * 10
+    found, alone = pooled("together", whole), share("alone", [one for group in whole for one in group], bool)
+    assert found.value == alone.value == 0.5
+    assert found.high - found.low > 2 * (alone.high - alone.low)
+    assert pooled("none", [[], []]).value is None
 
 
 def test_shares_of_nothing_have_no_value():
@@ -147,7 +171,7 @@ def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
     )
     facts = ProofFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
     page = render_proof_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
-    assert page.index("Misses: 6") < page.index("Figures")
+    assert page.index("Misses: 8") < page.index("Figures")
     assert "One remark." in page and "ab" * 32 in page
     assert "sensor_lag, logger_offset" in page and "nothing would tell" in page and "no name" in page
 
