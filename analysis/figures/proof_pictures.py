@@ -35,16 +35,21 @@ def _strips(strips: Sequence[Strip]) -> Picture:
         for strength, how in strip.draws:
             marker, colour = MARKS[how]
             axes.plot(strength, row, marker, color=colour, markersize=6.5 if marker != "." else 5)
+        if strip.oracle is not None:
+            axes.vlines(strip.oracle, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
     axes.set_yticks(range(len(strips)), labels=[strip.effect.replace("_", " ") for strip in strips])
     axes.set_ylim(len(strips) - 0.4, -0.6)
     axes.set_xlim(-0.03, 1.03)
     axes.set_xlabel("strength, from the weakest that is drawn to the strongest (logarithmic)")
     handles = [Line2D([], [], marker=m, color=c, linestyle="", label=how) for how, (m, c) in MARKS.items()]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(MARKS), frameon=False)
+    handles.append(Line2D([], [], marker="|", color=BLACK, linestyle="", markersize=9, label="an oracle sees it"))
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
     return Picture(
         "detection", "From which strength on an effect is named",
         "Each mark is a device with one concealed effect. Invisible: the re-tuned model errs by at most 1.25 times "
-        "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named.",
+        "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named. Bars: from "
+        "here on an oracle, who plays the same device with and without the effect, sees as much, before a re-tuned model "
+        "hides part of it (a line through the logarithms of what the draws add).",
         figure,
         alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {how}' for x, how in s.draws)}." for s in strips),
     )  # fmt: skip

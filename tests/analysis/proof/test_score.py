@@ -6,7 +6,7 @@ import pytest
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
 from analysis.figures.proof_pictures import proof_pictures
 from analysis.proof.calibration import calibration
-from analysis.proof.detection import detection_strips, shares_by_size, what_became_of
+from analysis.proof.detection import detection_strips, seen_from, shares_by_size, what_became_of
 from analysis.proof.follow_up import FollowUp
 from analysis.proof.miss import is_miss
 from analysis.proof.outcome import Concealed, Outcome
@@ -152,6 +152,14 @@ def test_each_draw_becomes_a_mark_of_its_effect():
     assert [strip.effect for strip in strips] == ["coulomb_friction"]
     assert sorted(how for _, how in strips[0].draws) == ["in the set", "invisible", "missed", "right"]
     assert what_became_of(BROKEN) == "missed"
+
+
+def test_an_oracle_sees_an_effect_from_where_it_adds_three_quarters_of_the_noise():
+    drawn = [outcome(adds=0.075 * 100**strength, strengths=(strength,)) for strength in (0.0, 0.2, 0.7, 1.0)]
+    assert seen_from(drawn) == pytest.approx(0.5)
+    assert seen_from([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
+    assert seen_from(drawn[:2]) is None
+    assert detection_strips(drawn)[0].oracle == pytest.approx(0.5)
 
 
 def test_larger_effects_come_later():
