@@ -47,9 +47,9 @@ def _strips(strips: Sequence[Strip]) -> Picture:
     return Picture(
         "detection", "From which strength on an effect is named",
         "Each mark is a device with one concealed effect. Invisible: the re-tuned model errs by at most 1.25 times "
-        "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named. Bars: from "
-        "here on an oracle, who plays the same device with and without the effect, sees as much, before a re-tuned model "
-        "hides part of it (a line through the logarithms of what the draws add).",
+        "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named. Bars: "
+        "from here on an oracle, who plays the same device with and without the effect, sees as much, before a "
+        "re-tuned model hides part of it (a line through the logarithms of what the draws add).",
         figure,
         alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {how}' for x, how in s.draws)}." for s in strips),
     )  # fmt: skip

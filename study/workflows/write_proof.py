@@ -13,9 +13,10 @@ from analysis.proof.score import main_error
 from analysis.reports.proof_report import ProofFacts, render_proof_report
 from study.devices.clock import RealClock
 from study.store.csv_rows import rows_to_csv
-from study.store.json_document import write_json
+from study.store.json_document import read_json, write_json
 from study.store.provenance import command_line, gather_provenance, versions
 from study.store.text_file import write_text
+from study.workflows.answer_cases import engine_digest
 from study.workflows.picture_files import write_pictures
 from study.workflows.proof_summary import remarks
 from study.workflows.prove import Proof
@@ -60,7 +61,7 @@ class FigureRow:
 
 def write_proof(proof: Proof) -> None:
     """Anew each time: what it is made from stays. Raises StudyError."""
-    folder = proof.folder.path
+    folder, at = proof.folder.path, answered_at(proof)
     score = proof.score
     document = {
         "seed": proof.plan.seed,
@@ -69,7 +70,7 @@ def write_proof(proof: Proof) -> None:
         "left_out": proof.left_out,
         "seal": proof.seal,
         "engines": list(proof.engines),
-        "commit": commit(),
+        "commit": at,
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
         "followed": [asdict(one) for one in proof.followed],
@@ -82,7 +83,7 @@ def write_proof(proof: Proof) -> None:
     pictures = proof_pictures(proof.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
     facts = ProofFacts(
-        seeds(proof), proof.seal, commit(), proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
+        seeds(proof), proof.seal, at, proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
     )
     page = render_proof_report(
         proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, RealClock().utc()
@@ -96,15 +97,32 @@ def write_table(path: Path, proof: Proof) -> None:
     figures = [FigureRow(one.name, one.value, one.low, one.high, one.of) for one in proof.score.figures]
     named = sum(part.of for part in calibration.bins)
     figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
-    missed = [str(one.number) for one in proof.score.misses]
+    held = [f"{one.name}: {'held' if one.held else 'did not hold'}" for one in proof.controls]
     lines = [
         f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
-        f"# commit {commit()}, code of the diagnosis {' '.join(proof.engines)}",
+        f"# commit {answered_at(proof)}, code of the diagnosis {' '.join(proof.engines)}",
         f"# seal of the labels {proof.seal}",
         f"# versions {json.dumps(versions())}",
-        f"# missed {' '.join(missed) or 'none'}",
+        f"# controls {'; '.join(held) or 'not asked'}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
+    misses = [_row(one, True) for one in proof.score.misses]
+    write_text(misses_table(path), rows_to_csv(misses, CaseRow), overwrite=True)
+
+
+def misses_table(path: Path) -> Path:
+    """Beside the table of figures."""
+    return path.with_name(f"{path.stem}-misses{path.suffix}")
+
+
+def answered_at(proof: Proof) -> str:
+    """The commit at which the answers were first written down; this checkout's where they are its own."""
+    document = proof.folder.path / DOCUMENT
+    if document.exists():
+        before = read_json(document, FORMAT, VERSION)
+        if before.get("engines") == list(proof.engines) and isinstance(before.get("commit"), str):
+            return str(before["commit"])
+    return commit() if proof.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
 
 
 def seeds(proof: Proof) -> str:

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from study.workflows.proof_summary import proof_lines, summary
 from study.workflows.prove import Wishes, prove
 from study.workflows.reveal_cases import reveal_cases
 from study.workflows.seal_cases import BankPlan, to_draw
-from study.workflows.write_proof import write_proof, write_table
+from study.workflows.write_proof import commit, write_proof, write_table
 
 ROOT = Path(__file__).parents[3]
 SEED = 51_404
@@ -97,6 +98,12 @@ def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_p
     assert len((done.folder.path / "proof.csv").read_text().splitlines()) == len(done.outcomes) + 1
     assert json.loads((done.folder.path / "proof.json").read_text())["format"] == "hapteq-proof"
     assert f"# seal of the labels {done.seal}" in (tmp_path / "small.csv").read_text()
+    misses = (tmp_path / "small-misses.csv").read_text().splitlines()
+    assert len(misses) == 1 + len(done.score.misses)
+    document = json.loads((done.folder.path / "proof.json").read_text())
+    write_proof(replace(done, engines=("another",)))
+    assert json.loads((done.folder.path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
+    assert document["commit"] == commit()
     assert next(proof_lines(done)).endswith(f"misses in {len(done.outcomes)} cases")
     assert summary(done)["cases"] == len(done.outcomes)
 
