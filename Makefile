@@ -9,13 +9,23 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 DIAGNOSIS := tests/stories/test_missing_physics_is_named.py \
 	tests/stories/test_friction_is_named_and_then_compensated.py
-FIRST := tests/study/tui tests/equalizer tests/contracts tests/stories
+# The tests in parts, the longest first; `rest` is every test that no other part has. Between them they use all cores.
+workflows := tests/study/workflows
+screens := tests/study/tui
+stories := tests/stories tests/contracts
+equalizer := tests/equalizer
+analysis := tests/analysis
+PARTS := workflows screens stories equalizer analysis
+rest := tests $(foreach part,$(PARTS),$(addprefix --ignore=,$($(part))))
+TESTED := $(addprefix tested-,$(PARTS) rest)
+JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 CASES ?= 600
 SEED ?= 93000
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove-study prove-equalizer prove-diagnosis prove-bank docs clean
+.PHONY: help study test check fix bench prove-study prove-equalizer prove-diagnosis prove-bank docs clean \
+	types imports compiled $(TESTED)
 
 help: ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -23,21 +33,29 @@ help: ## Show what can be made
 study: $(VENV)/.installed ## Set up, then take the study (without a terminal: a simulated participant takes it)
 	$(BIN)/hapteq study
 
-test: $(VENV)/.installed-test ## Set up, then run all checks and tests
+test: $(VENV)/.installed-test ## Set up, then run all checks and tests (JOBS=2: so many at once; else one per core)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	@# One that fails stops none of the others, and fails the whole.
+	@$(MAKE) --no-print-directory --keep-going --jobs=$(JOBS) types imports $(TESTED)
+
+types:
 	$(BIN)/mypy
+
+imports:
 	$(BIN)/lint-imports
-	@# Two halves side by side, about as long: screens, which mostly wait, with numbers, and all the others.
-	@$(BIN)/python -m pytest -m "not slow" -p no:cacheprovider $(FIRST) & first=$$!; \
-		$(BIN)/python -m pytest -m "not slow" $(FIRST:%=--ignore=%); others=$$?; \
-		wait $$first && exit $$others
+
+compiled:
+	@# Numba's code lies beside the sources: compiled once here, else each part would do it for itself.
+	$(BIN)/python tests/compile_kernels.py
+
+$(TESTED): tested-%: | compiled
+	$(BIN)/python -m pytest -m "not slow" -p no:cacheprovider $($*)
 
 check: $(VENV)/.installed-test ## Format, lint, types and import contracts: the fast half of `make test`
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
+	@$(MAKE) --no-print-directory types imports
 
 fix: $(VENV)/.installed-test ## Let ruff format and mend what it can
 	$(BIN)/ruff format .
@@ -57,7 +75,7 @@ prove-diagnosis: $(VENV)/.installed-test ## The slow tests of the diagnosis, eff
 	$(BIN)/python -m pytest -m slow $(DIAGNOSIS)
 
 prove-bank: $(VENV)/.installed-prove ## The blind proof of the diagnosis (CASES=600 SEED=93000 BANK=DIR); repeated, it goes on
-	$(BIN)/hapteq prove --cases $(CASES) --seed $(SEED) --out $(BANK) --table docs/proof/bank-$(SEED).csv
+	$(BIN)/hapteq prove --controls --cases $(CASES) --seed $(SEED) --out $(BANK) --table docs/proof/bank-$(SEED).csv
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
 	$(BIN)/python -m study.workflows.format_docs docs
@@ -81,7 +99,9 @@ $(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
 	@$(PIP) install --quiet -c constraints.txt -e .
 	@touch $@
 
-$(VENV)/.installed-test: $(VENV)/.installed
-	@echo "Installing the test tools"
-	@$(PIP) install --quiet -c constraints.txt -e '.[test]'
-	@touch $@
+# Not after the plain installation: both at once are quicker than one after the other. What is imported compiles itself
+# then; to compile all that is installed takes longer than all of that.
+$(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml constraints.txt
+	@echo "Installing hapteq, what it needs and the test tools (a minute or two)"
+	@$(PIP) install --quiet --no-compile -c constraints.txt -e '.[test]'
+	@touch $(VENV)/.installed $@

@@ -48,6 +48,14 @@ def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
     return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
+def _axis_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
+    """The same effects, each at the other axis."""
+    if not _same_but_axes(answers):
+        return False
+    one, other = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
+    return all(None not in pair and pair[0] != pair[1] for pair in zip(one, other, strict=True))
+
+
 def _opposite(answers: Sequence[Diagnosis | None]) -> bool:
     """One effect, its main number with the other sign."""
     mains = [next(iter(one.effects[0].parameters.values())).value for one in answers if one and one.effects]
@@ -73,5 +81,6 @@ CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
     "nothing": _nothing,
     "same": _same,
     "same but axes": _same_but_axes,
+    "axis exchanged": _axis_exchanged,
     "opposite": _opposite,
 }

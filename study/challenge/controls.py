@@ -93,6 +93,15 @@ def _permuted(seed: int, rig: Rig) -> tuple[Asked, ...]:
     return Asked(recording, model), Asked(turned, other)
 
 
+def _exchanged(seed: int, rig: Rig) -> tuple[Asked, ...]:
+    """What was read of one axis now bears the other's name, in command, response, position and model."""
+    two = replace(rig, axes=(0, 1))
+    case = _strong(seed, two)
+    turned = _mapped(case.recording, lambda samples: samples[:, ::-1])
+    other = replace(case.model, input=case.model.input[:, ::-1], output=case.model.output[::-1])
+    return Asked(case.recording, case.model), Asked(turned, other)
+
+
 def _mirrored(seed: int, rig: Rig) -> tuple[Asked, ...]:
     case = draw_case(seed, (PUSHED,), "calibrated", STRONG, "a", rig)
     turned = _mapped(case.recording, lambda samples: -samples)
@@ -147,6 +156,7 @@ CONTROLS = (
     Control("the model of another device", "not explained", _other_model),
     Control("a silent recording", "no name", _silent),
     Control("axes in another order", "same", _permuted),
+    Control("axes exchanged", "axis exchanged", _exchanged),
     Control("everything mirrored", "opposite", _mirrored),
     Control("strength zero", "nothing", _plain),
     Control("irrelevant hypotheses added", "same", _fewer),

@@ -17,6 +17,8 @@ from study.workflows.reveal_cases import engines, reveal_cases
 from study.workflows.run_controls import run_controls
 from study.workflows.seal_cases import BankPlan, redrawn, seal_cases, sealed_names, to_draw
 
+CONTROL_TURNS = 3
+"""Each with a seed of its own."""
 Progress = Callable[[str, int, int], None]
 """What is being done; how many are done, of how many."""
 
@@ -75,9 +77,12 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
             lambda done, of: on_progress("following up", done, of),
         )
         controls: tuple[Controlled, ...] = ()
-        if wishes.controls:
-            controls = run_controls(
-                path / "controls", plan.seed, wishes.workers, lambda done, of: on_progress("controls", done, of)
+        for turn in range(CONTROL_TURNS if wishes.controls else 0):
+            controls += run_controls(
+                path / "controls" / str(plan.seed + turn),
+                plan.seed + turn,
+                wishes.workers,
+                lambda done, of: on_progress("controls", done, of),
             )
     except KeyboardInterrupt as interruption:
         raise LeftError(

@@ -41,7 +41,8 @@ def run_controls(
 
     ask_engine(folder, every, workers, on_answered)
     return tuple(
-        controlled(one.name, one.claim, [_said(folder.open / name) for name in names[one.name]]) for one in controls
+        controlled(f"{one.name}, seed {seed}", one.claim, [_said(folder.open / name) for name in names[one.name]])
+        for one in controls
     )
 
 

@@ -35,6 +35,15 @@ def test_axes_are_turned_in_recording_and_model_alike(asked):
     assert np.array_equal(turned.model.output[0], first.model.output[1])
 
 
+def test_axes_are_exchanged_where_one_bears_the_others_name(asked):
+    first, turned = asked["axes exchanged"]
+    for name in ("command", "response", "position"):
+        one, other = getattr(first.recording, name), getattr(turned.recording, name)
+        assert one.channels == other.channels
+        assert np.array_equal(one.samples, other.samples[:, ::-1])
+    assert np.array_equal(turned.model.output[0], first.model.output[1])
+
+
 def test_mirrored_means_every_signal(asked):
     first, turned = asked["everything mirrored"]
     for name in ("command", "response", "position"):

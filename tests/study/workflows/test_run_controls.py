@@ -12,7 +12,7 @@ def test_noise_alone_and_a_clean_device_name_nothing_and_are_asked_once(tmp_path
     quick = [one for one in CONTROLS if one.name in ("a silent recording", "strength zero")]
     seen = []
     first = run_controls(tmp_path, 51_502, 1, lambda done, of: seen.append((done, of)), quick)
-    assert [(one.name, one.held) for one in first] == [(one.name, True) for one in quick]
+    assert [(one.name, one.held) for one in first] == [(f"{one.name}, seed 51502", True) for one in quick]
     assert seen == [(0, 2), (1, 2), (2, 2)]
     again = run_controls(tmp_path, 51_502, 1, lambda done, of: seen.append((done, of)), quick)
     assert again == first and seen[-1] == (2, 2)
