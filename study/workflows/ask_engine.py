@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
+from study.errors import StudyError
 from study.store.text_file import write_text
 from study.workflows.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
 from study.workflows.proof_seals import answer_at
@@ -90,7 +91,7 @@ def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answe
                 name = answered.get(timeout=GLANCE_S)
             except Empty:
                 if not any(thread.is_alive() for thread in threads) and answered.empty():
-                    raise RuntimeError("the processes of the diagnosis ended before their work was done") from None
+                    raise _ended(folder, missing) from None
                 continue
             missing -= 1
             on_answered(name)
@@ -127,6 +128,15 @@ def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered:
                 return
             _given_up(folder.open / name)
         answered.put(name)
+
+
+def _ended(folder: ProofFolder, missing: int) -> StudyError:
+    return StudyError(
+        "The processes of the diagnosis ended before their work was done",
+        f"{missing} cases are without an answer; what they said last is in {folder.log}.",
+        "Run the same command again: it goes on where it stopped.",
+        saved=f"All answers so far are in {folder.open}.",
+    )
 
 
 def is_answered(place: Path) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError
+from study.store.json_document import parse_json
 from study.store.text_file import read_text, write_text
 
 
@@ -48,7 +49,7 @@ def opened(path: Path, seed: int, brief: bool) -> ProofFolder:
     folder, said = ProofFolder(path), path / "bank.json"
     wanted = json.dumps({"format": "hapteq-bank", "version": 1, "seed": seed, "brief": brief}, indent=1) + "\n"
     if said.exists():
-        if read_text(said) != wanted:
+        if parse_json(said, read_text(said), "bank") != json.loads(wanted):
             raise StudyError(
                 "This folder holds another bank",
                 f"{path} was begun with another --seed, or another length of its recordings.",
