@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Diagnosis
 from analysis.proof.share import Figure, share
 
-NOTHING = "nothing"
+NOTHING, MISSING = "nothing", "missing"
+"""A change that is none; a verdict that nobody gave."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,12 @@ def scored(label: Label, diagnosis: Diagnosis) -> Scored:
     )
 
 
+def not_answered(label: Label) -> Scored:
+    """Without a diagnosis nothing is right, and a number lies in no interval: leaving one out must raise no rate."""
+    written = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
+    return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if written else None)
+
+
 def _inside(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool | None:
     for effect in diagnosis.effects:
         ends = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
@@ -112,7 +119,7 @@ def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
     kinds = [one.name for one in CHANGES if any(row.change == one.name for row in changed)]
     return (
         share("changes named", changed, lambda one: one.right),
-        share("nothing changed, something named", _of(rows, NOTHING), lambda one: not one.right),
+        share("nothing changed, nothing named", _of(rows, NOTHING), lambda one: one.right),
         share("written numbers inside their interval", _asked(rows), lambda one: bool(one.inside)),
         *(share(kind, _of(rows, kind), lambda one: one.right) for kind in kinds),
     )

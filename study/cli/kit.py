@@ -44,9 +44,15 @@ def score(
     labels: LabelsArgument,
     diagnoses: Annotated[Path, typer.Option(help="Folder with one diagnosis per recording, by its name.")],
     out: Annotated[Path, typer.Option(help="The table to write, SCORE.csv.")],
+    seal: Annotated[
+        str | None, typer.Option(metavar="HASH", help="The hash that was handed over before the diagnoses.")
+    ] = None,
 ) -> None:
-    """Compare the revealed table with the diagnoses. It must be the one that was sealed."""
-    from study.workflows.lab_kit import score_kit, score_lines
+    """Compare the revealed table with the diagnoses. It must be the one that was sealed.
 
-    for line in score_lines(score_kit(labels, diagnoses, out)):
+    Without --seal its hash is compared only with the file beside it. A recording without a diagnosis is not right.
+    """
+    from study.workflows.score_kit import score_kit, score_lines
+
+    for line in score_lines(score_kit(labels, diagnoses, out, seal)):
         typer.echo(line)
