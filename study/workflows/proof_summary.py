@@ -44,6 +44,8 @@ def remarks(proof: Proof) -> Iterator[str]:
             f"{proof.left_out} cases of the second physics engine were left out: MuJoCo is not installed "
             "(pip install 'hapteq[prove]')."
         )
+    if set(proof.beside) - set(proof.engines):
+        yield f"Follow-ups and controls were answered by another version of the diagnosis ({', '.join(proof.beside)})."
     if len(proof.engines) > 1:
         yield f"The answers come from {len(proof.engines)} versions of the diagnosis: run the bank anew for a figure."
 

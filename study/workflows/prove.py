@@ -10,7 +10,7 @@ from analysis.proof.outcome import Outcome
 from analysis.proof.score import Score, score
 from study.errors import LeftError
 from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
-from study.workflows.follow_up import follow_up
+from study.workflows.follow_up import NEXT, follow_up
 from study.workflows.proof_folder import RECORDING, ProofFolder, opened
 from study.workflows.proof_seals import label_at
 from study.workflows.reveal_cases import engines, reveal_cases
@@ -32,6 +32,9 @@ class Proof:
     outcomes: tuple[Outcome, ...]
     score: Score
     engines: tuple[str, ...]
+    """Digests of the code that answered the bank,"""
+    beside: tuple[str, ...]
+    """and follow-ups and controls."""
     controls: tuple[Controlled, ...]
     followed: tuple[FollowUp, ...]
     left_out: int
@@ -92,6 +95,12 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
             saved=f"All that is sealed and answered so far is in {path}.",
         ) from interruption
     return Proof(
-        folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, set(names)), controls,
+        folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, names), _beside(path), controls,
         followed, plan.cases - len(numbers),
     )  # fmt: skip
+
+
+def _beside(path: Path) -> tuple[str, ...]:
+    folders = [ProofFolder(path / NEXT), *(ProofFolder(one) for one in sorted(path.glob("controls/*")))]
+    found = {digest for one in folders for digest in engines(one, [place.name for place in one.open.glob("*")])}
+    return tuple(sorted(found))

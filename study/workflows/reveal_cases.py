@@ -1,5 +1,6 @@
 """The labels of a bank, opened once its cases are answered: seals are checked, and both become outcomes."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from analysis.diagnosis.document import diagnosis_from_json
@@ -51,7 +52,7 @@ def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
     )
 
 
-def engines(folder: ProofFolder, names: set[str]) -> tuple[str, ...]:
+def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
     """Digests of the code that gave the answers; more than one where it changed on the way."""
     answers = [answer_at(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
     return tuple(sorted({one["engine"] for one in answers if "engine" in one}))

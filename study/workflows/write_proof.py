@@ -70,6 +70,7 @@ def write_proof(proof: Proof) -> None:
         "left_out": proof.left_out,
         "seal": proof.seal,
         "engines": list(proof.engines),
+        "engines_beside": list(proof.beside),
         "commit": at,
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
@@ -101,6 +102,7 @@ def write_table(path: Path, proof: Proof) -> None:
     lines = [
         f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
         f"# commit {answered_at(proof)}, code of the diagnosis {' '.join(proof.engines)}",
+        f"# follow-ups and controls by code {' '.join(proof.beside) or 'none'}",
         f"# seal of the labels {proof.seal}",
         f"# versions {json.dumps(versions())}",
         f"# controls {'; '.join(held) or 'not asked'}",
