@@ -11,7 +11,7 @@ from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.error_table import channel_errors, errors_of
 from analysis.diagnosis.explain import Explanation
-from analysis.diagnosis.findings import Course, Findings, Signature
+from analysis.diagnosis.findings import BlackBox, Course, Findings, Signature
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import without_claim
 from analysis.diagnosis.impact_remainder import impact_remainder
@@ -52,9 +52,7 @@ def assembled(
     maps, courses = maps_of(measure, found, floors, learned), _courses(measure, found, names)
     local = localised(measure, tuning, found, floors, maps.cells)
     proposal = _proposal(arena, found, judged)
-    document = replace(
-        _document(arena, found, judged, maps, local), next_experiment=None if proposal is None else proposal.document
-    )
+    document = _document(arena, found, judged, (maps, local), proposal)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
@@ -68,9 +66,7 @@ def assembled(
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
         signatures=_signatures(arena, found, said),
-        black_box=None
-        if found.statistic is not None
-        else black_box(measure, found.retuned, max(len(fitted.hypothesis.point), 1), document.fit.test.after),
+        black_box=_black_box(measure, found, document),
         remarks=_remarks(learned_sentence(learned, channels), *unit_sentences(courses), *_of_noise(floors)),
         maps=maps.cells,
         local=local,
@@ -80,6 +76,13 @@ def assembled(
         proposal=proposal,
         split_s=_split_s(measure),
     )
+
+
+def _black_box(measure: ErrorMeasure, found: Explanation, document: Diagnosis) -> BlackBox | None:
+    if found.statistic is not None:
+        return None
+    numbers = max(len(found.after.fitted.hypothesis.point), 1)
+    return black_box(measure, found.retuned, numbers, document.fit.test.after)
 
 
 def _of_noise(floors: tuple[NoiseFloor, ...]) -> list[str]:
@@ -99,8 +102,11 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
     }
 
 
-def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps, local: Localisation) -> Diagnosis:
+def _document(
+    arena: Arena, found: Explanation, judged: Judgement, looked: tuple[Maps, Localisation], proposal: Proposal | None
+) -> Diagnosis:
     measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
+    maps, local = looked
     said = said_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
@@ -115,7 +121,7 @@ def _document(arena: Arena, found: Explanation, judged: Judgement, maps: Maps, l
         or whole_mismatch(measure, found.after),
         fit=errors_of(measure, found),
         error=measure.name,
-        next_experiment=None,
+        next_experiment=None if proposal is None else proposal.document,
     )
 
 

@@ -1,6 +1,6 @@
 """A bank of concealed physics from start to end: sealed, answered by processes that know nothing, revealed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,20 +57,7 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
     try:
         seal = seal_cases(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = sealed_names(folder, numbers)
-        for number, name in zip(numbers, names, strict=True):
-            if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
-                redrawn(folder.open / name, plan, label_at(folder.label(number)))
-        done = sum(is_answered(folder.open / name) for name in names)
-        on_progress("diagnosing", done, len(names))
-
-        def on_answered(name: str) -> None:
-            nonlocal done
-            done += 1
-            if not wishes.keep:
-                forget_recording(folder.open / name)
-            on_progress("diagnosing", done, len(names))
-
-        ask_engine(folder, names, wishes.workers, on_answered)
+        _answered(folder, plan, wishes, dict(zip(names, numbers, strict=True)), on_progress)
         outcomes = reveal_cases(folder, plan.cases)
         followed = follow_up(
             folder,
@@ -79,14 +66,7 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
             (wishes.workers, wishes.keep),
             lambda done, of: on_progress("following up", done, of),
         )
-        controls: tuple[Controlled, ...] = ()
-        for turn in range(CONTROL_TURNS if wishes.controls else 0):
-            controls += run_controls(
-                path / "controls" / str(plan.seed + turn),
-                plan.seed + turn,
-                wishes.workers,
-                lambda done, of: on_progress("controls", done, of),
-            )
+        controls = _controls(path, plan, wishes, on_progress)
     except KeyboardInterrupt as interruption:
         raise LeftError(
             "Interrupted",
@@ -104,3 +84,31 @@ def _beside(path: Path) -> tuple[str, ...]:
     folders = [ProofFolder(path / NEXT), *(ProofFolder(one) for one in sorted(path.glob("controls/*")))]
     found = {digest for one in folders for digest in engines(one, [place.name for place in one.open.glob("*")])}
     return tuple(sorted(found))
+
+
+def _answered(
+    folder: ProofFolder, plan: BankPlan, wishes: Wishes, numbers: Mapping[str, int], on_progress: Progress
+) -> None:
+    """numbers: by the names of the cases."""
+    for name, number in numbers.items():
+        if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
+            redrawn(folder.open / name, plan, label_at(folder.label(number)))
+    done = sum(is_answered(folder.open / name) for name in numbers)
+    on_progress("diagnosing", done, len(numbers))
+
+    def on_answered(name: str) -> None:
+        nonlocal done
+        done += 1
+        if not wishes.keep:
+            forget_recording(folder.open / name)
+        on_progress("diagnosing", done, len(numbers))
+
+    ask_engine(folder, tuple(numbers), wishes.workers, on_answered)
+
+
+def _controls(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> tuple[Controlled, ...]:
+    found: tuple[Controlled, ...] = ()
+    for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if wishes.controls else ():
+        there = path / "controls" / str(seed)
+        found += run_controls(there, seed, wishes.workers, lambda done, of: on_progress("controls", done, of))
+    return found
