@@ -20,17 +20,10 @@ from study.store.provenance import Provenance, gather_provenance
 from study.store.recording_file import read_recording
 from study.store.text_file import write_text
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
+from study.workflows.analysis_files import written_by_analysis
 from study.workflows.collect_sessions import Collected, collect_sessions
 from study.workflows.picture_files import write_pictures
 from study.workflows.written_analysis import WrittenAnalysis
-
-ANALYSIS_NAME = "analysis"
-"""Where an analysis goes, in the folder that was analysed, if nobody says otherwise."""
-
-OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
-"""Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""
-
-OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, "anova.json", "report.html")
 
 
 def analyze_data(
@@ -97,13 +90,6 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
             "Give a recording made with: hapteq record ellipsoid",
             saved="Nothing was written.",
         ) from problem
-
-
-def written_by_analysis(out: Path) -> tuple[Path, ...]:
-    """The files in `out` that an analysis writes, as far as they are there."""
-    figures = [path for name in OURS for kind in ("svg", "png") for path in (out / "figures").glob(f"{name}.{kind}")]
-    tables = [out / name for name in OUR_FILES if (out / name).is_file()]
-    return (*tables, *figures)
 
 
 def sensor_frame(recording: Recording) -> FloatArray | None:

@@ -10,7 +10,7 @@ from study.store.json_document import write_json
 from study.store.provenance import gather_provenance
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.trials_file import TRIALS_NAME, write_trials
-from study.workflows.analyze_data import ANALYSIS_NAME, analyze_data
+from study.workflows.analysis_files import ANALYSIS_NAME
 from study.workflows.fold_session import fold_session
 from study.workflows.written_analysis import WrittenAnalysis
 
@@ -33,6 +33,9 @@ def write_tables(folder: SessionFolder) -> SessionState:
 
 def write_results(folder: SessionFolder) -> WrittenAnalysis:
     """The tables, and the analysis of this session alone beside them."""
+    # Statistics and plots take longer to load than all else; nobody who begins or checks a session waits for them.
+    from study.workflows.analyze_data import analyze_data
+
     write_tables(folder)
     return analyze_data(folder.path, folder.path / ANALYSIS_NAME)
 

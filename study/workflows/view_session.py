@@ -1,8 +1,8 @@
 """One session looked at: facts, thresholds, staircases and its log in words. Reads only, and never fails for damage."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from analysis.study_analysis import StudyAnalysis, analyse_study
 from analysis.thresholds import Threshold
 from analysis.wording import NONE, number
 from protocols.schedule import Run
@@ -14,10 +14,13 @@ from study.session.printable import printable
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import readable_events
-from study.workflows.analyze_data import ANALYSIS_NAME
+from study.workflows.analysis_files import ANALYSIS_NAME
 from study.workflows.fold_session import FoldedSession, fold_session
 from study.workflows.session_facts import session_facts
 from study.workflows.session_line import line_of, session_line, with_writer
+
+if TYPE_CHECKING:
+    from analysis.study_analysis import StudyAnalysis
 
 THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "turns", "trials", "right", "remark")
 
@@ -67,14 +70,17 @@ def _bare(
     return SessionView(line, facts, (), notes, (), events, _report(folder), _figures(folder))
 
 
-def _analysis(state: SessionState) -> tuple[StudyAnalysis | None, tuple[str, ...]]:
+def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
+    # Statistics load slowly, and the engine, which looks at sessions too, begins at once.
+    from analysis.study_analysis import analyse_study
+
     try:
         return analyse_study(state.trials, state.protocol), ()
     except ValueError as problem:
         return None, (f"No thresholds: {problem}.",)
 
 
-def _threshold_rows(state: SessionState, analysis: StudyAnalysis | None) -> tuple[tuple[str, ...], ...]:
+def _threshold_rows(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[tuple[str, ...], ...]:
     rows = (*analysis.thresholds, *analysis.detection) if analysis else ()
     if not any(row.complete for row in rows):
         return ()
@@ -99,7 +105,7 @@ def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
     )
 
 
-def _staircases(state: SessionState, analysis: StudyAnalysis | None) -> tuple[Staircase, ...]:
+def _staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
     rows = {row.run: row for row in (*analysis.thresholds, *analysis.detection)} if analysis else {}
     begun = (run for run in state.runs if not run.practice)
     drawn = (_staircase(state, run, rows.get(run.index)) for run in begun)

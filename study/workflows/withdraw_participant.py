@@ -12,7 +12,7 @@ from study.store.archive import TOMBSTONE_NAME, SessionFolder, session_folders
 from study.store.event_log import nobody_writes
 from study.store.json_document import write_json
 from study.store.session_lock import LOCK_NAME, locked
-from study.workflows.analyze_data import ANALYSIS_NAME, written_by_analysis
+from study.workflows.analysis_files import ANALYSIS_NAME, written_by_analysis
 from study.workflows.participant_number import TOMBSTONE_FORMAT, TOMBSTONE_VERSION, begun_in
 
 

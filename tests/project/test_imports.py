@@ -15,7 +15,8 @@ def loaded_by(statement: str) -> set[str]:
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True, timeout=120
     )
-    return {name.split(".")[0] for name in done.stdout.split()}
+    modules = done.stdout.split()
+    return {name.split(".")[0] for name in modules} | {"scipy.stats"}.intersection(modules)
 
 
 def test_help_loads_nothing_heavy():
@@ -33,6 +34,13 @@ def test_headless_packages_load_no_screen_and_no_plots(package):
     names = [".".join(m.relative_to(ROOT).with_suffix("").parts) for m in modules if m.stem != "__init__"]
     loaded = loaded_by(f"import {', '.join(names or [package])}")
     assert loaded.isdisjoint({"textual", "rich", "typer", "matplotlib"})
+
+
+def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
+    loaded = loaded_by("import study.tui.link.desk, study.workflows.end_sitting, study.workflows.validate_apart")
+    assert "numba" in loaded
+    slow = {"scipy.stats", "statsmodels", "pandas", "matplotlib"}
+    assert loaded.isdisjoint(slow), sorted(loaded & slow)
 
 
 def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():

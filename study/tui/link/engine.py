@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.trial_recordings")
 """Loaded while somebody still types a code, so that beginning is quick."""
 
+NEEDED_AT_THE_END = ("study.workflows.analyze_data",)
+"""Statistics and plots: loaded after them, if there is still time, so that the results are quick."""
+
 LAST_RESORT_S = 5.0
 """The device was stopped long before."""
 
@@ -62,7 +65,7 @@ class Engine:
         return self._link.next_command()
 
     def _warm_up(self) -> None:
-        for name in ("study.tui.link.desk", *NEEDED_FOR_A_SESSION):
+        for name in ("study.tui.link.desk", *NEEDED_FOR_A_SESSION, *NEEDED_AT_THE_END):
             if not self._link.command_waits:
                 import_module(name)
 

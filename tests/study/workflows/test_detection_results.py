@@ -7,7 +7,8 @@ import pytest
 
 from protocols.loading import load_protocol
 from study.store.thresholds_file import read_thresholds
-from study.workflows.analyze_data import analyze_data, written_by_analysis
+from study.workflows.analysis_files import written_by_analysis
+from study.workflows.analyze_data import analyze_data
 from study.workflows.session_results import write_results
 from study.workflows.validate import validate_file
 
