@@ -16,7 +16,11 @@ Outcome = Literal["no_mismatch", "parameters", "explained", "partly_explained", 
 
 
 class RealAnswerError(ValueError):
-    """A document that is no such answer."""
+    """A document that is no such answer. `problems`: one sentence each."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -147,7 +151,8 @@ def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        raise RealAnswerError(str(error)) from error
+        wrong = tuple(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        raise RealAnswerError(wrong) from error
 
 
 def real_answer_schema() -> dict[str, Any]:

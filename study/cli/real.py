@@ -18,7 +18,10 @@ def real(
         typer.Option(min=1.0, help="Processor time for a sub-folder: a search that is not done by then ends there."),
     ] = 180.0,
     inject: Annotated[
-        int, typer.Option(min=0, help="So many faults of sensor or clock are injected under a seal, and looked for.")
+        int,
+        typer.Option(
+            min=0, max=10_000, help="So many faults of sensor or clock are injected under a seal, and looked for."
+        ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Of the draws of these faults.")] = 1,
     as_json: JsonOption = False,

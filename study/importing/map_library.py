@@ -28,6 +28,7 @@ class MapFile:
     name: str
     map: ImportMap
     text: str
+    path: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +53,9 @@ def shipped_maps() -> tuple[str, ...]:
 def read_map(name: str) -> MapFile:
     """A shipped map by its name, or any by its path. Raises WrongUseError, CannotReadError, UnusableFileError."""
     if name in shipped_maps():
-        text = resources("study.importing").joinpath("maps").joinpath(f"{name}.toml").read_text("utf-8")
-        return MapFile(name, parse_map(text, Path(f"{name}.toml")), text)
+        shipped = resources("study.importing").joinpath("maps").joinpath(f"{name}.toml")
+        text = shipped.read_text("utf-8")
+        return MapFile(name, parse_map(text, Path(f"{name}.toml")), text, Path(str(shipped)))
     path = Path(name)
     if path.suffix != ".toml" and not path.exists():
         raise WrongUseError(
@@ -63,7 +65,7 @@ def read_map(name: str) -> MapFile:
             "Give the name of one of them, or the path of a map of yours.",
         )
     text = read_text(path)
-    return MapFile(path.stem, parse_map(text, path), text)
+    return MapFile(path.stem, parse_map(text, path), text, path)
 
 
 def find_map(folder: Path) -> tuple[FoundMap, ...]:

@@ -91,6 +91,8 @@ def _why_not_written(path: Path, problem: OSError) -> tuple[str, str]:
             return f"You have no right to write in {path.parent}", "Choose another folder."
         case errno.ENOENT | errno.ENOTDIR:
             return f"There is no folder {path.parent}", "Make the folder first, or choose another."
+        case errno.EEXIST:
+            return f"{path} is there, and is no folder", "Choose another name for the folder."
         case errno.EISDIR:
             return f"{path} is a folder", "Choose a name for a file."
     return f"The system says: {problem.strerror or problem}", "Choose another folder, or mend this and do it again."

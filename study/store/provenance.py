@@ -31,6 +31,8 @@ class Provenance:
     """As typed, paths cut down to file names."""
     protocol_hash: str | None = None
     seeds: Mapping[str, int] | None = None
+    settings: Mapping[str, float] | None = None
+    """Options that the result hangs on, as they held, typed or not."""
     parents: tuple[Parent, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -42,7 +44,11 @@ class Provenance:
 
 
 def gather_provenance(
-    *, protocol_hash: str | None = None, seeds: Mapping[str, int] | None = None, parents: Sequence[Path] = ()
+    *,
+    protocol_hash: str | None = None,
+    seeds: Mapping[str, int] | None = None,
+    settings: Mapping[str, float] | None = None,
+    parents: Sequence[Path] = (),
 ) -> Provenance:
     """Of the running program. Raises CannotReadError where a parent is not there."""
     return Provenance(
@@ -50,6 +56,7 @@ def gather_provenance(
         command=command_line(sys.argv),
         protocol_hash=protocol_hash,
         seeds=seeds,
+        settings=settings,
         parents=tuple(Parent(path.name, sha256_of(path)) for path in parents),
     )
 

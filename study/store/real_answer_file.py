@@ -18,12 +18,17 @@ from study.store.provenance import Provenance
 
 def read_real_answer(path: Path) -> RealAnswer:
     """Raises CannotReadError, UnusableFileError."""
+    return read_answer_and_origin(path)[0]
+
+
+def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
+    """With its provenance as it stands there; empty where it has none. Raises CannotReadError, UnusableFileError."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
-    document.pop("provenance", None)
+    origin = document.pop("provenance", None)
     try:
-        return real_answer_from_json(document)
+        return real_answer_from_json(document), origin if isinstance(origin, dict) else {}
     except RealAnswerError as error:
-        raise UnusableFileError(path, "answer to a real recording", (str(error),)) from error
+        raise UnusableFileError(path, "answer to a real recording", error.problems) from error
 
 
 def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:

@@ -48,7 +48,7 @@ class _Read:
 
 def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progress) -> RealDiagnosis:
     """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
-    parents = wanted.found.files if wanted.before is None else (*wanted.found.files, *wanted.before.files)
+    parents = wanted.parents
     try:
         read = _read(wanted, on_progress)
         settings = DiagnosisSettings(

@@ -31,8 +31,27 @@ class RealRecording:
 
     def model(self) -> MechanicalModel | None:
         """None where a linear one is to be fitted. Raises StudyError."""
+        path = self._model_path()
+        return None if path is None else read_mechanical_model(path)
+
+    @property
+    def parents(self) -> tuple[Path, ...]:
+        """Files that the diagnosis is made from: recordings, map, and the model where one is there."""
+        before = () if self.before is None else self.before.files
+        try:
+            model = self._model_path()
+        except StudyError:
+            model = None
+        return (*self.found.files, *before, self.found.source.path, *(() if model is None else (model,)))
+
+    @property
+    def tested_on(self) -> tuple[Path, ...]:
+        """Files of the recordings that are only predicted, and their maps."""
+        return tuple(path for one in self.tests for path in (*one.files, one.source.path))
+
+    def _model_path(self) -> Path | None:
         wanted = self.found.source.map.diagnosis.model
-        return read_mechanical_model(model_for(wanted, self.folder)) if wanted else None
+        return model_for(wanted, self.folder) if wanted else None
 
 
 @dataclass(frozen=True, slots=True)

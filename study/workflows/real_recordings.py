@@ -1,6 +1,9 @@
 """`hapteq real`: all recordings of a folder, one after the other. Answers that are there already are kept."""
 
-from collections.abc import Callable, Sequence
+import errno
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
@@ -8,19 +11,26 @@ from time import process_time
 from analysis.diagnosis.real_answer import RealAnswer
 from analysis.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
-from study.errors import LeftError
+from study.errors import LeftError, StudyError, WrongUseError
 from study.store.file_errors import CannotWriteError
 from study.store.mechanical_model_file import write_mechanical_model
 from study.store.new_folder import new_folder
-from study.store.provenance import gather_provenance
-from study.store.real_answer_file import read_real_answer, write_real_answer
+from study.store.provenance import Provenance
+from study.store.real_answer_file import write_real_answer
 from study.workflows.diagnose_real import RealDiagnosis, diagnose_real, retuned_model
 from study.workflows.inject_real import carriers, injected_outcomes
+from study.workflows.kept_answers import (
+    ANSWER_NAME,
+    INJECTED_NAME,
+    answer_place,
+    kept_answers,
+    origin_of_answer,
+)
 from study.workflows.real_folder import RealFolder, RealRecording, read_real_folder
 from study.workflows.write_diagnosis import write_diagnosis_into
-from study.workflows.write_real import RealResults, WrittenReal, write_real
+from study.workflows.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 
-ANSWER_NAME, RETUNED_NAME, INJECTED_NAME = "answer.json", "retuned.toml", "injected"
+RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
 """Share of the work that is done when faults begin to be injected."""
 SECONDS = 180.0
@@ -45,14 +55,12 @@ class RealPlan:
 
 def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None = None) -> WrittenReal:
     """`on_progress(what is being done, share)`. Interrupted (LeftError), the same call goes on. Raises StudyError."""
-    found = read_real_folder(plan.folder)
+    found = _found(plan)
     time = clock or RealClock()
+    kept = kept_answers(plan.out, found.recordings, plan.seconds)
+    _make_writable(plan.out)
     try:
-        plan.out.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise CannotWriteError(plan.out, problem) from problem
-    try:
-        answers = _answers(plan, found, on_progress, time)
+        answers = _answers(plan, found, kept, on_progress, time)
         injected = _injected(plan, found, answers, on_progress)
         on_progress("writing the page", 0.98)
         return write_real(plan.out, RealResults(answers, found.troubles, injected), time.utc())
@@ -63,6 +71,36 @@ def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None =
             "Run the same command again: it goes on where it stopped.",
             saved=f"What was answered so far is in {plan.out}.",
         ) from interruption
+
+
+def _found(plan: RealPlan) -> RealFolder:
+    """Raises StudyError where there is nothing to diagnose, or no time for it."""
+    if not math.isfinite(plan.seconds):
+        raise WrongUseError(
+            "That is no number of seconds",
+            f"--seconds is {plan.seconds}.",
+            f"Give a number of 1 or more, such as {SECONDS:g}.",
+            saved="Nothing was written.",
+        )
+    found = read_real_folder(plan.folder)
+    if found.recordings:
+        return found
+    raise StudyError(
+        "There is no recording to diagnose",
+        " ".join(f"{one.where}: {one.why}" for one in found.troubles),
+        "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
+        saved="Nothing was written.",
+    )
+
+
+def _make_writable(out: Path) -> None:
+    """What cannot be written is said before the work, not after it. Raises CannotWriteError."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(out, problem) from problem
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise CannotWriteError(out / PAGE_NAME, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
 def _injected(
@@ -80,7 +118,9 @@ def _injected(
     return injected_outcomes(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show)
 
 
-def _answers(plan: RealPlan, found: RealFolder, on_progress: Progress, clock: Clock) -> tuple[RealAnswer, ...]:
+def _answers(
+    plan: RealPlan, found: RealFolder, kept: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
+) -> tuple[RealAnswer, ...]:
     answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
     left = dict.fromkeys((one.folder.name for one in found.recordings), plan.seconds)
     for number, one in enumerate(found.recordings):
@@ -91,25 +131,22 @@ def _answers(plan: RealPlan, found: RealFolder, on_progress: Progress, clock: Cl
         def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
             on_progress(f"{one.folder.name}, {one.name}: {what}", end * (number + min(share, 1.0)) / count)
 
-        answers.append(_answer(plan.out, one, budget, show, clock))
+        there = kept.get(answer_place(plan.out, one))
+        answers.append(there or _answer(plan, one, budget, show, clock))
         left[one.folder.name] -= process_time() - begun
     return tuple(answers)
 
 
-def _answer(out: Path, one: RealRecording, seconds: float, on_progress: Progress, clock: Clock) -> RealAnswer:
-    """seconds: of processor time, that the search may take."""
-    folder = out / one.folder.name / one.name
-    kept = folder / ANSWER_NAME
-    if kept.is_file():
-        return read_real_answer(kept)
+def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Progress, clock: Clock) -> RealAnswer:
+    """budget_s: of processor time, that the search may take."""
     begun_s, worked = clock.now_s(), process_time()
-    done = diagnose_real(one, lambda: process_time() - worked < seconds, on_progress)
+    done = diagnose_real(one, lambda: process_time() - worked < budget_s, on_progress)
     answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
-    _write(folder, replace(done, answer=answer))
+    _write(answer_place(plan.out, one), replace(done, answer=answer), origin_of_answer(one, plan.seconds))
     return answer
 
 
-def _write(folder: Path, done: RealDiagnosis) -> None:
+def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
     """Whole or not at all."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -119,4 +156,4 @@ def _write(folder: Path, done: RealDiagnosis) -> None:
         if done.findings is not None:
             write_diagnosis_into(part, done.findings, done.parents)
             write_mechanical_model(part / RETUNED_NAME, retuned_model(done.findings))
-        write_real_answer(part / ANSWER_NAME, done.answer, gather_provenance(parents=done.parents))
+        write_real_answer(part / ANSWER_NAME, done.answer, origin)
