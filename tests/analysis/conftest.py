@@ -133,7 +133,7 @@ def rule() -> StaircaseRule:
     return PUBLISHED
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def protocol() -> StudyProtocol:
     return StudyProtocol(
         name="direction_threshold",
@@ -161,7 +161,7 @@ def answered() -> Callable[..., list[Trial]]:
     return answered_run
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def simulate_study() -> Callable[..., list[Trial]]:
     """A whole study: thresholds rise with frequency; people differ by a factor."""
 

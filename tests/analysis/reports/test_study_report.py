@@ -74,6 +74,16 @@ def report(protocol):
     return render
 
 
+@pytest.fixture
+def words(protocol):
+    """The page without its figures, which take longer to draw than all else, for tests of what it says."""
+
+    def render(trials, protocol=protocol) -> str:
+        return render_study_report(analyse_study(trials, protocol), (), {}, "2026-01-02T03:04:05Z")
+
+    return render
+
+
 def test_a_full_study_is_one_page_that_needs_nothing_else(report, simulate_study):
     html = report(simulate_study(subjects=3), (ellipsoid(),))
     structure = parsed(html)
@@ -108,14 +118,14 @@ def test_the_page_follows_the_reader_into_the_dark_and_onto_paper(report):
     ("felt", "banner"),
     [(None, "Simulated participants: no person took part."), (False, "Nothing was felt: people answered while")],
 )
-def test_what_is_no_measurement_of_people_says_so_in_a_banner(report, simulate_study, felt, banner):
-    html = report(simulate_study(subjects=1, felt=felt))
+def test_what_is_no_measurement_of_people_says_so_in_a_banner(words, simulate_study, felt, banner):
+    html = words(simulate_study(subjects=1, felt=felt))
     assert banner in html
     assert 'class="banner"' in html
 
 
-def test_people_need_no_banner(report, simulate_study):
-    assert 'class="banner"' not in report(simulate_study(subjects=1, felt=True))
+def test_people_need_no_banner(words, simulate_study):
+    assert 'class="banner"' not in words(simulate_study(subjects=1, felt=True))
 
 
 def test_nothing_usable_is_said(report):
@@ -126,16 +136,16 @@ def test_nothing_usable_is_said(report):
     assert "<table>" not in html
 
 
-def test_one_participant_is_told_what_cannot_be_computed(report, simulate_study):
-    html = report(simulate_study(subjects=1, felt=True))
+def test_one_participant_is_told_what_cannot_be_computed(words, simulate_study):
+    html = words(simulate_study(subjects=1, felt=True))
     assert "1 participant, 5 runs, 5 of them complete" in html
     assert "Every group holds a single value" in html
     assert "needs two who have every condition; there are 1" in html
     assert "not computed" in html
 
 
-def test_a_clean_study_says_that_nothing_stands_out(report, simulate_study):
-    html = report(simulate_study(subjects=5, true_n=(0.4,) * 5, seed=2, felt=True))
+def test_a_clean_study_says_that_nothing_stands_out(words, simulate_study):
+    html = words(simulate_study(subjects=5, true_n=(0.4,) * 5, seed=2, felt=True))
     assert "Nothing stands out" in html
 
 
@@ -150,8 +160,8 @@ def test_detection_catch_trials_and_practice_have_sections(report, everything, f
     assert not re.search(r"\b(nan|inf|None)\b", html)
 
 
-def test_without_such_trials_there_is_no_such_section(report, simulate_study, full_protocol):
-    html = report(simulate_study(subjects=2), protocol=full_protocol)
+def test_without_such_trials_there_is_no_such_section(words, simulate_study, full_protocol):
+    html = words(simulate_study(subjects=2), protocol=full_protocol)
     assert not any(section in html for section in SIDE_SECTIONS)
 
 
@@ -177,8 +187,8 @@ def test_practice_says_how_it_ended(everything, full_protocol, answers, outcome)
     assert row[-1] == outcome
 
 
-def test_lower_bounds_are_marked_in_the_table(report, simulate_study):
-    assert "<td>≥ 2." in report(simulate_study(subjects=1, true_n=(0.4, 0.4, 0.4, 0.4, float("inf"))))
+def test_lower_bounds_are_marked_in_the_table(words, simulate_study):
+    assert "<td>≥ 2." in words(simulate_study(subjects=1, true_n=(0.4, 0.4, 0.4, 0.4, float("inf"))))
 
 
 def test_no_number_is_ever_nan(report, simulate_study):
