@@ -70,6 +70,11 @@ def test_a_broken_file_is_named(tmp_path, name):
         ("validate", "a_file", "nowhere", "/dev/null"),
         ("withdraw", "a_file", "--yes"),
         ("resume", "a_file"),
+        ("real", "a_file", "--out", "found"),
+        ("real", "nowhere", "--out", "a_file"),
+        ("kit", "draw", "--out", "a_file"),
+        ("kit", "seal", "a_file"),
+        ("kit", "score", "a_file", "--diagnoses", "nowhere", "--out", "score.csv"),
     ],
     ids=" ".join,
 )
@@ -119,6 +124,14 @@ def test_no_input_at_all_leaves_at_once(tmp_path, small_file):
     assert "0 answers are on disk." in done.stderr
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory) -> None:
+    """Compiled code is on disk before a limit on files holds: it is no part of the session."""
+    folder = tmp_path_factory.mktemp("compiled")
+    assert hapteq("record", "ellipsoid", "--out", folder / "warm.h5", cwd=folder).returncode == 0
+
+
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("size_kib", [8, 30])
 def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_goes_on(tmp_path, small_file, size_kib):
     """A limit on the size of one file stands for a full disk: with 8 KiB recordings fail first, with 30 KiB the log."""
@@ -128,8 +141,6 @@ def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_goe
         "from study.cli.main import main; sys.exit(main(sys.argv[1:]))"
     )
     arguments = ["study", "--observer", "scripted", "--protocol", str(small_file), "--data", str(tmp_path / "d")]
-    # Compiled code is on disk before the limit holds: it is no part of the session.
-    assert hapteq("record", "ellipsoid", "--out", tmp_path / "warm.h5", cwd=tmp_path).returncode == 0
     done = subprocess.run(
         [sys.executable, "-c", script, *arguments],
         capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": PATHS},
