@@ -5,6 +5,8 @@ from pathlib import Path
 
 from study.errors import StudyError
 
+CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
+
 
 class UnusableFileError(StudyError):
     """A file that was read and is not what it should be.
@@ -12,14 +14,14 @@ class UnusableFileError(StudyError):
     `problems`: one each, without a full stop; `sentences`: the same, ready to be shown.
     """
 
-    def __init__(self, path: Path, kind: str, problems: tuple[str, ...]) -> None:
+    def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = CHECKED) -> None:
         self.kind = kind
         self.problems = problems
         self.sentences = tuple(_sentence(problem) for problem in problems)
         super().__init__(
             title=f"{path.name} is not a usable {kind}",
             happened=" ".join(self.sentences),
-            do_now="Correct it, or make it again; `hapteq validate` checks it.",
+            do_now=do_now,
         )
 
 

@@ -14,6 +14,7 @@ from study.store.provenance import sha256_of
 from study.store.text_file import read_text, write_text
 
 SEAL_SUFFIX = ".sha256"
+CORRECT = "Correct it before it is sealed; from then on nothing in it may be changed."
 
 
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
@@ -34,7 +35,7 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     try:
         labels = rows_from_csv(read_text(path), Label)
     except CsvError as error:
-        raise UnusableFileError(path, "table of labels", error.problems) from error
+        raise UnusableFileError(path, "table of labels", error.problems, CORRECT) from error
     problems = [
         f"{one.recording}: '{one.change}' is no change of the kit{nearest(one.change, tuple(CHANGES_BY_NAME))}"
         for one in labels
@@ -43,7 +44,7 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     names = [one.recording for one in labels]
     problems += [f"{name} is there twice" for name in sorted({one for one in names if names.count(one) > 1})]
     if problems or not labels:
-        raise UnusableFileError(path, "table of labels", tuple(problems) or ("it holds no recording",))
+        raise UnusableFileError(path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT)
     return labels
 
 

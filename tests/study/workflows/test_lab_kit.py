@@ -36,6 +36,7 @@ def test_a_table_of_something_else_is_refused(tmp_path: Path) -> None:
         read_labels(table)
     assert "'added_masss' is no change of the kit" in str(refusal.value)
     assert "rec_01 is there twice" in str(refusal.value)
+    assert refusal.value.do_now.startswith("Correct it before it is sealed")
 
 
 def test_a_table_with_its_seal_keeps_it(tmp_path: Path) -> None:
