@@ -98,14 +98,15 @@ def write_table(path: Path, proof: Proof) -> None:
     figures = [FigureRow(one.name, one.value, one.low, one.high, one.of) for one in proof.score.figures]
     named = sum(part.of for part in calibration.bins)
     figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
-    held = [f"{one.name}: {'held' if one.held else 'did not hold'}" for one in proof.controls]
+    failed = [one.name for one in proof.controls if not one.held]
+    held = f"{len(proof.controls) - len(failed)} of {len(proof.controls)} held" if proof.controls else "not asked"
     lines = [
         f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
         f"# commit {answered_at(proof)}, code of the diagnosis {' '.join(proof.engines)}",
         f"# follow-ups and controls by code {' '.join(proof.beside) or 'none'}",
         f"# seal of the labels {proof.seal}",
         f"# versions {json.dumps(versions())}",
-        f"# controls {'; '.join(held) or 'not asked'}",
+        f"# controls {', not '.join((held, *failed))}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
     misses = [_row(one, True) for one in proof.score.misses]
