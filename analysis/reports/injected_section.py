@@ -35,8 +35,8 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
             "Half of a recording was left as it is, and served as the clean one; into the other half a fault of the "
             "sensor or the clock was put, drawn and sealed beforehand. The diagnosis was given the model that knows "
             "what is really there, both halves, and nothing else.",
-            f"A fault is detectable where it makes that model's error {DETECTABLE} times as large or more, also once the "
-            "model's own numbers are re-tuned within their tolerances.",
+            f"A fault is detectable where it makes that model's error {DETECTABLE} times as large or more, also once "
+            "the model's own numbers are re-tuned within their tolerances.",
         ),
         tables=(rates, listed) if missed else (rates,),
     )

@@ -25,18 +25,21 @@ from study.errors import StudyError
 from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
 from study.store.provenance import sha256_of
 from study.store.recording_file import write_recording
-from study.store.text_file import read_text, write_text
-from study.workflows.ask_engine import ask_engine
+from study.store.text_file import write_text
+from study.workflows.answer_cases import others_sha256
+from study.workflows.ask_engine import ask_engine, is_answered
 from study.workflows.diagnose_real import imported
-from study.workflows.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, opened
+from study.workflows.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, opened
+from study.workflows.proof_seals import answer_at, broken_seal, is_of, label_at, seal
 from study.workflows.real_folder import RealRecording
+from study.workflows.seal_cases import settings_text
 
 MOST_SAMPLES, LEAD = 10_000, 8_000
 """Of each half of a recording, and that are played before it."""
 NOTHING = 1 / 6
 """Share of draws into which nothing is injected."""
-SECONDS = 60.0
-"""For the search of one case."""
+PROCESSOR_S = 180.0
+"""For the search of one case: real recordings take longer than a bank's."""
 BY_FORCES = "predicted force"
 
 
@@ -120,15 +123,14 @@ def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int,
             saved="The diagnoses are written.",
         )
     names = [_sealed(folder, carried, number, seed) for number in range(count)]
-    lines = (f"{sha256_of(path)}  sealed/{path.name}\n" for path in sorted(folder.sealed.glob("*.json")))
-    write_text(folder.seals, "".join(lines), overwrite=True)
+    seal(folder)
     return tuple(names)
 
 
 def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: int) -> str:
     label = folder.label(number)
     if label.exists():
-        return str(json.loads(read_text(label))["name"])
+        return str(label_at(label)["name"])
     random = np.random.default_rng([seed, number])
     carrier = carried[int(random.integers(len(carried)))]
     effects = fitting_injections(carrier.rest)
@@ -141,7 +143,7 @@ def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: 
     write_recording(place / RECORDING, _nameless(without_lead(done.recording)), precision="float64")
     write_recording(place / CLEAN / RECORDING, _nameless(carrier.sound), precision="float64")
     write_mechanical_model(place / MODEL, carrier.model)
-    write_text(place / SETTINGS, json.dumps({"without": [], "seconds": SECONDS}) + "\n")
+    write_text(place / SETTINGS, settings_text((), PROCESSOR_S))
     said = {
         "name": name,
         "number": number,
@@ -153,6 +155,8 @@ def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: 
         "adds": adds,
         "adds_as_it_is": as_it_is,
         "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "others_sha256": others_sha256(place),
         "salt": secrets.token_hex(16),
     }
     write_text(label, json.dumps(said, indent=1, allow_nan=False) + "\n")
@@ -193,7 +197,7 @@ def injected_outcomes(
     count, seed = draws
     folder = opened(path, seed, False)
     names = seal_injections(folder, carried, count, seed)
-    answered = sum((folder.open / name / ANSWER).exists() for name in names)
+    answered = sum(is_answered(folder.open / name) for name in names)
     on_done(answered, count)
 
     def one_more(name: str) -> None:
@@ -202,7 +206,8 @@ def injected_outcomes(
         on_done(answered, count)
 
     ask_engine(folder, names, 2, one_more)
-    return tuple(
-        outcome_of(json.loads(read_text(folder.label(number))), json.loads(read_text(folder.open / name / ANSWER)))
-        for number, name in enumerate(names)
-    )
+    labels = [label_at(folder.label(number)) for number in range(len(names))]
+    answers = [answer_at(folder.open / name) for name in names]
+    if broken := [label["name"] for label, said in zip(labels, answers, strict=True) if not is_of(label, said)]:
+        raise broken_seal(broken, folder.path)
+    return tuple(outcome_of(label, said) for label, said in zip(labels, answers, strict=True))

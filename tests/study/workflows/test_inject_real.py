@@ -11,8 +11,10 @@ from equalizer.effects.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
+from study.errors import StudyError
+from study.store.provenance import sha256_of
 from study.store.recording_file import read_recording
-from study.workflows.inject_real import Carrier, halves, seal_injections, without_lead
+from study.workflows.inject_real import PROCESSOR_S, Carrier, halves, seal_injections, without_lead
 from study.workflows.proof_folder import opened
 
 RATE_HZ, SAMPLES = 500.0, 6000
@@ -86,3 +88,20 @@ def test_what_re_tuning_takes_up_is_not_detectable(carrier, tmp_path: Path):
     taken_up = [one["adds"] / one["adds_as_it_is"] for one in labels if one["adds_as_it_is"] >= 1.25]
     assert taken_up
     assert min(taken_up) < 1.0
+
+
+def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(carrier, tmp_path: Path):
+    folder = opened(tmp_path / "bank", 4, False)
+    (name,) = seal_injections(folder, (carrier,), 1, 4)
+    label, place = json.loads(folder.label(0).read_text()), folder.open / name
+    assert label["model_sha256"] == sha256_of(place / "model.toml")
+    assert label["others_sha256"] == {"clean/recording.h5": sha256_of(place / "clean" / "recording.h5")}
+    assert json.loads((place / "settings.json").read_text()) == {"without": [], "processor_s": PROCESSOR_S}
+
+
+def test_a_label_that_was_changed_breaks_its_seal(carrier, tmp_path: Path):
+    folder = opened(tmp_path / "bank", 4, False)
+    seal_injections(folder, (carrier,), 1, 4)
+    folder.label(0).write_text(folder.label(0).read_text().replace('"strength"', '"strength" '))
+    with pytest.raises(StudyError, match="A seal is broken"):
+        seal_injections(folder, (carrier,), 1, 4)
