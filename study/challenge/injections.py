@@ -169,8 +169,10 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
 
 
 def fitting_injections(recording: Recording) -> tuple[str, ...]:
-    """Names of the faults that the recording can carry: mains hum asks for a rate well above it."""
-    width, rate_hz = recording.response.samples.shape[1], recording.sample_rate_hz
+    """Names of the faults that the recording can carry: mains hum asks for a rate well above it, a tilt for one
+    sensor's three directions, which are called so: three sensors at three places are not turned together."""
+    rate_hz = recording.sample_rate_hz
+    width = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
     hums = rate_hz > 4 * max(MAINS_HZ)
     return tuple(one.effect for one in INJECTIONS if one.axes in (1, width) and (hums or one.effect != "mains_hum"))
 

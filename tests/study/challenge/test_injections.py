@@ -1,5 +1,7 @@
 """Faults put into recordings: each does what it says, by the truth that is kept of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ def recording(channels: int = 3) -> Recording:
     return Recording(
         "rig",
         Signal(random.normal(size=(4000, 1)), RATE_HZ, "force", "N", ("fx",)),
-        Signal(y, RATE_HZ, "acceleration", "m/s^2", tuple("abc"[:channels])),
+        Signal(y, RATE_HZ, "acceleration", "m/s^2", tuple(f"a{axis}" for axis in "xyz"[:channels])),
     )
 
 
@@ -79,6 +81,8 @@ def test_a_lag_delays_a_slow_tone_by_its_time_constant():
 def test_only_faults_that_a_recording_can_carry_are_drawn():
     assert "sensor_misalignment" in fitting_injections(recording(3))
     assert "sensor_misalignment" not in fitting_injections(recording(1))
+    places = replace(recording(3).response, channels=("shaker", "wing tip", "payload"))
+    assert "sensor_misalignment" not in fitting_injections(replace(recording(3), response=places))
     assert reading_of(recording(1)).middle_hz == pytest.approx(7, abs=0.5)
 
 
