@@ -7,7 +7,7 @@ driven axes and what sensors and oscillators sit on; see `mechanical_joint`.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -176,12 +176,12 @@ def packed_mass(mass: FloatArray) -> FloatArray:
     """Unknowns of a mass in the structure's unit. mass: (m, m), positive definite."""
     lower = np.linalg.cholesky(mass)
     np.fill_diagonal(lower, np.log(np.diag(lower)))
-    return np.asarray(lower[np.tril_indices(len(mass))])
+    return np.asarray(lower[_triangle(len(mass))])
 
 
 def packed_square(matrix: FloatArray) -> FloatArray:
     """Likewise of a damping or stiffness: as its root, so that none can feed a motion. matrix: positive definite."""
-    return np.asarray(np.linalg.cholesky(matrix)[np.tril_indices(len(matrix))])
+    return np.asarray(np.linalg.cholesky(matrix)[_triangle(len(matrix))])
 
 
 def begun_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
@@ -205,20 +205,25 @@ def without_mode(structure: Structure, unknowns: FloatArray, number: int) -> tup
 
 def diagonal_places(m: int) -> npt.NDArray[np.intp]:
     """Which of the unknowns of a symmetric matrix stand on its diagonal."""
-    rows, columns = np.tril_indices(m)
+    rows, columns = _triangle(m)
     return np.flatnonzero(rows == columns)
+
+
+@cache
+def _triangle(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    return np.tril_indices(m)  # kept, for a fit asks some ten thousand times
 
 
 def _lower(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
-    lower[np.tril_indices(m)] = unknowns
+    lower[_triangle(m)] = unknowns
     np.fill_diagonal(lower, np.exp(np.diag(lower)))
     return lower
 
 
 def _square(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
-    lower[np.tril_indices(m)] = unknowns
+    lower[_triangle(m)] = unknowns
     return np.asarray(lower @ lower.T)
 
 
