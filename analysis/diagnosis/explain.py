@@ -112,8 +112,7 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
 def _with(arena: Arena, base: Contender, one: Hypothesis) -> Contender:
     """Whatever it gains."""
     start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, one))
-    known = sensitivity_at(arena, start.deviations, start.hypothesis)
-    return arena.contender(fit(arena.measure, arena.tuning, start, known, RETUNING_ROUNDS))
+    return arena.contender(refine(arena, start))
 
 
 def retuned_alone(arena: Arena) -> Fitted:

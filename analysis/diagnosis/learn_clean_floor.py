@@ -50,18 +50,22 @@ class _Lesson:
             for record, one in zip(self.measure.records, self.retuned.fitted.residuals, strict=True)
         )
 
+    @property
+    def signal(self) -> FloatArray:
+        return _signal(self.measure, self.retuned.fitted.residuals)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Learned:
     floor: CleanFloor
     colour: Colour
     share: FloatArray
-    """(c,): what is left without its colour, of the signal that the model foresees."""
+    """(c,): what is left without its colour, of the signal; see `_signal`."""
     sound: SoundRecordings
 
     def beside(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
         """Of recordings to diagnose."""
-        return coloured(measure, self.colour, self.share * _foreseen(measure, measure.residuals(model, ())))
+        return coloured(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
 
 
 def learned_from(
@@ -94,11 +98,14 @@ def require_alike(learned_by: str, error: str) -> None:
 def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> Learned:
     courses = [course for one in lessons for course in one.courses]
     colour = colour_of(courses, np.min([one.measure.noise for one in lessons], axis=0))
-    shares = [_rms([colour.taken_off(course) for course in one.courses]) / _signal(one) for one in lessons]
+    shares = [
+        _rms([colour.taken_off(course) for course in one.courses]) / _signal(one.measure, one.retuned.fitted.residuals)
+        for one in lessons
+    ]
     share = np.max(shares, axis=0)
     sound = [
         sound_recording(
-            coloured(floored(one.measure, floor), colour, share * _signal(one)),
+            coloured(floored(one.measure, floor), colour, share * one.signal),
             one.tuning,
             one.retuned.fitted.deviations,
             map_,
@@ -108,14 +115,13 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
     return Learned(floor, colour, share, SoundRecordings(tuple(sound), floor.beyond))
 
 
-def _signal(lesson: _Lesson) -> FloatArray:
-    return _foreseen(lesson.measure, lesson.retuned.fitted.residuals)
-
-
-def _foreseen(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
-    """(c,): rms of what a model foresees, about its mean: no fault of the recording is in it."""
-    courses = [one.measured - left * measure.unit for one, left in zip(measure.records, residuals, strict=True)]
-    return np.asarray(np.maximum(np.nanstd(np.vstack(courses), axis=0), np.finfo(float).tiny))
+def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
+    """(c,): rms about the mean of what was measured or of what the model foresees of it, the smaller of both: neither a
+    hum or a drift makes it larger, nor a model that is far off."""
+    measured = [one.measured for one in measure.records]
+    foreseen = [one - left * measure.unit for one, left in zip(measured, residuals, strict=True)]
+    sizes = [np.nanstd(np.vstack(courses), axis=0) for courses in (measured, foreseen)]
+    return np.asarray(np.maximum(np.fmin(*sizes), np.finfo(float).tiny))
 
 
 def _rms(courses: Sequence[FloatArray]) -> FloatArray:

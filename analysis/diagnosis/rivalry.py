@@ -38,6 +38,8 @@ ALIKE = 4.0
 class Contender:
     fitted: Fitted
     standing: Standing
+    usual: float = 0.0
+    """Mean log error power that it would gain on a device in order, and that is counted against it here."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,15 +67,19 @@ class Arena:
 
     def contender(self, fitted: Fitted) -> Contender:
         """As decisions see it; its `test` is NaN."""
-        return Contender(fitted, self._beside_sound(fitted, standing(self.measure, fitted.residuals)))
+        return self._contender(fitted, self.measure)
 
     def confirmed(self, contender: Contender) -> Contender:
         """With the sealed samples."""
         fitted = evaluated(self.whole, self.tuning, contender.fitted.deviations, contender.fitted.hypothesis)
-        return Contender(fitted, self._beside_sound(fitted, standing(self.whole, fitted.residuals)))
+        return self._contender(fitted, self.whole)
 
-    def _beside_sound(self, fitted: Fitted, stands: Standing) -> Standing:
-        return stands if self.sound is None else self.sound.beside(fitted.hypothesis, stands)
+    def _contender(self, fitted: Fitted, measure: ErrorMeasure) -> Contender:
+        stands = standing(measure, fitted.residuals)
+        if self.sound is None:
+            return Contender(fitted, stands)
+        gained = self.sound.gained(fitted.hypothesis)
+        return Contender(fitted, stands.larger(np.exp(gained)), 2 * float(gained.mean()))
 
 
 def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> tuple[Contender, ...]:

@@ -17,5 +17,7 @@ def excess(contender: Contender) -> float:
 
 
 def inseparable(best: Contender, other: Contender) -> bool:
+    """As much as both gain on a device in order, where neither is true, they mend the model itself: less than that
+    tells nothing."""
     worse = other.standing.chosen_by - best.standing.chosen_by
-    return worse <= max(CLOSE, CLOSE_SHARE * excess(best))
+    return worse <= max(CLOSE, CLOSE_SHARE * excess(best), min(other.usual, best.usual))

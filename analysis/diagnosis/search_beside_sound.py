@@ -11,6 +11,7 @@ from analysis.diagnosis.output_error import evaluated
 from analysis.diagnosis.patience import Patience
 from analysis.diagnosis.rivalry import Arena, Contender, refine
 from analysis.diagnosis.search import Searched, searched
+from analysis.diagnosis.standing import standing
 from analysis.diagnosis.verdict import EXPLAINED, Judgement
 from equalizer.effects.effect import Effect
 
@@ -19,7 +20,39 @@ def searched_beside_sound(
     arena: Arena, learned: Learned, catalogue: Sequence[Effect], progress: Progress, patient: Patience
 ) -> Searched:
     """arena: as without sound recordings, but for what is certain. What is found has its residuals by the arena's own
-    measure, with what a sound device differs by counted as noise, and stands as beside the sound recordings."""
+    measure, with what a sound device differs by counted as noise.
+
+    Where much more is left than on a sound device, its colour is of little use: then what is simply larger than that
+    is looked for, too, and whichever leaves less stands.
+    """
+    fine = _by_contrast(arena, learned, catalogue, progress, patient)
+    if arena.certain or fine.found.after.standing.seen <= learned.floor.beyond or not patient():
+        return fine
+    coarse = _by_size(arena, learned, catalogue, progress, patient)
+    return coarse if coarse.judged.named and _left(fine.arena, coarse) < _left(fine.arena, fine) else fine
+
+
+def _left(arena: Arena, seen: Searched) -> float:
+    """Mean log error power of what is named, on what decisions may see."""
+    stands = seen.found.after if seen.judged.named else seen.found.retuned
+    fitted = evaluated(arena.measure, arena.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
+    return Contender(fitted, standing(arena.measure, fitted.residuals)).standing.chosen_by
+
+
+def _by_size(
+    arena: Arena, learned: Learned, catalogue: Sequence[Effect], progress: Progress, patient: Patience
+) -> Searched:
+    wide = replace(learned.floor, channels=tuple(learned.floor.beyond * one for one in learned.floor.channels))
+    plain = floored(arena.whole, wide)
+    seen = searched(replace(arena, measure=plain.shortened(), whole=plain), catalogue, progress, patient)
+    back = floored(arena.whole, learned.floor).with_records(seen.arena.whole.records)
+    own = replace(arena, measure=back.shortened(), whole=back)
+    return replace(seen, arena=own, found=_by(own, seen.found))
+
+
+def _by_contrast(
+    arena: Arena, learned: Learned, catalogue: Sequence[Effect], progress: Progress, patient: Patience
+) -> Searched:
     plain = floored(arena.whole, learned.floor)
     whole = learned.beside(plain, arena.tuning.model)
     beside = replace(arena, measure=whole.shortened(), whole=whole, sound=learned.sound)

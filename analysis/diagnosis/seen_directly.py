@@ -5,9 +5,9 @@ that stay at a limit, or that are there twice. Recordings of the sound device sa
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from analysis.diagnosis.hypothesis import Claim, Hypothesis, Spread, claimed
+from analysis.diagnosis.observed import Mask
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.lattice import lattice_step
 from equalizer.signals.recording import Recording
@@ -90,16 +90,22 @@ def _at_the_top(values: FloatArray) -> tuple[float, int]:
 
 
 def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+    """Here and there: a sensor that stands still for a while has not lost samples."""
     repeated = _repeats(new)
-    usual = max(float(_repeats(one).mean()) for one in sound) * len(repeated)
-    if not _unusual(int(repeated.sum()), usual):
+    usual = max(float(_begun(_repeats(one)).mean()) for one in sound) * len(repeated)
+    if not _unusual(int(_begun(repeated).sum()), usual):
         return None
     fraction = (float(repeated.sum()) - usual) / len(repeated)
     return tuple(range(new.shape[1])), {"fraction": fraction}
 
 
-def _repeats(values: FloatArray) -> npt.NDArray[np.bool_]:
+def _repeats(values: FloatArray) -> Mask:
     return np.asarray((np.diff(values, axis=0) == 0).all(axis=1), dtype=np.bool_)
+
+
+def _begun(repeated: Mask) -> Mask:
+    """Where repeats begin, one after the other counted once."""
+    return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
 
 
 def _unusual(count: int, usual: float) -> bool:

@@ -10,7 +10,7 @@ from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import NOTHING, Hypothesis, together, without_claim
 from analysis.diagnosis.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
 from analysis.diagnosis.screening import Mapper
-from analysis.diagnosis.standing import Standing, rms_over
+from analysis.diagnosis.standing import rms_over
 from analysis.diagnosis.tuning import Tuning
 from equalizer.effects.evidence import Evidence
 from equalizer.signals.signal import FloatArray
@@ -59,15 +59,14 @@ class SoundRecordings:
     """A gain counts by what is more than so many times that on the sound ones: the fewer, the more."""
     seen: dict[object, FloatArray] = field(default_factory=dict)
 
-    def beside(self, hypothesis: Hypothesis, stands: Standing) -> Standing:
-        """As it would stand without what it gains on sound recordings."""
+    def gained(self, hypothesis: Hypothesis) -> FloatArray:
+        """(c,): logarithm of the errors' rms, that counts against it; none of a model without effects."""
         if not hypothesis.claims:
-            return stands
+            return np.zeros(1)
         if hypothesis.key not in self.seen:
             gains = np.max([one.gained(hypothesis) for one in self.each], axis=0)
-            self.seen[hypothesis.key] = np.exp(self.beyond * np.maximum(gains, 0.0))
-        by = self.seen[hypothesis.key]
-        return Standing(stands.fit * by, stands.choose * by, stands.test * by)
+            self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
+        return self.seen[hypothesis.key]
 
 
 def sound_recording(measure: ColouredMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper) -> SoundRecording:

@@ -32,6 +32,10 @@ class Standing:
         """
         return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
 
+    def larger(self, times: FloatArray) -> "Standing":
+        """times: (c,)"""
+        return Standing(self.fit * times, self.choose * times, self.test * times)
+
 
 def standing(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> Standing:
     """residuals: per record (n, c), in units of `measure.unit`."""

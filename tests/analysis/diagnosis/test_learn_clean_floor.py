@@ -60,6 +60,21 @@ def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in)
     assert not any(cell.significant for cell in found.maps["after"])
 
 
+def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
+    """At a frequency where it differs by little; the same without a hum is no mismatch."""
+    without = tuple(name for name in BY_NAME if name not in (*AMONG, "mains_hum"))
+    for seed in (6, 7):
+        sound = diagnosed.recorded(1, (LAG,), seed=seed)
+        left = learned_from(clean, diagnosed.device(1), (sound,), map, quiet).floor.channels[0]
+        tone = 0.4 * left * sound.response.samples.std() * np.sqrt(2)
+        hum = PlacedEffect(BY_NAME["mains_hum"], (0,), {"amplitude": tone, "frequency": 50.02, "phase": 0.3})
+        humming = diagnosed.recorded(1, (LAG, hum), seed=seed)
+        settings = DiagnosisSettings(without, clean=clean)
+        found, nothing = (diagnose([one], diagnosed.device(1), settings, map, quiet) for one in (humming, sound))
+        assert (named(found), named(nothing)) == (["mains_hum"], [])
+        assert found.diagnosis.effects[0].parameters["amplitude"].value == pytest.approx(tone, rel=0.3)
+
+
 def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):
     sound, other = (diagnosed.recorded(1, (), seed=seed) for seed in (11, 12))
     floor = learned_from((sound,), diagnosed.device(1), (other,), map, quiet).floor

@@ -66,6 +66,11 @@ def test_samples_that_are_there_twice_are_seen_with_their_share():
     assert values["fraction"] == pytest.approx(0.02, rel=0.2)
 
 
+def test_a_sensor_that_stands_still_has_not_lost_samples():
+    new = spoiled(recording(2, 0.0), lambda y: np.where(np.arange(len(y))[:, None] < 5900, y, y[5900]))
+    assert seen(new, recording(1, 0.0)) == []
+
+
 def test_what_the_sound_device_does_too_is_not_seen():
     clipped = spoiled(recording(1), lambda y: np.clip(y, -0.9, 0.9))
     assert seen(spoiled(recording(2), lambda y: np.clip(y, -0.9, 0.9)), clipped) == []
