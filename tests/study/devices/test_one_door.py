@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -47,15 +48,20 @@ def defines(tree: ast.Module, name: str) -> bool:
     return name in targets | {n.name for n in tree.body if isinstance(n, ast.ClassDef | ast.FunctionDef)}
 
 
-def namers(name: str, folder: Path) -> set[str]:
+@cache
+def sources(folder: Path) -> dict[str, tuple[ast.Module, frozenset[str]]]:
+    """Of each file of the study: what it is, and all names in it."""
     trees = {
         path.relative_to(folder).as_posix(): ast.parse(path.read_text()) for path in (folder / "study").rglob("*.py")
     }
     return {
-        path
+        path: (tree, frozenset[str]().union(*(names_in(node) for node in ast.walk(tree))))
         for path, tree in trees.items()
-        if not defines(tree, name) and any(name in names_in(node) for node in ast.walk(tree))
     }
+
+
+def namers(name: str, folder: Path) -> set[str]:
+    return {path for path, (tree, names) in sources(folder).items() if name in names and not defines(tree, name)}
 
 
 def callers(name: str) -> set[str]:
