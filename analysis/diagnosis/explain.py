@@ -87,8 +87,10 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
         steps.append(base)
     surprised |= arena.sound is not None
     more = MORE * (1.0 if arena.sound is None else arena.sound.beyond)
-    while len(rounds) < MOST_EFFECTS and (
-        base.standing.seen > (more if rounds else CLEAN) or (surprised and not rounds)
+    while (
+        not arena.certain
+        and len(rounds) < MOST_EFFECTS
+        and (base.standing.seen > (more if rounds else CLEAN) or (surprised and not rounds))
     ):
         step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:

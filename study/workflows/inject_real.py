@@ -34,8 +34,8 @@ from study.workflows.proof_seals import answer_at, broken_seal, is_of, label_at,
 from study.workflows.real_folder import RealRecording
 from study.workflows.seal_cases import settings_text
 
-MOST_SAMPLES, LEAD = 10_000, 8_000
-"""Of each half of a recording, and that are played before it."""
+MOST_SAMPLES = 10_000
+"""Of each half of a recording, and of what is played before it."""
 NOTHING = 1 / 6
 """Share of draws into which nothing is injected."""
 PROCESSOR_S = 180.0
@@ -90,7 +90,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 
 
 def _led(recording: Recording, start: int, stop: int) -> Recording:
-    lead = min(start, LEAD)
+    lead = min(start, MOST_SAMPLES)
     whole = part_of(recording, start - lead, stop)
     own = [replace(one, start=max(one.start, lead)) for one in whole.segments if one.stop > lead]
     return replace(whole, segments=tuple(own) or (Segment(lead, len(whole), "noise", 0.0),))
