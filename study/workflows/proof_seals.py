@@ -1,10 +1,12 @@
 """The seals of a proof: every label's hash, written before anything is answered, and compared ever after."""
 
 import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
+from study.store.file_errors import UnusableFileError
 from study.store.json_document import parse_json
 from study.store.provenance import sha256_of
 from study.store.text_file import read_text, write_text
@@ -46,8 +48,14 @@ def label_at(path: Path) -> dict[str, Any]:
 
 
 def answer_at(place: Path) -> dict[str, Any]:
-    """Raises StudyError."""
-    return parse_json(place / ANSWER, read_text(place / ANSWER), "answer of a diagnosis")
+    """An error that is not known is NaN there. Raises StudyError."""
+    try:
+        said = json.loads(read_text(place / ANSWER))
+    except ValueError as problem:
+        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)) from problem
+    if not isinstance(said, dict):
+        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", ("it holds no object",))
+    return said
 
 
 def is_of(label: dict[str, Any], said: dict[str, Any]) -> bool:

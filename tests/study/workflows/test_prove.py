@@ -150,6 +150,14 @@ def test_a_torn_file_is_named(copied, torn):
         prove(copied.path, PLAN, Wishes(), lambda *_: None)
 
 
+def test_an_error_that_is_not_known_is_read(copied):
+    path = next(copied.open.glob(f"*/{ANSWER}"))
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
+    assert "NaN" in path.read_text()
+    assert len(reveal_cases(copied, 100)) == len(to_draw(PLAN))
+
+
 def test_an_answer_that_was_removed_is_given_again(copied):
     path = next(copied.open.glob(f"*/{ANSWER}"))
     before = json.loads(path.read_text())
