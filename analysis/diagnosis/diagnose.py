@@ -61,7 +61,7 @@ def diagnose(
         seen, floor = searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor
     else:
         seen, floor = searched(arena, catalogue, progress, settings.patient), CleanFloor()
-    if seen.judged.verdict in ("unexplained", "partly_explained") and settings.patient():
+    if seen.judged.verdict in ("unexplained", "partly_explained") and not arena.certain and settings.patient():
         progress("looking for play that rattles", 0.9)
         rattled = rattling(seen.arena, seen.found, chosen.floors, may_be_named)
         seen = seen if rattled is None else Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,))

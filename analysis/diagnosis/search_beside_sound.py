@@ -59,18 +59,11 @@ def _by_contrast(
     seen = searched(beside, catalogue, progress, patient)
     plain = plain.with_records(seen.arena.whole.records)
     back = replace(arena, measure=plain.shortened(), whole=plain)
-    found, named = _by(back, seen.found), seen.judged.named
-    if not named or foresees_nothing(plain, found.after):
-        found, named = _certain_alone(back, found), bool(arena.certain)
+    found = _by(back, seen.found)
+    if arena.certain:
+        return replace(seen, arena=back, found=found, judged=_judged(found, True, learned.floor.beyond), remarks=())
+    named = seen.judged.named and not foresees_nothing(plain, found.after)
     return replace(seen, arena=back, found=found, judged=_judged(found, named, learned.floor.beyond))
-
-
-def _certain_alone(arena: Arena, found: Explanation) -> Explanation:
-    count = len(arena.certain)
-    if not count:
-        return found
-    last = _seen_by(arena.whole, arena, found.steps[count - 1])
-    return replace(found, after=last, rounds=found.rounds[:count], steps=found.steps[:count])
 
 
 def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
