@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.clean_floor import CleanFloor
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed
 from analysis.diagnosis.learn_clean_floor import NothingLearned, learned_from, learned_sentence, require_alike
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -73,6 +74,14 @@ def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
         found, nothing = (diagnose([one], diagnosed.device(1), settings, map, quiet) for one in (humming, sound))
         assert (named(found), named(nothing)) == (["mains_hum"], [])
         assert found.diagnosis.effects[0].parameters["amplitude"].value == pytest.approx(tone, rel=0.3)
+
+
+def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean):
+    learned = learned_from(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
+    lag, rubbing = (claimed(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING))
+    assert learned.sound.gained(lag).mean() > 0.2
+    assert learned.sound.gained(rubbing).mean() < 0.01
+    assert not learned.sound.gained(NOTHING).any()
 
 
 def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):
