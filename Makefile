@@ -18,8 +18,7 @@ analysis := tests/analysis
 PARTS := workflows screens equalizer analysis stories
 rest := tests $(foreach part,$(PARTS),$(addprefix --ignore=,$($(part))))
 TESTED := $(addprefix tested-,rest $(PARTS))
-# One more than there are cores: sessions wait for the disk, screens and drivers for time to pass.
-JOBS ?= $(shell expr 1 + $$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 1))
+JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 CASES ?= 600
 SEED ?= 93000
 BANK ?= bank-$(SEED)
@@ -34,7 +33,7 @@ help: ## Show what can be made
 study: $(VENV)/.installed ## Set up, then take the study (without a terminal: a simulated participant takes it)
 	$(BIN)/hapteq study
 
-test: $(VENV)/.installed-test ## Set up, then run all checks and tests (JOBS=2: so many at once; else one per core and one)
+test: $(VENV)/.installed-test ## Set up, then run all checks and tests (JOBS=2: so many at once; else one per core)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	@# One that fails stops none of the others, and fails the whole.
