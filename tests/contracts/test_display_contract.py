@@ -29,6 +29,8 @@ from study.session.views import (
     Welcome,
 )
 
+pytestmark = pytest.mark.real_time
+
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE, progress=Progress(0.3, 9))
 MENU = DemoMenu(PICTURE, vibrations=3, vibration=1, felt=(), handle_moves=True)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.real_time
+
 SCRIPT = Path(__file__).with_name("killed_sessions.py")
 
 

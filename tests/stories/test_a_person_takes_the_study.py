@@ -10,6 +10,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from terminal import Terminal
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture
 def study(tmp_path, small_file):

@@ -10,6 +10,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from terminal import Terminal
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.timeout(200)
 def test_the_same_command_goes_on(small_file, tmp_path):

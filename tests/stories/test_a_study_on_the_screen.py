@@ -21,6 +21,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from terminal import Terminal
 
+pytestmark = pytest.mark.real_time
+
 FELT_S = 0.3
 SEED = 4
 

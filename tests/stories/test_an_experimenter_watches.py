@@ -12,6 +12,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from terminal import ROOT, Terminal
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture
 def started(tmp_path, small_file):

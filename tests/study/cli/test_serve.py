@@ -17,6 +17,8 @@ from aiohttp import ClientSession, WSServerHandshakeError
 
 from study.tui.web_server import origins
 
+pytestmark = pytest.mark.real_time
+
 ROOT = Path(__file__).resolve().parents[3]
 PATHS = os.pathsep.join((str(ROOT), str(ROOT / "study" / "launcher")))
 

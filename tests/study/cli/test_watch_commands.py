@@ -12,6 +12,8 @@ from study.session.requests import PauseAsked, StopAsked
 from study.store.event_log import LOG_NAME, EventLog, read_log
 from study.store.request_inbox import RequestInbox
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):

@@ -15,6 +15,8 @@ from study.devices.runner import CompiledRunner
 from study.devices.safe import SafeDevice
 from study.devices.stepped_runner import SteppedRunner
 
+pytestmark = pytest.mark.real_time
+
 
 class MovedClock:
     """The haptic thread sleeps for ever; the test's own sleeps are what the test says."""

@@ -19,6 +19,8 @@ from study.devices.safe import SafeDevice
 from study.devices.stepped_runner import SteppedRunner
 from study.errors import DeviceError
 
+pytestmark = pytest.mark.real_time
+
 TESTS = Path(__file__).parents[2]
 
 

@@ -16,6 +16,8 @@ from study.devices.rig import READING_SIZE
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture
 def rig(rigs):

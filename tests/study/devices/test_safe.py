@@ -340,6 +340,7 @@ def test_a_reading_of_the_wrong_shape_counts_as_a_lost_device(rigs, clock):
     device.close()
 
 
+@pytest.mark.real_time
 def test_a_caller_that_stalls_loses_the_force_in_real_time(rigs, rig):
     device = SafeDevice(rig, rigs.SETTINGS, RealClock())
     device.hold(rigs.sine(3.0, fade_s=0.05))
@@ -353,6 +354,7 @@ def test_a_caller_that_stalls_loses_the_force_in_real_time(rigs, rig):
     device.close()
 
 
+@pytest.mark.real_time
 def test_a_stepped_rig_is_played_in_real_time_and_stopped_from_another_thread(rigs):
     rig = rigs.ScriptedRig()
     device = SafeDevice(rig, rigs.SETTINGS, RealClock())

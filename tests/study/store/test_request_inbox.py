@@ -97,6 +97,7 @@ def test_garbage_is_set_aside_and_what_comes_after_it_is_heard(inbox, folder, co
     assert inbox.take() == ()
 
 
+@pytest.mark.real_time
 def test_a_folder_a_pipe_and_a_dangling_link_do_not_hold_it_up(inbox, folder):
     (folder / "note-folder").mkdir()
     os.mkfifo(folder / "note-pipe")
@@ -165,6 +166,7 @@ def test_many_senders_at_once_lose_nothing(tmp_path, inbox):
         assert [text for text in heard if text.startswith(f"{number} ")] == [f"{number} {p}" for p in range(each)]
 
 
+@pytest.mark.real_time
 def test_an_empty_inbox_costs_next_to_nothing(inbox):
     looks = 200
     began = time.perf_counter()

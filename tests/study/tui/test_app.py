@@ -16,6 +16,8 @@ from study.tui.home_messages import BeginWanted
 from study.tui.link.from_engine import Failed, Finished
 from study.tui.link.to_engine import Begin, SessionOrder
 
+pytestmark = pytest.mark.real_time
+
 SIZE = (100, 30)
 SHORT = {
     "frequencies_hz = [25.0, 35.0]": "frequencies_hz = [25.0]",
@@ -60,7 +62,7 @@ class Person:
 
     async def reads(self, words: str) -> None:
         """Until they are on the screen."""
-        until_s = time.monotonic() + 10.0
+        until_s = time.monotonic() + 30.0
         while words not in self.text():
             assert time.monotonic() < until_s, f"{words!r} is not in: {self.text()}"
             await self.pilot.pause(0.03)
@@ -115,7 +117,7 @@ def test_from_the_start_screen_to_the_report_and_back(order, tmp_path):
         await person.until("HomeScreen")
         await asyncio.sleep(0.1)
         await person.pilot.press(*"P01")
-        until_s = time.monotonic() + 10.0
+        until_s = time.monotonic() + 30.0
         while person.at == "HomeScreen":
             assert time.monotonic() < until_s
             await person.press("f5")

@@ -12,6 +12,8 @@ from study.tui.app import HapteqApp
 from study.tui.app_start import AppStart
 from study.tui.home_messages import DiagnoseWanted
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture
 def files(module_at, tmp_path):

@@ -13,6 +13,8 @@ import pytest
 from study.session.events import DeviceFacts, SessionOpened, event_line
 from study.tui.link.watch_feed import WatchFeed
 
+pytestmark = pytest.mark.real_time
+
 ROOT = Path(__file__).parents[3]
 
 
@@ -99,7 +101,7 @@ def test_the_child_dies_with_a_killed_parent(session, tmp_path):
     ) as parent:
         child = int(parent.stdout.readline())
         parent.kill()
-    until(lambda: gone(child), 5.0)
+    until(lambda: gone(child))
 
 
 def test_the_screens_process_loads_neither_numpy_nor_pydantic():

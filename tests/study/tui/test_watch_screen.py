@@ -112,7 +112,7 @@ class Seat:
         self.source.view = shown
         await self.wait(lambda: self.app.screen_stack[1].view is shown)
 
-    async def wait(self, until, most_s: float = 3.0) -> None:
+    async def wait(self, until, most_s: float = 20.0) -> None:
         end_s = time.monotonic() + most_s
         while not until():
             assert time.monotonic() < end_s, "\n".join(self.lines)

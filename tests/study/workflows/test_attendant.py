@@ -123,6 +123,7 @@ def test_several_sources_are_heard_in_turn(requests):
     assert ManyRequests(requests, other).take() == (StopAsked("experimenter"), PauseAsked("participant"))
 
 
+@pytest.mark.real_time
 def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
     told, clock = [], RealClock()
     with contextlib.closing(SafeDevice(rigs.compiled_rig(), rigs.SETTINGS, clock)) as device:

@@ -76,6 +76,7 @@ def test_a_late_computer_is_a_fault_with_a_real_device(rigs, settings):
     assert found["Missed ticks"].value.endswith("%)")
 
 
+@pytest.mark.real_time
 def test_ticks_that_a_real_loop_missed_are_counted(rigs, settings):
     rig = rigs.HeldForceRig()
     rig.before_sensing = lambda: time.sleep(0.01)

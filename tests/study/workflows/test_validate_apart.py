@@ -10,6 +10,8 @@ from study.workflows import validate_apart
 from study.workflows.validate import Validation, validate_file
 from study.workflows.validate_apart import validate_files
 
+pytestmark = pytest.mark.real_time
+
 
 def crash_or_hang(path: Path) -> Validation:
     """Stands for the HDF5 library on a file damaged in a way that it does not survive; found by name here."""

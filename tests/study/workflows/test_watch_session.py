@@ -23,6 +23,8 @@ from study.workflows.take_note import take_note
 from study.workflows.validate import validate_file
 from study.workflows.watch_session import ask, follow
 
+pytestmark = pytest.mark.real_time
+
 STOP, PAUSE = StopAsked("experimenter"), PauseAsked("experimenter")
 NOTE = NoteAsked("experimenter", "asks for a lower chair")
 

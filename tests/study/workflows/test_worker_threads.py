@@ -12,6 +12,8 @@ import pytest
 
 from study.workflows.worker_threads import worker_threads
 
+pytestmark = pytest.mark.real_time
+
 
 def test_results_come_in_order_whoever_is_first():
     with worker_threads(4) as threads:

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
@@ -71,6 +72,13 @@ class Sight:
     def words(self) -> str:
         """Without breaks and frames: for sentences that wrap."""
         return " ".join(self.text.translate({ord(c): " " for c in "│╭╮╰╯─"}).split())
+
+    async def until(self, there: Callable[[], bool], patience_s: float = 20.0) -> None:
+        """What takes time takes longer on a busy machine; what never comes fails with what is on the screen."""
+        until_s = time.monotonic() + patience_s
+        while not there():
+            assert time.monotonic() < until_s, self.text
+            await self.pilot.pause(0.02)
 
     async def press(self, *keys: str) -> None:
         await self.pilot.press(*keys)

@@ -1,6 +1,5 @@
 """The start screen: a form that says what is wrong, and a list of whatever lies there."""
 
-import time
 from dataclasses import replace
 
 import pytest
@@ -225,12 +224,10 @@ def test_five_hundred_sessions_open_at_once_and_scroll_to_the_last(on_screen, ho
     many = tuple(replace(line, name=f"P{n:03}_001", path=f"/data/P{n:03}_001", subject=f"P{n:03}") for n in range(500))
 
     async def story(sight):
-        started_s = time.perf_counter()
         sight.app.screen.show(replace(home, sessions=many))
-        blocked_s = time.perf_counter() - started_s
-        assert sight.app.screen.query_one(SessionTable).row_count == AT_ONCE
-        assert blocked_s < 0.3
-        await sight.pilot.pause(1.0)
+        table = sight.app.screen.query_one(SessionTable)
+        assert table.row_count == AT_ONCE
+        await sight.until(lambda: table.row_count == len(many))
         await sight.press("f3", "ctrl+end", "enter")
         assert "P499_001" in sight.text
 
@@ -243,8 +240,10 @@ def test_a_newer_list_replaces_a_long_one_that_still_comes_in(on_screen, home, l
     async def story(sight):
         sight.app.screen.show(replace(home, sessions=many))
         sight.app.screen.show(home)
+        table = sight.app.screen.query_one(SessionTable)
+        await sight.until(lambda: table.row_count == len(home.sessions))
         await sight.pilot.pause(0.3)
-        assert sight.app.screen.query_one(SessionTable).row_count == len(home.sessions)
+        assert table.row_count == len(home.sessions)
 
     on_screen(HomeScreen(None), story)
 

@@ -67,7 +67,7 @@ def browse(on_screen, folder, *keys, typed=None):
     seen = []
 
     async def story(sight):
-        await sight.pilot.pause(0.2)
+        await sight.until(lambda: "P01_001" in sight.text)
         seen.append(sight.text)
         if typed is not None:
             sight.app.screen.query_one("#path", Input).focus()
@@ -126,8 +126,7 @@ def test_while_the_device_is_prepared_it_says_what_and_for_how_long(on_screen, m
         assert "Compiling the simulation." in sight.text
         assert "0 s so far" in sight.text
         now[0] += 75.0
-        await sight.pilot.pause(0.1)
-        assert "1 min 15 s so far" in sight.text
+        await sight.until(lambda: "1 min 15 s so far" in sight.text)
         sight.app.screen.say("Opening the log.")
         await sight.pilot.pause()
         assert "Opening the log." in sight.text

@@ -91,10 +91,7 @@ def test_a_newer_view_stays_on_its_page(on_screen, session):
         await sight.press("5")
         assert "No report was written yet." in sight.text
         sight.app.screen.show(session)
-        for _ in range(40):
-            await sight.pilot.pause(0.05)
-            if "Open report" in sight.text:
-                break
+        await sight.until(lambda: "Open report" in sight.text)
         assert "report.html" in sight.text
         assert sight.app.screen.query_one(TabbedContent).active == "report"
         assert "Open report" in sight.text

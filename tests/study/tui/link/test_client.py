@@ -10,6 +10,8 @@ from study.tui.link.client import EngineClient
 from study.tui.link.from_engine import Failed
 from study.tui.link.to_engine import ShowHome
 
+pytestmark = pytest.mark.real_time
+
 ENGINES = """
 import os, sys
 from multiprocessing.connection import Connection
@@ -53,7 +55,7 @@ def engine(tmp_path, monkeypatch):
 def test_an_engine_that_talks_nonsense_is_told_as_ended_and_does_end(engine, capfd):
     client, heard = engine("talks_nonsense")
     client.send(ShowHome("."))
-    failure = heard.get(timeout=5.0)
+    failure = heard.get(timeout=20.0)
     assert isinstance(failure, Failed)
     assert failure.error.title == "The device program ended"
     assert client.dead
@@ -62,7 +64,7 @@ def test_an_engine_that_talks_nonsense_is_told_as_ended_and_does_end(engine, cap
 
 def test_the_last_words_of_an_engine_are_told(engine):
     client, heard = engine("gives_up")
-    failure = heard.get(timeout=5.0)
+    failure = heard.get(timeout=20.0)
     assert failure.error.happened == (
         "The process that drives the device ended with code 4. Its last words: no device on the bus"
     )
@@ -78,7 +80,7 @@ def test_a_system_that_starts_nothing_is_told(monkeypatch):
     heard = queue.Queue()
     client = EngineClient(heard.put)
     client.start()
-    failure = heard.get(timeout=5.0)
+    failure = heard.get(timeout=20.0)
     assert failure.error.title == "The device program cannot be started"
     assert "Resource temporarily unavailable" in failure.error.happened
     client.close()

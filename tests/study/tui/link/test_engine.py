@@ -27,6 +27,8 @@ from study.tui.link.to_engine import (
     Withdraw,
 )
 
+pytestmark = pytest.mark.real_time
+
 ROOT = Path(__file__).parents[4]
 
 

@@ -27,6 +27,8 @@ from study.tui.link.remote_display import SILENT_AFTER_S, RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
 from study.tui.link.to_engine import Heartbeat, Reply
 
+pytestmark = pytest.mark.real_time
+
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE)
 MENU = DemoMenu(PICTURE, vibrations=1, vibration=1, felt=(), handle_moves=True)
@@ -44,7 +46,7 @@ class OtherEnd:
         threading.Thread(target=self._beat, daemon=True).start()
 
     def hear(self):
-        assert self.pipe.poll(5.0)
+        assert self.pipe.poll(20.0)
         return self.pipe.recv()
 
     def soon(self, *messages, delay_s: float = 0.1) -> None:
@@ -193,7 +195,7 @@ def test_an_engine_that_understands_nothing_any_more_stops_its_device_and_ends(s
     screen.fall_silent()
     time.sleep(0.15)
     screen.pipe.send_bytes(b"nothing that was pickled")
-    assert stopped.wait(2.0)
+    assert stopped.wait(20.0)
     assert screen.link.next_command() is None
     with pytest.raises(KeyboardInterrupt):
         screen.display.await_return("a reason")

@@ -6,6 +6,7 @@ HAPTEQ_REWRITE_SCREENS=1 writes the pictures anew; look at the difference before
 import asyncio
 import os
 import re
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -62,6 +63,16 @@ class Stage:
     async def press(self, *keys: str) -> None:
         await self.pilot.press(*keys)
         await self.pilot.pause()
+
+    async def until(self, there: Callable[[], bool], patience_s: float = 20.0) -> None:
+        """What takes time takes longer on a busy machine; what never comes fails with what is on the screen."""
+        until_s = time.monotonic() + patience_s
+        while not there():
+            assert time.monotonic() < until_s, self.text
+            await self.pilot.pause(0.02)
+
+    async def reads(self, words: str) -> None:
+        await self.until(lambda: words in self.words)
 
     @property
     def text(self) -> str:

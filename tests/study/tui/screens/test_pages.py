@@ -1,6 +1,5 @@
 """Pages that are read and left, and waits that the application ends."""
 
-import asyncio
 import subprocess
 import sys
 
@@ -227,8 +226,7 @@ def test_a_rest_cannot_be_shortened_and_tells_what_is_left(on_stage):
         await stage.press("enter", "space", "escape")
         assert stage.heard == []
         assert "There is no hurry." in stage.words
-        await asyncio.sleep(0.9)
-        assert "When you are ready, press Enter." in stage.words
+        await stage.reads("When you are ready, press Enter.")
         await stage.press("enter")
 
     (rested_s,) = on_stage(RestScreen(RestNotice(0.6, 1)), story)
