@@ -11,15 +11,15 @@ DIAGNOSIS := tests/stories/test_missing_physics_is_named.py \
 	tests/stories/test_friction_is_named_and_then_compensated.py
 # The tests in parts, the longest first; `rest` is every test that no other part has. Parts with a clock or a screen
 # sleep half of their time and must wake up at once: they start first, and what computes gives way to them.
-real_time := tests/study tests/stories tests/contracts
+real_time := $(shell grep -rl --include='test_*.py' 'mark.real_time' tests)
 workflows := tests/study/workflows
 screens := tests/study/tui
 stories := tests/stories tests/contracts
 equalizer := tests/equalizer
 analysis := tests/analysis
-PARTS := screens workflows equalizer analysis stories
+PARTS := screens workflows equalizer stories analysis
 rest := tests $(foreach part,$(PARTS),$(addprefix --ignore=,$($(part))))
-TESTED := $(addprefix tested-,real_time $(PARTS) rest)
+TESTED := $(addprefix tested-,real_time screens workflows rest $(filter-out screens workflows,$(PARTS)))
 JOBS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2) + 2)
 MARKED := not slow and not real_time
 tested-real_time: MARKED := real_time and not slow

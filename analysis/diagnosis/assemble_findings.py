@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.black_box import black_box
 from analysis.diagnosis.clean_floor import CleanFloor
+from analysis.diagnosis.determined import number_errors
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.error_measure import ErrorMeasure
 from analysis.diagnosis.error_table import channel_errors, errors_of
@@ -15,7 +16,6 @@ from analysis.diagnosis.findings import BlackBox, Course, Findings, Signature
 from analysis.diagnosis.gather_evidence import gather_evidence
 from analysis.diagnosis.hypothesis import without_claim
 from analysis.diagnosis.impact_remainder import impact_remainder
-from analysis.diagnosis.intervals import standard_errors
 from analysis.diagnosis.learn_clean_floor import learned_sentence
 from analysis.diagnosis.localisation import Localisation, localised
 from analysis.diagnosis.mismatch_maps import Maps, maps_of, whole_mismatch
@@ -25,14 +25,13 @@ from analysis.diagnosis.noise_floor import NoiseFloor
 from analysis.diagnosis.observed import Mask
 from analysis.diagnosis.output_error import evaluated
 from analysis.diagnosis.proposed_experiment import Proposal, proposed_experiment
-from analysis.diagnosis.rivalry import Arena, sensitivity_at
+from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.signature_curves import Names, signature_of
 from analysis.diagnosis.unit_doubt import unit_sentences
 from analysis.diagnosis.verdict import Judgement
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
 
 
 def assembled(
@@ -112,7 +111,7 @@ def _document(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
-        effects=named_effects(found, _errors(arena, found), said) if judged.named else (),
+        effects=named_effects(found, number_errors(arena, found), said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -134,14 +133,6 @@ def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
     """The response's, then the position's."""
     position = () if recording.position is None else recording.position.channels
     return (*recording.response.channels, *position)[:count]
-
-
-def _errors(arena: Arena, found: Explanation) -> FloatArray:
-    if found.statistic is not None:
-        return found.statistic.errors
-    fitted = found.steps[-1].fitted
-    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
-    return standard_errors(arena.measure, arena.tuning, fitted, known)[len(fitted.deviations) :]
 
 
 def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:

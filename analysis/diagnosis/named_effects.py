@@ -119,8 +119,8 @@ def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, s
     if only_refines(other, best):
         gain = "too little" if worst < (1 - _TELLING) * least else "nothing"
         return (
-            f"it holds the named law and more numbers beside it{where}, which bring {gain}: {worst:.3g} times "
-            f"{unit} in the worst channel, the named one {least:.3g}"
+            f"it holds the named law as a special case{where}, and what it allows beyond that brings {gain}: "
+            f"{worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
         )
     if same:
         return f"as good{where}: it leaves {worst:.2f} times {unit} in the worst channel, the named one {least:.2f}"

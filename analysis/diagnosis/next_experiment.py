@@ -114,6 +114,7 @@ def _predicted(
 ) -> FloatArray:
     model: MechanicalModel = bench.tuning.tuned(deviations)
     model = heavier(model, one.added) if one.added else model
-    played = simulate_mechanism(model, one.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold)
-    signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
-    return np.asarray((signals / bench.noise).ravel())
+    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        played = simulate_mechanism(model, one.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold)
+        signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
+        return np.asarray((signals / bench.noise).ravel())

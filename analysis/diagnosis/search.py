@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.explain import Explanation, Progress, explain
 from analysis.diagnosis.no_answer import foresees_nothing
 from analysis.diagnosis.patience import OUT_OF_TIME, Patience, always
+from analysis.diagnosis.prune import pruned
 from analysis.diagnosis.rivalry import Arena
 from analysis.diagnosis.verdict import Judgement, judge
 from equalizer.effects.effect import Effect
@@ -39,17 +41,27 @@ class Searched:
 
 
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
-    found = explain(arena, catalogue, progress, patient)
+    found = pruned(arena, explain(arena, catalogue, progress, patient), patient)
     judged = _judged(arena, found)
-    if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
-        early = (OUT_OF_TIME,) if found.ended_early else ()
-        return Searched(arena, found, judged, early + ((ONLY_REFINES,) if found.barred else ()))
+    if found.ended_early or found.barred or found.undetermined or judged.named or not _sealed_alone(found):
+        return Searched(arena, found, judged, _remarks(found))
     half = arena.half_opened()
-    again = explain(half, catalogue, progress, patient)
+    again = pruned(half, explain(half, catalogue, progress, patient), patient)
     second = _judged(half, again)
     if second.named:
         return Searched(half, again, second, (OPENED,))
     return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN,))
+
+
+def _remarks(found: Explanation) -> tuple[str, ...]:
+    early = (OUT_OF_TIME,) if found.ended_early else ()
+    barred = (ONLY_REFINES,) if found.barred else ()
+    return early + barred + (_left_open(found.undetermined) if found.undetermined else ())
+
+
+def _left_open(names: Sequence[str]) -> tuple[str, ...]:
+    what = " with ".join(noun_of(one) for one in names)
+    return (f"What explains most, {what}, is not named: these recordings leave its numbers as good as open.",)
 
 
 def _judged(arena: Arena, found: Explanation) -> Judgement:

@@ -16,6 +16,8 @@ EXPLAINED = 1.12
 CONVINCING, CONVINCED = 0.93, 1.3
 """So are errors of so many times the noise (second) where the explanation takes so much of the mismatch (first), in
 logarithms of power: a force that flips its sign leaves a blow where the real one is a little rounder."""
+HELD_OUT = 1.5
+"""Nor does anything count as explained with so many times the noise on samples that nothing was fitted to."""
 NEARLY = 3.0
 """With errors up to so many times the noise, what was found is named beside a remainder;"""
 MOSTLY = 0.9
@@ -50,10 +52,11 @@ def judge(found: Explanation) -> Judgement:
     if found.statistic is not None:
         return Judgement("explained" if worst <= BY_CHANCE else "partly_explained", True)
     share = share_of_mismatch(found.retuned, found.after)
-    if worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING):
+    clean = worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING)
+    if clean and not np.nanmax(found.after.standing.test, initial=0.0) > HELD_OUT:
         return Judgement("explained", True)
     taken = found.retuned.standing.chosen_by - found.after.standing.chosen_by
-    if worst <= NEARLY or share >= MOSTLY or taken >= BULK:
+    if clean or worst <= NEARLY or share >= MOSTLY or taken >= BULK:
         return Judgement("partly_explained", True)
     return Judgement("unexplained", False)
 

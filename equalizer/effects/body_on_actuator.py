@@ -41,4 +41,6 @@ EFFECT = Effect(
     ),
     acts=Structure(_change),
     starts=_starts,
+    # Of one axis, and damped so little that it rings.
+    simpler=("extra_mode",),
 )

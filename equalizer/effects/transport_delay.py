@@ -10,6 +10,9 @@ from equalizer.effects.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
+BEYOND = 0.15
+"""Of the time that a command is held. What follows a force at once jumps where the delay passes a whole such time: from
+one side of it no small step leads to the other."""
 
 
 def _late(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
@@ -22,7 +25,15 @@ def _late_at_end(commands: FloatArray, step_s: float, of: Values) -> FloatArray:
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     fitting = likeliest_value(evidence, axis, delayed, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
-    return tuple({"delay": late} for late in starts_for_lateness(evidence, axis, fitting, LONGEST_S))
+    starts = starts_for_lateness(evidence, axis, fitting, LONGEST_S)
+    beside = tuple(_across(late, 1 / evidence.sample_rate_hz) for late in starts[:1])
+    return tuple({"delay": late} for late in (*starts, *beside))
+
+
+def _across(late_s: float, held_s: float) -> float:
+    """On the other side of the nearest whole number of times that a command is held."""
+    whole = max(round(late_s / held_s), 1)
+    return (whole + (BEYOND if late_s < whole * held_s else -BEYOND)) * held_s
 
 
 EFFECT = Effect(

@@ -44,6 +44,13 @@ def test_half_of_the_power_outweighs_any_plainness(standing_at):
     assert first_of(plain, refined) == "stribeck_friction"
 
 
+def test_what_rings_on_one_axis_is_a_mode_and_what_is_damped_more_than_a_mode_can_be_a_body(standing_at):
+    mode = standing_at(1.0010, "extra_mode")
+    assert first_of(mode, standing_at(1.0008, "body_on_actuator")) == "extra_mode"
+    assert not both_stand(mode, standing_at(1.0008, "body_on_actuator"))
+    assert first_of(standing_at(3.0, "extra_mode"), standing_at(1.02, "body_on_actuator")) == "body_on_actuator"
+
+
 def test_a_law_refines_another_at_its_own_place_only(standing_at):
     plain = standing_at(1.5, "coulomb_friction")
     assert only_refines(standing_at(1.5, "stribeck_friction"), plain)

@@ -54,6 +54,12 @@ def test_a_law_that_is_not_quite_exact_explains_a_great_mismatch(standing_at):
     assert judge(search(standing_at(60.0), standing_at(60.0), standing_at(1.35, RUBS))).verdict == "partly_explained"
 
 
+@pytest.mark.parametrize(("sealed", "verdict"), [(1.4, "explained"), (1.7, "partly_explained")])
+def test_what_was_never_looked_at_must_be_explained_too(standing_at, sealed, verdict):
+    judged = judge(search(standing_at(30.0), standing_at(10.0), standing_at(1.02, RUBS, test=sealed)))
+    assert (judged.verdict, judged.named) == (verdict, True)
+
+
 def test_where_nothing_was_found_a_mismatch_stays_unexplained(standing_at):
     assert judge(search(standing_at(30.0), standing_at(10.0))).verdict == "unexplained"
 

@@ -66,7 +66,7 @@ def repeated(device, repetition, repeats, seed):
     return state
 
 
-@pytest.mark.parametrize(("friction_n", "first_at_least"), [(0.1, 0.1), (0.3, 0.3)])
+@pytest.mark.parametrize(("friction_n", "first_at_least"), [(0.1, 0.1), pytest.param(0.3, 0.3, marks=pytest.mark.slow)])
 def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, wanted, friction_n, first_at_least):
     device = rubbing.rubbing(plants.modes_of(), friction_n)
     rest = [noise_of_rest(device.measured(np.zeros((1000, 3)), seed=seed + 77), repetition) for seed in SEEDS]
@@ -81,7 +81,13 @@ def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, want
 
 
 @pytest.mark.parametrize(
-    ("friction_n", "floor_from"), [(0.0, "repeats"), (0.002, "repeats"), (0.005, "rest"), (0.01, "repeats")]
+    ("friction_n", "floor_from"),
+    [
+        pytest.param(0.0, "repeats", marks=pytest.mark.slow),
+        pytest.param(0.002, "repeats", marks=pytest.mark.slow),
+        (0.005, "rest"),
+        (0.01, "repeats"),
+    ],
 )
 def test_a_good_first_shot_is_not_made_worse(rubbing, plants, repetition, wanted, friction_n, floor_from):
     device = rubbing.rubbing(plants.modes_of(0.003, 0.2), friction_n)

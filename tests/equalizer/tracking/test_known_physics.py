@@ -111,7 +111,7 @@ def test_from_recordings_freed_of_friction_a_linear_model_is_identified(rubbing,
     assert error(device, forces, wanted) < 0.03
 
 
-@pytest.mark.parametrize("level", [0.1, 0.3])
+@pytest.mark.parametrize("level", [0.1, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_friction_already_in_the_model_is_not_counted_twice(rubbing, plants, wanted, level):
     device, known = rubbing.rubbing(plants.modes_of(), level), physics(friction(level))
     model = identified(swept(plants, device))
