@@ -23,6 +23,9 @@ FLAT_TO = 0.88
 """Share of the lower Nyquist frequency up to which band-limited resampling is flat; the stop band begins at 1."""
 SAME_INSTANT = 1e-3
 """Times closer than this share of a sample are the same."""
+ON_A_SAMPLE = 1e-5
+"""Closer than this share of a sample to one, band-limited values are those of the samples: at four fifths of Nyquist
+the error is that of the filter."""
 _HALF_LENGTH = 48
 _BETA = 8.6
 _UPSAMPLED = 8
@@ -92,8 +95,8 @@ def _band_limited(samples: Samples, grid: Grid) -> FloatArray:
         return _from_uneven(samples, grid)
     first = (grid.start_s - samples.times_s[0]) * samples.rate_hz
     ratio = Fraction(grid.rate_hz / samples.rate_hz).limit_denominator(1000)
-    exact = abs(float(ratio) * samples.rate_hz / grid.rate_hz - 1) * grid.count < SAME_INSTANT
-    if exact and abs(first - round(first)) < SAME_INSTANT:
+    exact = abs(float(ratio) * samples.rate_hz / grid.rate_hz - 1) * grid.count < ON_A_SAMPLE
+    if exact and abs(first - round(first)) < ON_A_SAMPLE:
         return _by_ratio(samples.values, ratio, round(first), grid.count)
     dense = _by_ratio(samples.values, Fraction(_UPSAMPLED), 0, _UPSAMPLED * (len(samples.values) - 1) + 1)
     dense_rate_hz = _UPSAMPLED * samples.rate_hz

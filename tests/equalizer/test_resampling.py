@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from equalizer.signals.resampling import Grid, Samples, resampled
@@ -26,6 +26,8 @@ def test_a_sinusoid_is_recovered_to_a_ten_thousandth_up_to_four_fifths_of_nyquis
 
 @settings(max_examples=20, deadline=None)
 @given(shift_s=st.floats(0.1, 0.2), frequency_hz=st.floats(1, 400))
+@example(shift_s=0.1969990976217758, frequency_hz=18.0)
+@example(shift_s=0.1969990976217758, frequency_hz=399.0)
 def test_a_shift_by_a_part_of_a_sample_is_exact_to_a_ten_thousandth(shift_s, frequency_hz):
     samples = even(sine(np.arange(2000) / 1000, frequency_hz))
     grid = Grid(shift_s, 1000.0, 1700)
