@@ -68,7 +68,7 @@ class Explanation:
     barred: str = ""
     """An effect that was not to be named, where nothing but refinements of it explains as much."""
     undetermined: tuple[str, ...] = ()
-    """Effects that explained most, and are not named: the recordings leave their numbers open."""
+    """Effects that were found, and are not named: the recordings leave their numbers open."""
 
 
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Explanation:

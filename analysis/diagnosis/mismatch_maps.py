@@ -41,10 +41,12 @@ def maps_of(
 def whole_mismatch(measure: ErrorMeasure, contender: Contender) -> tuple[Mismatch, ...]:
     """One row for the worst channel over the whole band, where no cell can be told apart from its neighbours."""
     record = measure.records[0].recording
-    worst = int(np.argmax(np.maximum(contender.standing.fit, contender.standing.choose)))
+    stands = contender.standing
+    errors = np.fmax(np.maximum(stands.fit, stands.choose), stands.test)
+    worst = int(np.argmax(errors))
     names = (*record.response.channels, *(() if record.position is None else record.position.channels))
     signal = np.sqrt(np.nanmean(measure.records[0].measured[:, worst] ** 2))
-    left = float(contender.standing.fit[worst] * measure.noise[worst])
+    left = float(errors[worst] * measure.noise[worst])
     share = min(left / signal, 1.0) if signal > 0 else 1.0
     inputs = "+".join(record.command.channels)
     return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, 0.0),)

@@ -43,14 +43,14 @@ class Searched:
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
     found = pruned(arena, explain(arena, catalogue, progress, patient), patient)
     judged = _judged(arena, found)
-    if found.ended_early or found.barred or found.undetermined or judged.named or not _sealed_alone(found):
+    if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
         return Searched(arena, found, judged, _remarks(found))
     half = arena.half_opened()
     again = pruned(half, explain(half, catalogue, progress, patient), patient)
     second = _judged(half, again)
     if second.named:
-        return Searched(half, again, second, (OPENED,))
-    return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN,))
+        return Searched(half, again, second, (OPENED, *_remarks(again)))
+    return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN, *_remarks(found)))
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:
@@ -60,8 +60,10 @@ def _remarks(found: Explanation) -> tuple[str, ...]:
 
 
 def _left_open(names: Sequence[str]) -> tuple[str, ...]:
-    what = " with ".join(noun_of(one) for one in names)
-    return (f"What explains most, {what}, is not named: these recordings leave its numbers as good as open.",)
+    return tuple(
+        f"An explanation by {noun_of(one)} is not named: these recordings leave its numbers as good as open."
+        for one in dict.fromkeys(names)
+    )
 
 
 def _judged(arena: Arena, found: Explanation) -> Judgement:

@@ -17,7 +17,8 @@ CONVINCING, CONVINCED = 0.93, 1.3
 """So are errors of so many times the noise (second) where the explanation takes so much of the mismatch (first), in
 logarithms of power: a force that flips its sign leaves a blow where the real one is a little rounder."""
 HELD_OUT = 1.5
-"""Nor does anything count as explained with so many times the noise on samples that nothing was fitted to."""
+"""Nor does anything count as explained with so many times the noise on samples that nothing was fitted to. On the bank
+from 93000 on, 168 of 172 right explanations stayed below, and three of nine wrong ones did not."""
 NEARLY = 3.0
 """With errors up to so many times the noise, what was found is named beside a remainder;"""
 MOSTLY = 0.9
@@ -43,22 +44,29 @@ class Judgement:
 
 
 def judge(found: Explanation) -> Judgement:
-    """By what decisions may see; the sealed samples can only take a name away."""
+    """By what decisions may see; the sealed samples can only take a name, or `explained`, away."""
     if not found.after.fitted.hypothesis.claims or not _confirmed(found):
         if found.before.standing.seen <= CLEAN:
             return Judgement("no_mismatch", False)
         return Judgement("parameters" if found.retuned.standing.seen <= CLEAN else "unexplained", False)
-    worst = found.after.standing.seen
     if found.statistic is not None:
-        return Judgement("explained" if worst <= BY_CHANCE else "partly_explained", True)
-    share = share_of_mismatch(found.retuned, found.after)
-    clean = worst <= EXPLAINED or (worst <= CONVINCED and share >= CONVINCING)
-    if clean and not np.nanmax(found.after.standing.test, initial=0.0) > HELD_OUT:
+        return Judgement("explained" if found.after.standing.seen <= BY_CHANCE else "partly_explained", True)
+    if as_good_as_noise(found) and not np.nanmax(found.after.standing.test, initial=0.0) > HELD_OUT:
         return Judgement("explained", True)
+    return Judgement("partly_explained", True) if worth_naming(found) else Judgement("unexplained", False)
+
+
+def as_good_as_noise(found: Explanation) -> bool:
+    """On what decisions may see."""
+    worst = found.after.standing.seen
+    return worst <= EXPLAINED or (worst <= CONVINCED and share_of_mismatch(found.retuned, found.after) >= CONVINCING)
+
+
+def worth_naming(found: Explanation) -> bool:
+    """Beside a remainder; on what decisions may see."""
     taken = found.retuned.standing.chosen_by - found.after.standing.chosen_by
-    if clean or worst <= NEARLY or share >= MOSTLY or taken >= BULK:
-        return Judgement("partly_explained", True)
-    return Judgement("unexplained", False)
+    share = share_of_mismatch(found.retuned, found.after)
+    return found.after.standing.seen <= NEARLY or share >= MOSTLY or taken >= BULK
 
 
 def _confirmed(found: Explanation) -> bool:
