@@ -8,9 +8,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 
 DIAGNOSIS := tests/stories/test_missing_physics_is_named.py \
-	tests/stories/test_friction_is_named_and_then_compensated.py
-# The tests in parts, the longest first; `rest` is every test that no other part has. Parts with a clock or a screen
-# sleep half of their time and must wake up at once: they start first, and what computes gives way to them.
+	tests/stories/test_friction_is_named_and_then_compensated.py tests/analysis
+# The tests in parts; `rest` is every test that no other part has. Parts with a clock or a screen sleep half of their
+# time and must wake up at once: they start first, and what computes gives way to them, the longest first.
 real_time := $(shell grep -rl --include='test_*.py' 'mark.real_time' tests)
 workflows := tests/study/workflows
 screens := tests/study/tui

@@ -19,12 +19,12 @@ settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A busy machine misses deadlines, and a trial whose screen falls silent is void, as it must be: once more, then.
+    """A busy machine shows a screen late, and a trial whose screen fell silent is void, as it must be: again, then.
 
-    What is wrong is wrong three times.
+    Never where something may not happen even once: a force that stays, an answer that is lost, a race of threads.
     """
     for item in items:
-        if item.get_closest_marker("real_time"):
+        if item.get_closest_marker("may_be_late"):
             item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=2))
 
 

@@ -29,7 +29,7 @@ from study.session.views import (
     Welcome,
 )
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE, progress=Progress(0.3, 9))

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from terminal import Terminal
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.mark.timeout(200)

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from terminal import ROOT, Terminal
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from aiohttp import ClientSession, WSServerHandshakeError
 
 from study.tui.web_server import origins
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 ROOT = Path(__file__).resolve().parents[3]
 PATHS = os.pathsep.join((str(ROOT), str(ROOT / "study" / "launcher")))

@@ -12,7 +12,7 @@ from study.session.requests import PauseAsked, StopAsked
 from study.store.event_log import LOG_NAME, EventLog, read_log
 from study.store.request_inbox import RequestInbox
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.fixture(scope="module")

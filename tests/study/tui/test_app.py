@@ -16,7 +16,7 @@ from study.tui.home_messages import BeginWanted
 from study.tui.link.from_engine import Failed, Finished
 from study.tui.link.to_engine import Begin, SessionOrder
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 SIZE = (100, 30)
 SHORT = {

@@ -12,7 +12,7 @@ from study.tui.app import HapteqApp
 from study.tui.app_start import AppStart
 from study.tui.home_messages import DiagnoseWanted
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.fixture

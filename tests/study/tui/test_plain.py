@@ -17,8 +17,6 @@ from study.session.views import (
 from study.tui.answer_keys import AnswerKeys
 from study.tui.direction_picture import drawing, sentence
 
-pytestmark = pytest.mark.real_time
-
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 2, 5, trial_number=7, repeated=False, time_limit_s=0.0, picture=PICTURE)
 

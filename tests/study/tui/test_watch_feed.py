@@ -13,7 +13,7 @@ import pytest
 from study.session.events import DeviceFacts, SessionOpened, event_line
 from study.tui.link.watch_feed import WatchFeed
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 ROOT = Path(__file__).parents[3]
 

@@ -124,6 +124,7 @@ def test_several_sources_are_heard_in_turn(requests):
 
 
 @pytest.mark.real_time
+@pytest.mark.may_be_late
 def test_the_live_state_is_told_in_real_time_a_few_times_a_second(rigs):
     told, clock = [], RealClock()
     with contextlib.closing(SafeDevice(rigs.compiled_rig(), rigs.SETTINGS, clock)) as device:

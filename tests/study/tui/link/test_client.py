@@ -10,7 +10,7 @@ from study.tui.link.client import EngineClient
 from study.tui.link.from_engine import Failed
 from study.tui.link.to_engine import ShowHome
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 ENGINES = """
 import os, sys

@@ -27,7 +27,7 @@ from study.tui.link.to_engine import (
     Withdraw,
 )
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 ROOT = Path(__file__).parents[4]
 

@@ -27,7 +27,7 @@ from study.tui.link.remote_display import SILENT_AFTER_S, RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
 from study.tui.link.to_engine import Heartbeat, Reply
 
-pytestmark = pytest.mark.real_time
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 1, 5, 3, repeated=False, time_limit_s=0.0, picture=PICTURE)

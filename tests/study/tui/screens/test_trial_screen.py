@@ -122,6 +122,7 @@ def test_nothing_is_heard_before_it_is_armed_and_after_it_is_disarmed(on_stage):
 
 
 @pytest.mark.real_time
+@pytest.mark.may_be_late
 def test_a_key_held_over_from_the_last_trial_does_not_answer_the_next(on_stage):
     screen = TrialScreen()
 
@@ -168,6 +169,7 @@ def test_a_key_that_was_read_before_the_question_answers_nothing(on_stage):
 
 
 @pytest.mark.real_time
+@pytest.mark.may_be_late
 def test_the_time_limit_ends_the_question_unless_it_was_answered(on_stage):
     screen = TrialScreen()
     limited = replace(QUESTION, time_limit_s=0.1)
