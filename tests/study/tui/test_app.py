@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
+from textual.widgets import Input
 
 from study.store.log_writer import somebody_writes
 from study.tui.app import HapteqApp
@@ -62,9 +63,12 @@ class Person:
 
     async def reads(self, words: str) -> None:
         """Until they are on the screen."""
+        await self.sees(lambda: words in self.text())
+
+    async def sees(self, there: Callable[[], bool]) -> None:
         until_s = time.monotonic() + 30.0
-        while words not in self.text():
-            assert time.monotonic() < until_s, f"{words!r} is not in: {self.text()}"
+        while not there():
+            assert time.monotonic() < until_s, self.text()
             await self.pilot.pause(0.03)
 
     def text(self) -> str:
@@ -115,11 +119,12 @@ def test_from_the_start_screen_to_the_report_and_back(order, tmp_path):
 
     async def story(person: Person) -> None:
         await person.until("HomeScreen")
-        await asyncio.sleep(0.1)
+        await person.sees(lambda: person.app.focused is not None and person.app.focused.id == "code")
         await person.pilot.press(*"P01")
+        await person.sees(lambda: person.app.screen.query_one("#code", Input).value == "P01")
         until_s = time.monotonic() + 30.0
         while person.at == "HomeScreen":
-            assert time.monotonic() < until_s
+            assert time.monotonic() < until_s, person.text()
             await person.press("f5")
         await person.until("OutcomeScreen", patience_s=90.0)
         await person.reads("The session is finished")
