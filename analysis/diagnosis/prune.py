@@ -12,7 +12,7 @@ from analysis.diagnosis.without_step import without_step
 LITTLE = 0.1
 """Share of the mismatch that a further effect must take where more than noise is left with it, too: no law is exact,
 and in what a strong one leaves, any number beside it finds a little. On the bank from 93000 on, what took less was
-wrong in four of five, and seconds that were right took a fifth."""
+wrong in four of five, and seconds that were right a fifth or more."""
 
 
 def pruned(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
