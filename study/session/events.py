@@ -10,6 +10,22 @@ from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from protocols.trial import Phase
+from study.session.fact_types import (
+    AngleDeg,
+    Count,
+    ForceN,
+    FrequencyHz,
+    Index,
+    LevelDb,
+    Magnitude,
+    Measured,
+    Positive,
+    RecordingPath,
+    Seconds,
+    Seed,
+    Sha256,
+    UtcTime,
+)
 from study.session.level_scale import EqualizedFacts
 from study.session.sitting_events import (
     FACT,
@@ -54,7 +70,7 @@ SESSION_VERSION: Literal[1] = 1
 class DeviceFacts:
     name: str
     simulated: bool
-    sample_rate_hz: float
+    sample_rate_hz: Positive
     details: str = ""
 
 
@@ -62,19 +78,19 @@ class DeviceFacts:
 class SessionOpened:
     """First line of every log: all that the rest follows from."""
 
-    utc: str
+    utc: UtcTime
     format: Literal["hapteq-session"]
     version: Literal[1]
     session: str
     subject: str
-    participant_number: Annotated[int, Field(ge=0)]
+    participant_number: Index
     """How many participants began this protocol before: chooses the row of a balanced order."""
     observer: str | None
     """Name of the simulated participant; null for a person."""
     protocol_text: str
-    protocol_hash: str
+    protocol_hash: Sha256
     protocol_locked: bool
-    seed: Annotated[int, Field(ge=0)]
+    seed: Seed
     device: DeviceFacts
     equalizer: str
     versions: dict[str, str]
@@ -87,19 +103,19 @@ class SessionOpened:
 class TrialPresented:
     """Written before the device moves."""
 
-    utc: str
-    run: int
-    trial: int
-    attempt: int
+    utc: UtcTime
+    run: Index
+    trial: Index
+    attempt: Index
     phase: Phase
-    frequency_hz: float
-    level_db: float
-    level_n: float
+    frequency_hz: FrequencyHz
+    level_db: LevelDb
+    level_n: ForceN
     direction: Literal[1, 2]
     """The number that is the right answer; with swapped labels not the number of the protocol's direction."""
-    angle_deg: float
+    angle_deg: AngleDeg
     polarity: Literal[-1, 1]
-    wanted_mps2: float | None = None
+    wanted_mps2: Magnitude | None = None
     """The acceleration that the level stands for; null where levels are commanded forces."""
     event: Literal["trial_presented"] = "trial_presented"
 
@@ -108,12 +124,12 @@ class TrialPresented:
 class AnswerGiven:
     """Written before anything reacts to it."""
 
-    utc: str
-    run: int
-    trial: int
-    attempt: int
+    utc: UtcTime
+    run: Index
+    trial: Index
+    attempt: Index
     answer: Literal[1, 2]
-    response_time_s: float
+    response_time_s: Seconds
     event: Literal["answer_given"] = "answer_given"
 
 
@@ -121,21 +137,21 @@ class AnswerGiven:
 class TrialMeasured:
     """What the device did in an answered trial. It closes the trial: the answer counts."""
 
-    utc: str
-    run: int
-    trial: int
-    attempt: int
+    utc: UtcTime
+    run: Index
+    trial: Index
+    attempt: Index
     status: Literal["ok", "flagged", "unmeasured"]
     flags: tuple[str, ...] = ()
-    recording: str | None = None
-    sha256: str | None = None
-    delivered_mps2: float | None = None
-    off_axis_mps2: float | None = None
-    displacement_mm: float | None = None
-    missed_ticks: int | None = None
-    vibrated_s: float | None = None
+    recording: RecordingPath | None = None
+    sha256: Sha256 | None = None
+    delivered_mps2: Measured | None = None
+    off_axis_mps2: Measured | None = None
+    displacement_mm: Measured | None = None
+    missed_ticks: Count | None = None
+    vibrated_s: Seconds | None = None
     """How long the hand was shaken, fades included: for the vibration dose."""
-    offset_mm: float | None = None
+    offset_mm: Magnitude | None = None
     """Farthest the handle was from its place while recorded: a lean on the spring."""
     event: Literal["trial_measured"] = "trial_measured"
 
@@ -144,23 +160,23 @@ class TrialMeasured:
 class TrialSpoiled:
     """The presentation is void, answered or not; the trial is drawn again as the next attempt."""
 
-    utc: str
-    run: int
-    trial: int
-    attempt: int
+    utc: UtcTime
+    run: Index
+    trial: Index
+    attempt: Index
     reason: str
-    missed_ticks: int | None = None
-    vibrated_s: float | None = None
+    missed_ticks: Count | None = None
+    vibrated_s: Seconds | None = None
     event: Literal["trial_spoiled"] = "trial_spoiled"
 
 
 @dataclass(frozen=True, config=FACT)
 class RestTaken:
-    utc: str
-    run: int
-    trial: int
+    utc: UtcTime
+    run: Index
+    trial: Index
     """Index of the trial that comes after the rest."""
-    rested_s: float
+    rested_s: Seconds
     event: Literal["rest_taken"] = "rest_taken"
 
 
@@ -168,14 +184,14 @@ class RestTaken:
 class SessionInterrupted:
     """Somebody left on purpose, or a fault ended the sitting. It can be resumed."""
 
-    utc: str
+    utc: UtcTime
     reason: str
     event: Literal["session_interrupted"] = "session_interrupted"
 
 
 @dataclass(frozen=True, config=FACT)
 class SessionResumed:
-    utc: str
+    utc: UtcTime
     device: DeviceFacts
     versions: dict[str, str]
     mended: str = ""
@@ -187,7 +203,7 @@ class SessionResumed:
 class SessionClosed:
     """Last line of a finished session."""
 
-    utc: str
+    utc: UtcTime
     outcome: Literal["completed"]
     event: Literal["session_closed"] = "session_closed"
 
@@ -219,5 +235,5 @@ def event_line(event: Event) -> bytes:
 
 
 def parse_event(line: bytes) -> Event:
-    """Raises pydantic.ValidationError (a ValueError) where the line is no event of ours."""
-    return EVENTS.validate_json(line, strict=False)
+    """Every field as its type. Raises pydantic.ValidationError (a ValueError) where the line is no event of ours."""
+    return EVENTS.validate_json(line, strict=True)

@@ -6,6 +6,7 @@ two directions needs for its acceleration. Both directions then reach the cap at
 
 from pydantic.dataclasses import dataclass
 
+from study.session.fact_types import FileName, FrequencyHz, Magnitude, Positive, Sha256
 from study.session.sitting_events import FACT
 
 
@@ -13,10 +14,10 @@ from study.session.sitting_events import FACT
 class LevelScale:
     """At one frequency."""
 
-    frequency_hz: float
-    n_per_mps2: float
+    frequency_hz: FrequencyHz
+    n_per_mps2: Positive
     """Level for a wanted acceleration of 1 m/s²."""
-    reachable_mps2: float
+    reachable_mps2: Magnitude
     """At the cap of the staircase, in either direction."""
 
 
@@ -24,9 +25,9 @@ class LevelScale:
 class EqualizedFacts:
     """Through what the stimuli of a session go."""
 
-    model: str
+    model: FileName
     """File in the session folder."""
-    sha256: str
+    sha256: Sha256
     """Of that file."""
     levels: tuple[LevelScale, ...]
     """One per frequency that may be played."""

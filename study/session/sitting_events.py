@@ -1,9 +1,11 @@
 """Facts of a sitting around its trials: forms, checks, demonstrations, pauses, notes."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
+
+from study.session.fact_types import AngleDeg, ForceN, FrequencyHz, Seconds, UtcTime
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -13,7 +15,7 @@ class FormFilled:
     """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why somebody may not take part)
     is not kept: `answers` holds what the study needs."""
 
-    utc: str
+    utc: UtcTime
     form: Literal["consent", "exclusion", "setup", "debrief"]
     version: str
     """Of the form, as its protocol states it."""
@@ -26,7 +28,7 @@ class FormFilled:
 
 @dataclass(frozen=True, config=FACT)
 class DeviceChecked:
-    utc: str
+    utc: UtcTime
     passed: bool
     findings: tuple[str, ...]
     """One sentence each."""
@@ -37,33 +39,33 @@ class DeviceChecked:
 class DemoPlayed:
     """A labelled demonstration, written before the device moves."""
 
-    utc: str
-    frequency_hz: float
-    level_n: float
+    utc: UtcTime
+    frequency_hz: FrequencyHz
+    level_n: ForceN
     direction: Literal[1, 2]
     """The number on the screen."""
-    angle_deg: float
-    seconds: float
+    angle_deg: AngleDeg
+    seconds: Seconds
     event: Literal["demo_played"] = "demo_played"
 
 
 @dataclass(frozen=True, config=FACT)
 class DemoFinished:
-    utc: str
+    utc: UtcTime
     event: Literal["demo_finished"] = "demo_finished"
 
 
 @dataclass(frozen=True, config=FACT)
 class PauseTaken:
-    utc: str
+    utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
-    paused_s: Annotated[float, Field(ge=0)]
+    paused_s: Seconds
     event: Literal["pause_taken"] = "pause_taken"
 
 
 @dataclass(frozen=True, config=FACT)
 class NoteTaken:
-    utc: str
+    utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
     text: str
     adverse: bool = False

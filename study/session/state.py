@@ -9,6 +9,7 @@ from protocols.staircase import StaircaseState, begin
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial
+from study.session.draw_check import LogContradiction
 from study.session.due_trial import Place, Present, due_trial
 from study.session.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.sitting_state import SittingState
@@ -47,6 +48,8 @@ class SessionState:
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:
+    """Raises LogContradiction where the opening line does not go with its protocol."""
+    _check_scales(opened, protocol)
     state = SessionState(
         opened=opened,
         protocol=protocol,
@@ -62,6 +65,16 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
         closed=False,
     )
     return replace(state, staircase=begin(current_rule(state)))
+
+
+def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
+    """Every frequency that is due later has its scale of levels."""
+    if opened.equalized is None:
+        return
+    known = {scale.frequency_hz for scale in opened.equalized.levels}
+    missing = [f"{frequency:g} Hz" for frequency in protocol.all_frequencies_hz if frequency not in known]
+    if missing:
+        raise LogContradiction(f"the session has no scale of levels for {', '.join(missing)}")
 
 
 def current_rule(state: SessionState) -> StaircaseRule:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, get_args
 
+from study.session.fact_types import utc_time
 from study.session.live import Activity, Live
 
 LIVE_NAME = "live.json"
@@ -67,7 +68,15 @@ def _fits(values: dict[str, Any]) -> bool:
         and all(isinstance(value, kinds[name]) for name, value in values.items())
         and all(kinds[name] == (bool,) or not isinstance(value, bool) for name, value in values.items())
         and values["activity"] in _ACTIVITIES
+        and all(_is_time(values[name]) for name in ("utc", "since_utc"))
     )
+
+
+def _is_time(text: str) -> bool:
+    try:
+        return bool(utc_time(text))
+    except ValueError:
+        return False
 
 
 def _finite(value: Any) -> Any:

@@ -37,17 +37,19 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             "Give the folder its own name back, or take the copy away.",
             saved="Nothing was changed.",
         )
-    state = begin_session(opened, protocol_of(opened, folder))
-    for number, event in enumerate(contents.events[1:], start=2):
-        try:
+    number = 1
+    try:
+        state = begin_session(opened, protocol_of(opened, folder))
+        for event in contents.events[1:]:
+            number += 1
             state = apply(state, event)
-        except LogContradiction as problem:
-            raise StudyError(
-                "The session log contradicts the rules",
-                f"Line {number} of {folder.name}: {problem}.",
-                "If the log was edited, restore it from a copy; if not, use the hapteq that began it (first line).",
-                saved="Nothing was changed; every answer is still in the log.",
-            ) from problem
+    except (LogContradiction, ArithmeticError) as problem:
+        raise StudyError(
+            "The session log contradicts the rules",
+            f"Line {number} of {folder.name}: {problem}.",
+            "If the log was edited, restore it from a copy; if not, use the hapteq that began it (first line).",
+            saved="Nothing was changed; every answer is still in the log.",
+        ) from problem
     return FoldedSession(state, contents)
 
 

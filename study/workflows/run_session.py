@@ -178,7 +178,7 @@ def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState
     """A rest that a pause or a stop cuts short counts for nothing: it is due again afterwards."""
     sitting.attendant.begin("rest")
     notice = RestNotice(seconds, len(state.runs) - state.run, progress(state))
-    rested_s = sitting.display.rest(notice, sitting.attendant.glance)
+    rested_s = max(0.0, sitting.display.rest(notice, sitting.attendant.glance))
     if rested_s < seconds and (sitting.attendant.stop_asked or sitting.attendant.pause_asked):
         return state
     event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)

@@ -92,7 +92,10 @@ class Follower:
         if self._watched is None:
             if not isinstance(event, SessionOpened):
                 raise _not_ours(self._folder)
-            self._watched = begin_watching(event, protocol_of(event, self._folder))
+            try:
+                self._watched = begin_watching(event, protocol_of(event, self._folder))
+            except LogContradiction:
+                raise _not_ours(self._folder) from None
             return ""
         try:
             self._watched = after(self._watched, event)

@@ -130,7 +130,7 @@ path = Path({str(written)!r})
 log = EventLog.reopen(path)
 resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 20,) * 2)
 try:
-    log.append(NoteTaken(utc="u", who="program", text="x" * 100))
+    log.append(NoteTaken(utc="2026-01-01T00:00:00+00:00", who="program", text="x" * 100))
 except StudyError as error:
     print(error.title)
 """
