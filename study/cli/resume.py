@@ -39,10 +39,12 @@ def resume(
 
 def _simulated(session: str, data: Path) -> bool:
     """Whether its first line says that a simulated participant takes it: that one needs no screen."""
+    from study.store.regular_file import DOCUMENT_BYTES, open_regular
+
     for folder in (Path(session), data / session):
         try:
-            with (folder / LOG_NAME).open("rb") as log:
-                return json.loads(log.readline()).get("observer") is not None
+            with open_regular(folder / LOG_NAME) as log:
+                return json.loads(log.readline(DOCUMENT_BYTES)).get("observer") is not None
         except (OSError, ValueError, AttributeError, RecursionError):
             continue
     return False

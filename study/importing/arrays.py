@@ -18,6 +18,7 @@ from study.importing.map_errors import ImportRefusedError
 from study.importing.stored_arrays import read_hdf5_arrays, read_mat_arrays, read_npz_arrays
 from study.store.file_errors import CannotReadError
 from study.store.hdf5_file import is_hdf5
+from study.store.regular_file import open_regular
 
 Array = npt.NDArray[Any]
 KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
@@ -45,8 +46,7 @@ class Arrays:
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
     """Raises CannotReadError, ImportRefusedError."""
     try:
-        with path.open("rb"):
-            pass
+        open_regular(path).close()
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:

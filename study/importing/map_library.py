@@ -15,6 +15,7 @@ from study.importing.map_errors import ImportProblemError, suggestion
 from study.importing.map_files import part_files
 from study.importing.map_toml import is_map, parse_map
 from study.importing.namespace import of_file
+from study.store.regular_file import DOCUMENT_BYTES
 from study.store.text_file import read_text
 
 NO_DATA = (".toml", ".md")
@@ -64,7 +65,7 @@ def read_map(name: str) -> MapFile:
             f"{', '.join(shipped_maps())}.",
             "Give the name of one of them, or the path of a map of yours.",
         )
-    text = read_text(path)
+    text = read_text(path, DOCUMENT_BYTES)
     return MapFile(path.stem, parse_map(text, path), text, path)
 
 
@@ -82,8 +83,8 @@ def find_map(folder: Path) -> tuple[FoundMap, ...]:
 
 def _is_map_file(path: Path) -> bool:
     try:
-        return is_map(tomllib.loads(read_text(path)))
-    except tomllib.TOMLDecodeError:
+        return is_map(tomllib.loads(read_text(path, DOCUMENT_BYTES)))
+    except (StudyError, ValueError, RecursionError):
         return False
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
 from study.store.atomic_write import sync_folder
+from study.store.regular_file import DOCUMENT_BYTES, open_regular, read_regular
 
 LOG_NAME = "events.jsonl"
 
@@ -33,6 +34,7 @@ class EventLog:
     def reopen(cls, path: Path) -> "EventLog":
         """Raises StudyError where it cannot be written to."""
         try:
+            open_regular(path).close()  # a pipe would wait for its other end
             descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
         except OSError as problem:
             raise StudyError(
@@ -73,7 +75,7 @@ class LogContents:
 def read_log(path: Path) -> LogContents:
     """All whole events. Only the last line may be torn; a broken line before it is an error, not a loss."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as problem:
         raise StudyError(
             "The session log cannot be read",
@@ -89,8 +91,8 @@ def read_opening(path: Path) -> Event | None:
     """The first line alone, whatever comes after it; None where it is not whole. Raises StudyError, OSError."""
     if not path.exists():
         return None
-    with path.open("rb") as file:
-        line = file.readline()
+    with open_regular(path) as file:
+        line = file.readline(DOCUMENT_BYTES)
     return _event(path, 1, line) if line.endswith(b"\n") else None
 
 
@@ -98,7 +100,7 @@ def readable_events(path: Path) -> tuple[Event, ...]:
     """The events before the first damage, for whoever wants to look at a log that cannot be used. Raises nothing."""
     events: list[Event] = []
     try:
-        for line in path.read_bytes().split(b"\n")[:-1]:
+        for line in read_regular(path).split(b"\n")[:-1]:
             events.append(parse_event(line))
     except (OSError, ValueError):
         pass  # here the damage begins; whoever reads this knows of it

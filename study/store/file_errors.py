@@ -4,6 +4,7 @@ import errno
 from pathlib import Path
 
 from study.errors import StudyError
+from study.store.regular_file import RefusedFileError
 
 CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
 
@@ -80,6 +81,8 @@ def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
             return f"You have no right to read {path}"
         case UnicodeDecodeError():
             return f"It is neither HDF5 nor text in UTF-8 (byte {problem.start})"
+        case RefusedFileError():
+            return problem.words[:1].upper() + problem.words[1:]
     return f"The system says: {problem.strerror or problem}"
 
 

@@ -13,6 +13,7 @@ from equalizer.signals.signal import FloatArray
 from study.store.atomic_write import write_atomically
 from study.store.file_errors import CannotReadError, UnusableFileError
 from study.store.hdf5_attributes import AttributeProblemError, numbers_attribute, text_attribute
+from study.store.regular_file import open_regular
 
 Value = TypeVar("Value")
 
@@ -85,8 +86,7 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool) -> N
 @contextmanager
 def _opened(path: Path, kind: str) -> Iterator[Any]:
     try:
-        with path.open("rb"):
-            pass
+        open_regular(path).close()
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:

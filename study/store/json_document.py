@@ -7,6 +7,7 @@ from typing import Any
 
 from study.store.file_errors import UnusableFileError
 from study.store.provenance import Provenance
+from study.store.regular_file import DOCUMENT_BYTES
 from study.store.text_file import read_text, write_text
 
 
@@ -37,7 +38,7 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
 
     Raises CannotReadError, UnusableFileError.
     """
-    document = parse_json(path, read_text(path), format_name)
+    document = parse_json(path, read_text(path, DOCUMENT_BYTES), format_name)
     found, number = document.pop("format", None), document.pop("version", None)
     if found != format_name:
         raise UnusableFileError(path, format_name, (f"its format is {_said(found)}, not '{format_name}'",))

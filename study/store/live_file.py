@@ -9,12 +9,14 @@ from typing import Any, get_args
 
 from study.session.fact_types import utc_time
 from study.session.live import Activity, Live
+from study.store.regular_file import read_regular
 
 LIVE_NAME = "live.json"
 LIVE_FORMAT = "hapteq-live"
 LIVE_VERSION = 1
 
 _ACTIVITIES = get_args(Activity)
+_LARGEST_BYTES = 1 << 16
 
 
 def write_live(folder: Path, live: Live) -> None:
@@ -40,7 +42,7 @@ def remove_live(folder: Path) -> None:
 def read_live(folder: Path) -> Live | None:
     """None where there is none, or none that can be used. Never raises."""
     try:
-        document = json.loads((folder / LIVE_NAME).read_bytes(), parse_constant=_refuse)
+        document = json.loads(read_regular(folder / LIVE_NAME, _LARGEST_BYTES), parse_constant=_refuse)
     except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(document, dict):

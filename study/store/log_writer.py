@@ -1,7 +1,8 @@
 """Whether somebody writes a log right now, as the operating system knows it: its lock dies with its holder."""
 
-import os
 from pathlib import Path
+
+from study.store.regular_file import open_regular
 
 
 def somebody_writes(log: Path) -> bool | None:
@@ -14,15 +15,10 @@ def somebody_writes(log: Path) -> bool | None:
     except ImportError:  # Windows
         return None
     try:
-        descriptor = os.open(log, os.O_RDONLY)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        with open_regular(log) as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
     except OSError:
         return None
-    finally:
-        os.close(descriptor)
     return False

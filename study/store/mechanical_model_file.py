@@ -6,6 +6,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
 from study.store.file_errors import UnusableFileError
 from study.store.layout import Entry
+from study.store.regular_file import DOCUMENT_BYTES
 from study.store.text_file import read_text, write_text
 
 LAYOUT = (
@@ -38,7 +39,7 @@ LAYOUT = (
 def read_mechanical_model(path: Path) -> MechanicalModel:
     """Raises CannotReadError, UnusableFileError."""
     try:
-        return parse_mechanical_model(read_text(path))
+        return parse_mechanical_model(read_text(path, DOCUMENT_BYTES))
     except MechanicalModelError as error:
         raise UnusableFileError(path, "mechanical model", error.problems) from error
 

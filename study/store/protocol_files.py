@@ -1,5 +1,6 @@
 """Protocols from the disk: the shipped ones by name, others by path; and locks that fix them before data come in."""
 
+import os
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.resources import files
@@ -13,6 +14,7 @@ from protocols.recording_protocol import RecordingProtocol
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError, WrongUseError
 from study.store.file_errors import UnusableFileError
+from study.store.regular_file import DOCUMENT_BYTES
 from study.store.text_file import read_text, write_text
 
 P = TypeVar("P", bound=Protocol, covariant=True)
@@ -74,7 +76,11 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock).
     """
     path = None if name in shipped_protocols() else _path_of(name)
-    text = files("protocols").joinpath(f"{name}.toml").read_text("utf-8") if path is None else read_text(path)
+    text = (
+        files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
+        if path is None
+        else read_text(path, DOCUMENT_BYTES)
+    )
     source = f"{name}.toml" if path is None else path.name
     try:
         protocol = load_protocol(text, source)
@@ -122,9 +128,9 @@ def _checked_lock(protocol: Protocol, path: Path | None, data: Path | None) -> P
 
 
 def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
-    if not path.exists():
+    if not os.path.lexists(path):  # a link that leads nowhere is a lock that cannot be read, not none
         return None
-    text = read_text(path)
+    text = read_text(path, DOCUMENT_BYTES)
     try:
         lock = lock_from_json(text)
     except LockError as error:

@@ -12,6 +12,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from study.store.file_errors import CannotReadError
+from study.store.regular_file import open_regular
 
 PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels")
 
@@ -73,7 +74,7 @@ def command_line(arguments: Sequence[str]) -> tuple[str, ...]:
 
 def sha256_of(path: Path) -> str:
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as problem:
         raise CannotReadError(path, problem) from problem

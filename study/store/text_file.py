@@ -4,12 +4,13 @@ from pathlib import Path
 
 from study.store.atomic_write import write_atomically
 from study.store.file_errors import CannotReadError
+from study.store.regular_file import TABLE_BYTES, read_regular
 
 
-def read_text(path: Path) -> str:
-    """The text without a byte order mark. Raises CannotReadError."""
+def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:
+    """The text without a byte order mark. Raises CannotReadError, also for a file that is larger."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return read_regular(path, most_bytes).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as problem:
         raise CannotReadError(path, problem) from problem
 

@@ -24,6 +24,7 @@ from study.store.archive import SessionFolder
 from study.store.atomic_write import write_atomically
 from study.store.identified_model_file import read_identified_model
 from study.store.provenance import sha256_of
+from study.store.regular_file import read_regular
 from study.workflows.spring_beside_model import spring_beside
 
 MODEL_NAME = "model.h5"
@@ -84,7 +85,7 @@ def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceI
 def keep_model(equalized: Equalized, folder: SessionFolder) -> None:
     """Before the log names it."""
     if equalized.source is not None:
-        write_atomically(folder.path / MODEL_NAME, equalized.source.read_bytes())
+        write_atomically(folder.path / MODEL_NAME, read_regular(equalized.source))
 
 
 def equalized_again(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:

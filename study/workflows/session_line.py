@@ -19,6 +19,7 @@ from study.store.archive import SessionFolder
 from study.store.event_log import read_opening
 from study.store.json_document import read_json
 from study.store.log_writer import somebody_writes
+from study.store.regular_file import read_regular
 from study.workflows.fold_session import fold_session
 from study.workflows.participant_number import TOMBSTONE_FORMAT, TOMBSTONE_VERSION
 
@@ -92,7 +93,7 @@ def _withdrawn(folder: SessionFolder) -> SessionLine:
 @lru_cache(maxsize=4096)
 def _line(folder: SessionFolder, changed_ns: int, size: int) -> SessionLine:
     """Depends on the log's content alone, for which its time and size stand. Raises StudyError, OSError."""
-    content = folder.log.read_bytes()
+    content = read_regular(folder.log)
     opened = read_opening(folder.log) if CLOSED in content and _looks_whole(content) else None
     planned = _planned(opened.protocol_text) if isinstance(opened, SessionOpened) else None
     if planned is None or not isinstance(opened, SessionOpened) or opened.session != folder.name:

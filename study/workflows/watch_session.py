@@ -17,6 +17,7 @@ from study.session.watching import Beside, watch_view
 from study.store.archive import SessionFolder
 from study.store.live_file import read_live
 from study.store.log_writer import somebody_writes
+from study.store.regular_file import TABLE_BYTES, open_regular
 from study.store.request_inbox import RequestInbox
 from study.workflows.fold_session import protocol_of
 
@@ -59,12 +60,14 @@ class Follower:
 
     def _take_in_what_is_new(self) -> None:
         try:
-            with self._folder.log.open("rb") as file:
+            with open_regular(self._folder.log) as file:
                 self._begin_again_if_rewritten(file)
                 file.seek(self._read_bytes)
-                fresh = file.read()
+                fresh = file.read(TABLE_BYTES)
         except OSError as problem:
             self._problem, self._missing = f"{problem.strerror or problem}.", isinstance(problem, FileNotFoundError)
+            if self._watched is None and not self._missing:
+                raise _not_ours(f"The log of {self._folder.name}: {self._problem}") from problem
             return
         self._problem, self._missing = "", False
         # What comes after the last line end is being written, or was torn by a crash.
@@ -87,15 +90,15 @@ class Follower:
             event = parse_event(line)
         except ValueError:
             if self._watched is None:
-                raise _not_ours(self._folder) from None
+                raise _not_ours(_FIRST.format(self._folder.name)) from None
             return "a line of it is no event that this version knows."
         if self._watched is None:
             if not isinstance(event, SessionOpened):
-                raise _not_ours(self._folder)
+                raise _not_ours(_FIRST.format(self._folder.name))
             try:
                 self._watched = begin_watching(event, protocol_of(event, self._folder))
             except LogContradiction:
-                raise _not_ours(self._folder) from None
+                raise _not_ours(_FIRST.format(self._folder.name)) from None
             return ""
         try:
             self._watched = after(self._watched, event)
@@ -115,9 +118,12 @@ class Follower:
         return self._writer
 
 
-def _not_ours(folder: SessionFolder) -> StudyError:
+_FIRST = "The first line of the log of {} is none that this version knows."
+
+
+def _not_ours(why: str) -> StudyError:
     return StudyError(
         "This session cannot be followed",
-        f"The first line of the log of {folder.name} is none that this version knows.",
+        why,
         "Use the hapteq that runs the session; hapteq validate says more.",
     )

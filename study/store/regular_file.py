@@ -1,0 +1,65 @@
+"""Regular files only, opened without waiting: a pipe, a device or a folder in a file's place is an error at once."""
+
+import errno
+import io
+import os
+import stat
+from pathlib import Path
+
+TABLE_BYTES = 2**28
+"""Largest text that is read: tables and logs. An hour at 1 kHz with four columns of 17 digits."""
+DOCUMENT_BYTES = 2**24
+"""Largest JSON and TOML document that is read; the largest that hapteq writes are below 1 MB."""
+
+_BLOCK_BYTES = 2**20
+_KINDS = (
+    (stat.S_ISFIFO, "it is a pipe, not a file"),
+    (stat.S_ISSOCK, "it is a socket, not a file"),
+    (stat.S_ISCHR, "it is a device, not a file"),
+    (stat.S_ISBLK, "it is a device, not a file"),
+)
+
+
+class RefusedFileError(OSError):
+    """Something that is not read although the system would: no regular file, or too large. An OSError, so that
+    it is told wherever a file that cannot be opened is told. `words`: a sentence without capital and full stop."""
+
+    def __init__(self, number: int, words: str) -> None:
+        super().__init__(number, words)
+        self.words = words
+
+
+def open_regular(path: Path) -> io.BufferedReader:
+    """Open for reading; symbolic links are followed. Raises OSError, RefusedFileError among them."""
+    _require_regular(path.stat())  # first, because opening some devices does something to them
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+    descriptor = os.open(path, flags)
+    try:
+        _require_regular(os.fstat(descriptor))  # again, because the name may mean another file by now
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_regular(path: Path, most_bytes: int = TABLE_BYTES) -> bytes:
+    """The whole content. Raises OSError; RefusedFileError, before anything is read, for a larger file."""
+    with open_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        blocks: list[bytes] = []
+        found = 0
+        # Not the size alone: a file of the system may say 0 bytes and go on without end.
+        while size <= most_bytes and found <= most_bytes and (block := file.read(_BLOCK_BYTES)):
+            blocks.append(block)
+            found += len(block)
+    if max(size, found) > most_bytes:
+        raise RefusedFileError(errno.EFBIG, f"it has {max(size, found)} bytes, and up to {most_bytes} are read")
+    return b"".join(blocks)
+
+
+def _require_regular(found: os.stat_result) -> None:
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(found.st_mode):
+        what = next((words for is_kind, words in _KINDS if is_kind(found.st_mode)), "it is no regular file")
+        raise RefusedFileError(errno.EINVAL, what)
