@@ -8,6 +8,7 @@ Decisions:
 
 2026-11-21. The published one-way analysis is computed as published, and the one within participants stands beside it
 with the difference in words: readers need both, the first to compare, the second to believe.
-2026-11-21. A threshold with a peak at the cap is called a lower bound; comparing the mean with the cap would miss
+2026-11-22. A threshold with a peak at the cap is called cut by the cap, and no lower bound: it lies above the true
+threshold in some runs. The mark is set by peaks at the cap; comparing the mean with the cap would miss
 every guesser (they end near 2.7 N of 3 N). `thresholds.is_censored` has the measured operating characteristics.
 """

@@ -40,7 +40,7 @@ def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tu
 
 
 def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[Below, ...]:
-    """Both tables in newtons. Lower bounds of directions are left out: the threshold itself may lie above."""
+    """Both tables in newtons. Thresholds of direction that the cap cut are left out."""
     felt = {
         (subject, frequency_hz): value
         for subject, row in zip(detection.subjects, detection.values, strict=True)

@@ -14,9 +14,10 @@ from analysis.population import Population, split_by_population
 from analysis.practice import PracticeRun, practice_runs
 from analysis.repeated_measures import RepeatedMeasures, repeated_measures
 from analysis.runs import Run, recompute_runs
-from analysis.study_warnings import design_difference, side_warnings, study_warnings
+from analysis.study_warnings import side_warnings, study_warnings
 from analysis.threshold_table import ThresholdTable, threshold_table
 from analysis.thresholds import Threshold, threshold_of
+from analysis.wording import f_text, p_text
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase, Trial
 
@@ -103,7 +104,10 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "unit": "N",
         "participants": list(analysis.table.subjects),
         "frequencies_hz": list(analysis.table.frequencies_hz),
-        "lower_bounds": sum(map(sum, analysis.table.censored)),
+        "cut_by_cap": analysis.table.cut,
+        "lower_bounds": analysis.table.cut,  # older name of cut_by_cap, kept for programs that read it
+        "stopped_by_trial_limit": sum(map(sum, analysis.table.stopped)),
+        "coverage": analysis.table.coverage or None,
         "one_way": asdict(analysis.anova),
         "comparisons": asdict(analysis.comparisons),
         "within_participants": asdict(analysis.within),
@@ -111,3 +115,29 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "difference": analysis.difference,
         "warnings": list(analysis.warnings),
     }
+
+
+def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
+    """The published analysis beside the one within participants, in words and numbers."""
+    if anova.p is None or within.p is None:
+        said = "neither" if anova.p is None and within.p is None else "only one"
+        return (
+            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {said} "
+            "can be computed from these data, so they cannot be compared."
+        )
+    agree = (anova.p < 0.05) == (within.p < 0.05)
+    return (
+        "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
+        f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
+        "Every participant took every frequency; the analysis within participants takes those differences out "
+        f"({_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
+        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
+        f"{within.epsilon:.2f}, {p_text(within.p)}. "
+        + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
+        + "The second one fits the design; the first is here to compare with the published result."
+    )
+
+
+def _removed_percent(within: RepeatedMeasures) -> str:
+    between, error = within.ss_participants or 0.0, within.ss_error or 0.0
+    return f"{100 * between / (between + error):.0f} %"

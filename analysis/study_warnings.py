@@ -4,13 +4,12 @@ from collections.abc import Iterable, Sequence
 
 from scipy.stats import binom
 
-from analysis.anova import OneWayAnova
 from analysis.catch_trials import CatchTally, wilson_interval
 from analysis.detection import directions_below_detection
-from analysis.repeated_measures import RepeatedMeasures
 from analysis.threshold_table import ThresholdTable
-from analysis.thresholds import Threshold
-from analysis.wording import f_text, listed, p_text
+from analysis.thresholds import RunEnd, Threshold
+from analysis.wording import listed
+from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
 
@@ -36,6 +35,7 @@ def study_warnings(
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
+        _stopped(rows, protocol.staircase),
         _incomplete(rows, protocol.staircase.reversals),
         _missing(table),
         _censored(table, protocol.staircase.cap_n),
@@ -56,11 +56,11 @@ def side_warnings(
 ) -> tuple[str, ...]:
     """Of catch trials and detection runs. table: thresholds of direction, felt: of detection, both in newtons."""
     broken = [_run(row) for row in detection if not row.complete]
-    bounds = [_run(row) for row in detection if row.complete and row.censored]
+    cut = [_run(row) for row in detection if row.complete and row.censored]
     candidates = (
         _lapsing(catches),
         f"{_count(broken, 'detection run')} not complete and without a threshold: {listed(broken)}." if broken else "",
-        f"{_count(bounds, 'detection threshold')} only a lower bound: {listed(bounds)}." if bounds else "",
+        f"{_count(cut, 'detection threshold')} cut by the cap: {listed(cut)}." if cut else "",
         _undetected(detection),
         _below_detection(table, felt),
         *felt.notes,
@@ -68,35 +68,28 @@ def side_warnings(
     return tuple(sentence for sentence in candidates if sentence)
 
 
-def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
-    """The published analysis beside the one within participants, in words and numbers."""
-    if anova.p is None or within.p is None:
-        said = "neither" if anova.p is None and within.p is None else "only one"
-        return (
-            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {said} "
-            "can be computed from these data, so they cannot be compared."
-        )
-    agree = (anova.p < 0.05) == (within.p < 0.05)
-    return (
-        "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
-        f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
-        "Every participant took every frequency; the analysis within participants takes those differences out "
-        f"({_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
-        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
-        f"{within.epsilon:.2f}, {p_text(within.p)}. "
-        + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
-        + "The second one fits the design; the first is here to compare with the published result."
-    )
-
-
-def _removed_percent(within: RepeatedMeasures) -> str:
-    between, error = within.ss_participants or 0.0, within.ss_error or 0.0
-    return f"{100 * between / (between + error):.0f} %"
-
-
 def _incomplete(rows: Sequence[Threshold], reversals: int) -> str:
-    cut = [f"{_run(row)} ({row.reversals} of {reversals} reversals)" for row in rows if not row.complete]
+    cut = [
+        f"{_run(row)} ({row.reversals} of {reversals} reversals)"
+        for row in rows
+        if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
+    ]
     return f"{_count(cut, 'run')} not complete and without a threshold: {listed(cut)}." if cut else ""
+
+
+def _stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+    stopped = [
+        f"{_run(row)} ({row.reversals} of {rule.reversals} reversals, {row.trials_at_cap} trials at the cap)"
+        for row in rows
+        if row.ended is RunEnd.TRIAL_LIMIT
+    ]
+    if not stopped:
+        return ""
+    return (
+        f"{_count(stopped, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
+        f"{listed(stopped)}. The limit stops those who cannot tell the directions far more often than those who can, "
+        "so the means that are left are too low."
+    )
 
 
 def _missing(table: ThresholdTable) -> str:
@@ -114,9 +107,9 @@ def _censored(table: ThresholdTable, cap_n: float) -> str:
     if not cut:
         return ""
     return (
-        f"{_count(cut, 'threshold')} only a lower bound, because the cap of {cap_n:g} N cut off peaks of the "
-        f"staircase: {listed(cut)}. As in the published analysis they enter means and tests as plain numbers, so "
-        "means near the cap are too low and differences towards it too small."
+        f"{_count(cut, 'threshold')} cut by the cap of {cap_n:g} N, which cut off peaks of the staircase: "
+        f"{listed(cut)}. As in the published analysis they enter means and tests as plain numbers, so means near the "
+        "cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
     )
 
 
@@ -138,7 +131,12 @@ def _unequal(table: ThresholdTable) -> str:
 
 def _at_chance(rows: Sequence[Threshold]) -> str:
     guessed = _guessed(rows)
-    return f"Answers no better than chance (one-sided binomial test, 5 %): {listed(guessed)}." if guessed else ""
+    return (
+        "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far above the cap looks "
+        f"the same): {listed(guessed)}."
+        if guessed
+        else ""
+    )
 
 
 def _guessed(rows: Sequence[Threshold]) -> list[str]:
@@ -201,7 +199,7 @@ def _lapsing(catches: Sequence[CatchTally]) -> str:
 
 def _undetected(detection: Sequence[Threshold]) -> str:
     guessed = _guessed(detection)
-    return f"Vibration was not detected better than by chance: {listed(guessed)}." if guessed else ""
+    return f"Detection not shown to be better than chance: {listed(guessed)}." if guessed else ""
 
 
 def _below_detection(table: ThresholdTable, felt: ThresholdTable) -> str:

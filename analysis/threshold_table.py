@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from analysis.thresholds import Threshold
+from analysis.thresholds import RunEnd, Threshold
 
 Quantity = Literal["threshold_n", "threshold_db", "threshold_mps2", "threshold_mm"]
 
@@ -18,7 +18,9 @@ class ThresholdTable:
     values: tuple[tuple[float | None, ...], ...]
     """values[subject][frequency]; None where there is no completed run."""
     censored: tuple[tuple[bool, ...], ...]
-    """Same shape: True where the value is a lower bound."""
+    """Same shape: True where the value is cut by the cap."""
+    stopped: tuple[tuple[bool, ...], ...]
+    """Same shape: True where there is no value because the trial limit ended every run."""
     notes: tuple[str, ...]
     """What was left out, in sentences."""
 
@@ -26,6 +28,24 @@ class ThresholdTable:
         """The values of each frequency, named like "35 Hz", one entry per participant."""
         columns = zip(*self.values, strict=True) if self.values else ((),) * len(self.frequencies_hz)
         return {frequency_name(f): column for f, column in zip(self.frequencies_hz, columns, strict=True)}
+
+    @property
+    def cut(self) -> int:
+        """How many values are cut by the cap."""
+        return sum(map(sum, self.censored))
+
+    @property
+    def coverage(self) -> str:
+        """Why intervals and effect sizes of this table have no stated coverage; empty where nothing is cut."""
+        lost = sum(map(sum, self.stopped))
+        causes = [f"{self.cut} of the values {'is' if self.cut == 1 else 'are'} cut by the cap"] if self.cut else []
+        causes += [f"{lost} {'is' if lost == 1 else 'are'} missing because of the trial limit"] if lost else []
+        if not causes:
+            return ""
+        return (
+            f"Without coverage: {' and '.join(causes)}. Means near the cap come out too low, and the stated confidence "
+            "of intervals and effect sizes does not hold."
+        )
 
     def missing(self) -> tuple[tuple[str, float], ...]:
         """Participant and frequency of every gap."""
@@ -47,6 +67,7 @@ def threshold_table(
     """
     subjects = tuple(dict.fromkeys(row.subject for row in rows))
     first: dict[tuple[str, float], Threshold] = {}
+    limited = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
     notes = []
     for row in rows:
         key = (row.subject, row.frequency_hz)
@@ -66,6 +87,7 @@ def threshold_table(
         frequencies_hz=ordered,
         values=tuple(tuple(_value(first.get((s, f)), quantity) for f in ordered) for s in subjects),
         censored=tuple(tuple((s, f) in first and first[s, f].censored for f in ordered) for s in subjects),
+        stopped=tuple(tuple((s, f) in limited and (s, f) not in first for f in ordered) for s in subjects),
         notes=tuple(notes),
     )
 

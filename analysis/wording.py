@@ -10,8 +10,15 @@ def number(value: float | None, digits: int = 2) -> str:
     return NONE if value is None else f"{value:.{digits}f}"
 
 
-def bounded(value: float | None, lower_bound: bool) -> str:
-    return f"≥ {number(value)}" if lower_bound and value is not None else number(value)
+CUT_NOTE = (
+    "cut: the cap cut off peaks of the staircase. On a stronger device the value would be higher; a bound it is not, "
+    "the true threshold may lie to either side."
+)
+
+
+def marked_if_cut(value: float | None, cut: bool, digits: int = 2) -> str:
+    """The value, followed by "cut" where the cap cut into it."""
+    return f"{number(value, digits)} cut" if cut and value is not None else number(value, digits)
 
 
 def count(value: int | None) -> str:

@@ -1,4 +1,4 @@
-"""The tracks of one participant: level by trial, with every answer and every turn."""
+"""The tracks of one participant: level by trial, with every answer, every reversal and the threshold."""
 
 from collections.abc import Sequence
 
@@ -18,6 +18,7 @@ from analysis.figures.style import (
     say_nothing_to_draw,
 )
 from analysis.runs import Run
+from analysis.thresholds import RunEnd, Threshold, threshold_of
 from protocols.staircase_rule import StaircaseRule
 
 _COLUMNS = 3
@@ -54,24 +55,34 @@ def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
     levels = np.array([trial.level_n for trial in run.answered])
     numbers = np.arange(1, len(levels) + 1)
     right = np.array([bool(trial.correct) for trial in run.answered], dtype=bool)
-    turns = np.array(run.state.reversal_trials, dtype=int)
-    used = turns[-rule.averaged_reversals :] if run.complete else turns[:0]
+    reversals = np.array(run.state.reversal_trials, dtype=int)
+    used = reversals[-rule.averaged_reversals :] if run.complete else reversals[:0]
     axes.axhline(rule.cap_n, color=GREY, linestyle="--", linewidth=1)
     axes.plot(numbers, levels, color=GREY, linewidth=0.9, drawstyle="steps-post", zorder=1)
     axes.plot(numbers[right], levels[right], "o", color=BLUE, markersize=2.8)
     axes.plot(numbers[~right], levels[~right], "x", color=VERMILLION, markersize=4.5, markeredgewidth=1.3)
-    axes.plot(numbers[turns], levels[turns], "o", markersize=8, markerfacecolor="none", markeredgecolor=GREY)
+    axes.plot(numbers[reversals], levels[reversals], "o", markersize=8, markerfacecolor="none", markeredgecolor=GREY)
     axes.plot(numbers[used], levels[used], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
+    row = threshold_of(run, rule)
+    if row.threshold_n is not None:
+        axes.plot([numbers[used[0]], numbers[-1]], [row.threshold_n] * 2, color=BLACK, linewidth=1.1, zorder=3)
     axes.set_yscale("log")
-    axes.set_title(f"{run.frequency_hz:g} Hz" + ("" if run.complete else " (not complete)"), fontsize=10, loc="left")
+    axes.set_title(f"{run.frequency_hz:g} Hz{_outcome(row)}", fontsize=10, loc="left")
+
+
+def _outcome(row: Threshold) -> str:
+    if row.threshold_n is not None:
+        return f": {row.threshold_n:.2f} N{', cut by the cap' if row.censored else ''}"
+    return " (stopped by the trial limit)" if row.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
 
 
 def _legend(rule: StaircaseRule) -> list[Line2D]:
     return [
         Line2D([], [], marker="o", color=BLUE, markersize=4, linewidth=0, label="right"),
         Line2D([], [], marker="x", color=VERMILLION, linewidth=0, label="wrong"),
-        _ring(BLACK, f"turn, one of the last {rule.averaged_reversals}"),
-        _ring(GREY, "turn, not averaged"),
+        _ring(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
+        _ring(GREY, "reversal, not averaged"),
+        Line2D([], [], color=BLACK, linewidth=1.1, label="threshold"),
         Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {rule.cap_n:g} N"),
     ]
 

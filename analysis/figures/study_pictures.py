@@ -42,9 +42,10 @@ def _thresholds(analysis: StudyAnalysis) -> Picture:
     return Picture(
         name="thresholds",
         title="Thresholds by frequency",
-        caption="One marker per participant and frequency; upward triangles are lower bounds, cut by the cap. Black: "
-        "group mean with comparison interval: two means differ significantly when their intervals do not overlap. "
-        "They are not confidence intervals of the means.",
+        caption="One marker and line per participant. Hollow markers with an arrow are cut by the cap; those above "
+        "the cap are runs that the trial limit stopped. Black: group mean with comparison interval: two means differ "
+        "significantly when their intervals do not overlap. They are not confidence intervals of the means."
+        + (f" {analysis.table.coverage}" if analysis.table.coverage else ""),
         figure=draw_thresholds(analysis.table, analysis.comparisons, analysis.protocol.staircase.cap_n),
     )
 
@@ -66,8 +67,8 @@ def _staircases(analysis: StudyAnalysis) -> list[Picture]:
         Picture(
             name=f"staircases-{index}-{re.sub(r'[^A-Za-z0-9]+', '-', subject).strip('-')}",
             title=f"Staircases of {subject}",
-            caption="Level of every counted trial, right and wrong answers, and the turns; the black ones are averaged "
-            "into the threshold.",
+            caption="Level of every counted trial, right and wrong answers, and the reversals; the black ones are "
+            "averaged into the threshold (solid line).",
             figure=draw_staircases(
                 [run for run in analysis.runs if run.subject == subject], analysis.protocol.staircase
             ),

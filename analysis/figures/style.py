@@ -13,8 +13,8 @@ WINE, OLIVE, TEAL = "#882255", "#999933", "#117766"
 COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK, WINE, OLIVE, TEAL)
 """Ten, for the ten participants of the published study; the last three after P. Tol's muted scheme."""
 MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
-"""Without triangles: the upward one always means a lower bound."""
-CENSORED_MARKER = "^"
+CUT_MARKER = "$\\uparrow$"
+"""An arrow above the participant's own marker: the cap cut into this threshold."""
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:

@@ -8,8 +8,8 @@ from matplotlib.lines import Line2D
 from analysis.comparisons import Comparisons
 from analysis.figures.style import (
     BLACK,
-    CENSORED_MARKER,
     COLOURS,
+    CUT_MARKER,
     GREY,
     MARKERS,
     new_figure,
@@ -21,10 +21,12 @@ from analysis.threshold_table import ThresholdTable
 _SPREAD = 0.5
 """Width taken by the participants of one frequency, in steps between frequencies."""
 _LEGEND_LIMIT = 24
+_STOPPED_AT = 1.07
+"""Height of the row of stopped runs, in caps."""
 
 
 def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> Figure:
-    """Every participant at a fixed place left of the group mean; lower bounds as upward triangles.
+    """Every participant with a line of their own around the tick, the group mean over it.
 
     table: thresholds in newtons. comparisons: of the same table; without intervals plain means are drawn.
     """
@@ -35,14 +37,15 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     plain_axes(axes)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
     axes.annotate(
-        f"cap {cap_n:g} N", (1, cap_n), xycoords=("axes fraction", "data"), xytext=(-4, 4), textcoords="offset points",
-        ha="right", fontsize=9, color=GREY,
+        f"cap {cap_n:g} N", (0, cap_n), xycoords=("axes fraction", "data"), xytext=(4, 4), textcoords="offset points",
+        ha="left", fontsize=9, color=GREY,
     )  # fmt: skip
     _draw_participants(axes, table)
+    _draw_stopped(axes, table, cap_n)
     _draw_means(axes, table, comparisons)
     axes.set_xticks(range(len(table.frequencies_hz)), [f"{f:g}" for f in table.frequencies_hz])
     axes.set_xlim(-0.6, len(table.frequencies_hz) - 0.4)
-    axes.set_ylim(0, 1.12 * cap_n)
+    axes.set_ylim(0, 1.15 * cap_n)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
     figure.legend(handles=_legend(table, comparisons), loc="outside right upper", fontsize=8.5, frameon=False)
@@ -53,12 +56,35 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
     count = len(table.subjects)
     # Fixed places instead of jitter: the same participant stands at the same place at every frequency.
     places = np.linspace(-_SPREAD / 2, _SPREAD / 2, count) if count > 1 else np.zeros(1)
-    for index, (row, bounds) in enumerate(zip(table.values, table.censored, strict=True)):
-        for at, (value, censored) in enumerate(zip(row, bounds, strict=True)):
+    for index, row in enumerate(table.values):
+        at = np.arange(len(row)) + places[index]
+        values = np.array([np.nan if value is None else value for value in row], dtype=float)
+        axes.plot(at, values, "-", color=_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
+        for x, value, cut in zip(at, row, table.censored[index], strict=True):
             if value is not None:
-                marker = CENSORED_MARKER if censored else _marker(index)
-                axes.plot(at - 0.09 + places[index], value, marker, color=_colour(index), markersize=6, alpha=0.85,
-                          markeredgecolor="white", markeredgewidth=0.5)  # fmt: skip
+                _draw_threshold(axes, x, value, index, cut)
+
+
+def _draw_threshold(axes: Axes, x: float, value_n: float, participant: int, cut: bool) -> None:
+    """Hollow where the cap cut, with an arrow above: marker and colour still tell whose it is."""
+    colour = _colour(participant)
+    axes.plot(x, value_n, _marker(participant), color=colour, markersize=6, alpha=0.85,
+              markerfacecolor="white" if cut else colour, markeredgecolor=colour if cut else "white",
+              markeredgewidth=1.1 if cut else 0.5)  # fmt: skip
+    if cut:
+        axes.annotate("", (x, value_n), xytext=(0, 13), textcoords="offset points", zorder=2,
+                      arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 0.9, "shrinkB": 3.5,
+                                  "shrinkA": 0})  # fmt: skip
+
+
+def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
+    """Hollow and above the cap: where the threshold is, the run does not say."""
+    places = np.linspace(-_SPREAD / 2, _SPREAD / 2, max(2, len(table.subjects)))
+    for index, row in enumerate(table.stopped):
+        for at, stopped in enumerate(row):
+            if stopped:
+                axes.plot(at + places[index], _STOPPED_AT * cap_n, _marker(index), color=_colour(index), markersize=6,
+                          markerfacecolor="none")  # fmt: skip
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
@@ -69,17 +95,39 @@ def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> 
             continue
         mean = float(np.mean(present))
         half = intervals[name].upper - mean if name in intervals else None
-        axes.errorbar(at + 0.34, mean, yerr=half, fmt="_", color=BLACK, markersize=13, markeredgewidth=2.2,
-                      elinewidth=1.6, capsize=4)  # fmt: skip
+        axes.errorbar(at, mean, yerr=half, fmt="_", color=BLACK, markersize=22, markeredgewidth=2.4,
+                      elinewidth=1.6, capsize=4, zorder=4)  # fmt: skip
 
 
 def _legend(table: ThresholdTable, comparisons: Comparisons) -> list[Line2D]:
     percent = f"{100 * comparisons.confidence:g} %"
-    mean = f"mean, {percent}\ncomparison interval" if comparisons.intervals else "mean"
-    handles = [
-        Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.2, linewidth=0, label=mean),
-        Line2D([], [], color=GREY, marker=CENSORED_MARKER, linewidth=0, label="lower bound\n(cut by the cap)"),
-    ]
+    without = ",\nwithout coverage" if table.coverage else ""
+    mean = f"mean, {percent}\ncomparison interval{without}" if comparisons.intervals else "mean"
+    handles = [Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0, label=mean)]
+    if table.cut:
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=GREY,
+                marker=CUT_MARKER,
+                linewidth=0,
+                markersize=9,
+                label="cut by the cap\n(hollow marker)",
+            )
+        )
+    if any(map(any, table.stopped)):
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=GREY,
+                marker="o",
+                markerfacecolor="none",
+                linewidth=0,
+                label="above the cap: stopped\nby the trial limit",
+            )
+        )
     if len(table.subjects) <= _LEGEND_LIMIT:
         handles += [
             Line2D([], [], color=_colour(index), marker=_marker(index), linewidth=0, label=subject)

@@ -29,7 +29,8 @@ _STATISTICS = (
     "Frequencies are compared as published, by one-way analysis of variance between groups with Tukey-Kramer pairs "
     "and Hochberg-Tamhane comparison intervals (those that MATLAB's multcompare draws), and, because every "
     "participant took every frequency, within participants: analysis of variance with the Greenhouse-Geisser "
-    "correction, and Friedman's test on ranks. Lower bounds enter as plain numbers."
+    "correction, and Friedman's test on ranks. Thresholds that the cap cut enter as plain numbers; intervals and "
+    "effect sizes that include them have no stated coverage."
 )
 
 
@@ -113,8 +114,9 @@ def _threshold(rule: StaircaseRule) -> str:
     return (
         "The threshold is the arithmetic mean, in newtons, of the levels at the last "
         f"{rule.averaged_reversals} reversals. It was recomputed from the answers, and every level on record was "
-        "checked against the rule. It is marked as a lower bound (≥) when at least one of these reversals is a peak "
-        "at the cap, which a stronger device would have let rise further. Sensitivity d' and criterion are those of "
+        "checked against the rule. It is marked as cut by the cap when at least one of these reversals is a peak at "
+        "the cap, which a stronger device would have let rise further; a bound of the true threshold it is not. "
+        "Sensitivity d' and criterion are those of "
         "one-interval identification over all trials of a run, with the log-linear correction; the criterion is "
         "positive for a liking of the answer 2."
     )

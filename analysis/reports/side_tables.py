@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from analysis.equalized_delivery import deliveries
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
-from analysis.wording import NONE, bounded, number
+from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number
 from protocols.staircase import to_db
 
 
@@ -22,7 +22,7 @@ def detection_table(analysis: StudyAnalysis) -> Table:
         header=("Participant", "Frequency", "Felt from", "Direction told from", "Direction above detection (dB)"),
         rows=tuple(rows),
         notes=(
-            "≥: a lower bound, cut by the cap. –: no completed run. The last column is given where both are "
+            f"{CUT_NOTE} –: no completed run. The last column is given where both are "
             "thresholds. Near 0 dB the vibration has a direction as soon as it is felt; far above, it is felt "
             "long before its direction is.",
         ),
@@ -36,7 +36,7 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
         rows=tuple(
             (
                 row.subject, row.session, str(row.run), f"{row.frequency_hz:g}",
-                bounded(row.threshold_n, row.censored), str(row.reversals), str(row.trials),
+                marked_if_cut(row.threshold_n, row.censored), str(row.reversals), str(row.trials),
                 number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
             )
             for row in analysis.detection
@@ -111,6 +111,7 @@ def practice_table(analysis: StudyAnalysis) -> Table:
             for run in analysis.practice
         ),
         notes=(f"At {settings.level_n:g} N; passed with {settings.right_needed} right.",),
+        folded=True,
     )
 
 
@@ -118,8 +119,8 @@ def _beside_direction(
     analysis: StudyAnalysis, subject: str, frequency_hz: float, felt_n: float | None, felt_bound: bool
 ) -> Iterator[str]:
     told_n, told_bound = _direction(analysis, subject, frequency_hz)
-    yield bounded(felt_n, felt_bound)
-    yield bounded(told_n, told_bound)
+    yield marked_if_cut(felt_n, felt_bound)
+    yield marked_if_cut(told_n, told_bound)
     if felt_n is None or told_n is None or felt_bound or told_bound:
         yield NONE
     else:

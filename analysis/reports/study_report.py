@@ -93,7 +93,7 @@ def _warnings(analysis: StudyAnalysis) -> Section:
 def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
     if not analysis.thresholds:
         return []
-    pairs = (pair_table(analysis.comparisons),) if analysis.comparisons.pairs else ()
+    pairs = (pair_table(analysis),) if analysis.comparisons.pairs else ()
     thresholds = Section(
         "Thresholds",
         pictures=(by_name["thresholds"],) if "thresholds" in by_name else (),

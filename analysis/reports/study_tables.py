@@ -2,43 +2,58 @@
 
 from collections.abc import Callable, Sequence
 
-from analysis.comparisons import Comparisons
 from analysis.ellipsoid import EllipsoidResult
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
-from analysis.thresholds import Threshold
-from analysis.wording import NONE, bounded, count, number, p_value
+from analysis.thresholds import RunEnd, Threshold
+from analysis.wording import CUT_NOTE, NONE, count, marked_if_cut, number, p_value
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
     table = analysis.table
     rows = [
-        (subject, *(bounded(value, cut) for value, cut in zip(values, cuts, strict=True)))
-        for subject, values, cuts in zip(table.subjects, table.values, table.censored, strict=True)
+        (subject, *("stopped" if stop else marked_if_cut(value, cut) for value, cut, stop in zip(*cells, strict=True)))
+        for subject, *cells in zip(table.subjects, table.values, table.censored, table.stopped, strict=True)
     ]
     return Table(
         caption="Individual thresholds (N)",
         header=("Participant", *(f"{frequency:g} Hz" for frequency in table.frequencies_hz)),
         rows=tuple(rows),
-        notes=("≥: a lower bound, cut by the cap. –: no completed run.",),
+        notes=(f"{CUT_NOTE} stopped: by the trial limit, without a threshold. –: no completed run.",),
     )
 
 
 def group_table(analysis: StudyAnalysis) -> Table:
     intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
-    bounds = [sum(column) for column in zip(*analysis.table.censored, strict=True)]
+    cuts, stops = (
+        [sum(column) for column in zip(*cells, strict=True)]
+        for cells in (analysis.table.censored, analysis.table.stopped)
+    )
     rows = []
-    for group, bound in zip(analysis.anova.groups, bounds, strict=True):
+    for group, cut, stopped in zip(analysis.anova.groups, cuts, stops, strict=True):
         interval = intervals.get(group.name)
         shown = f"{number(interval.lower)} to {number(interval.upper)}" if interval else NONE
-        rows.append((group.name, str(group.n), number(group.mean), number(group.sd), shown, str(bound)))
+        mean = marked_if_cut(group.mean, bool(cut or stopped))
+        rows.append((group.name, str(group.n), mean, number(group.sd), shown, str(cut), str(stopped)))
     percent = f"{100 * analysis.comparisons.confidence:g} %"
     return Table(
         caption="Groups (N)",
-        header=("Frequency", "n", "Mean", "SD", f"{percent} comparison interval", "Lower bounds"),
+        header=("Frequency", "n", "Mean", "SD", f"{percent} comparison interval{_without(analysis)}", "Cut", "Stopped"),
         rows=tuple(rows),
-        notes=("Comparison intervals are for comparing means with each other; they are no confidence intervals.",),
+        notes=(
+            "Comparison intervals are for comparing means with each other; they are no confidence intervals.",
+            *_coverage(analysis),
+        ),
     )
+
+
+def _without(analysis: StudyAnalysis) -> str:
+    """Added to the name of an interval or effect size that includes cut runs."""
+    return ", without coverage" if analysis.table.coverage else ""
+
+
+def _coverage(analysis: StudyAnalysis) -> tuple[str, ...]:
+    return (analysis.table.coverage,) if analysis.table.coverage else ()
 
 
 def one_way_table(analysis: StudyAnalysis) -> Table:
@@ -50,7 +65,9 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
         between = (number(anova.ss_between, 3), count(anova.df_between), number(anova.ss_between / anova.df_between, 3))
         within = (number(anova.ss_within, 3), count(anova.df_within), number(anova.mean_square_within, 3))
         rows = (("Frequency", *between, number(anova.f), p_value(anova.p)), ("Within", *within, "", ""))
-        effect = (f"Effect size: η² = {number(anova.eta_squared)}, ω² = {number(anova.omega_squared)}.",)
+        effect = (
+            f"Effect size{_without(analysis)}: η² = {number(anova.eta_squared)}, ω² = {number(anova.omega_squared)}.",
+        )
     return Table(
         caption="One-way analysis of variance, as published",
         header=("Source", "Sum of squares", "df", "Mean square", "F", "p"),
@@ -59,11 +76,12 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-def pair_table(comparisons: Comparisons) -> Table:
+def pair_table(analysis: StudyAnalysis) -> Table:
+    comparisons = analysis.comparisons
     percent = f"{100 * comparisons.confidence:g} %"
     return Table(
         caption="Pairs of frequencies (Tukey-Kramer)",
-        header=("Pair", "Difference (N)", f"{percent} interval", "p"),
+        header=("Pair", "Difference (N)", f"{percent} interval{_without(analysis)}", "p"),
         rows=tuple(
             (
                 f"{pair.second} − {pair.first}",
@@ -73,7 +91,7 @@ def pair_table(comparisons: Comparisons) -> Table:
             )
             for pair in comparisons.pairs
         ),
-        notes=comparisons.notes,
+        notes=(*comparisons.notes, *_coverage(analysis)),
     )
 
 
@@ -90,7 +108,7 @@ def within_table(analysis: StudyAnalysis) -> Table:
             ("Without correction", f"{within.df_conditions}, {within.df_error}", f, p_value(within.p_uncorrected))
         )
         effects.append(
-            f"Effect size: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
+            f"Effect size{_without(analysis)}: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
             f"{number(within.generalized_eta_squared)}."
         )
     if ranks.p is not None:
@@ -110,7 +128,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("Session", lambda row: row.session),
         ("Run", lambda row: str(row.run)),
         ("Hz", lambda row: f"{row.frequency_hz:g}"),
-        ("N", lambda row: bounded(row.threshold_n, row.censored)),
+        ("N", _threshold),
         ("dB re 1 N", lambda row: number(row.threshold_db)),
         ("m/s²", lambda row: number(row.threshold_mps2)),
         ("mm", lambda row: number(row.threshold_mm, 3)),
@@ -134,6 +152,10 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ),
         folded=True,
     )
+
+
+def _threshold(row: Threshold) -> str:
+    return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else marked_if_cut(row.threshold_n, row.censored)
 
 
 def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:

@@ -85,12 +85,11 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
 
 def _level(means: _Means, frequency_hz: float) -> Finding:
     value, cut = means.at(frequency_hz), means.cut(frequency_hz)
-    bound = "at least " if cut else ""
-    bounds = f"; {cut} of {len(means.analysis.table.subjects)} thresholds are lower bounds" if cut else ""
+    marks = f", {cut} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if cut else ""
     return Finding(
         what=f"Mean threshold at {frequency_hz:g} Hz",
         published="",
-        here="no completed run" if value is None else f"{bound}{value:.2f} N{bounds}",
+        here="no completed run" if value is None else f"{value:.2f} N{marks}",
         value=value,
         unit="N",
         as_published=None,

@@ -68,12 +68,12 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
 
 
 def _lines(table: ThresholdTable, heading: str) -> list[str]:
-    lines = [f"{'frequency':>10}  {heading:>10}  {'lower bounds':>12}  participants"]
+    lines = [f"{'frequency':>10}  {heading:>10}  {'cut by cap':>10}  participants"]
     for column, frequency_hz in enumerate(table.frequencies_hz):
         values = [value for row in table.values if (value := row[column]) is not None]
         censored = sum(row[column] for row in table.censored)
-        shown = f"{'≥ ' if censored else ''}{sum(values) / len(values):.3f} N" if values else "-"
-        lines.append(f"{frequency_hz:7g} Hz  {shown:>10}  {censored:>12}  {len(values):>12}")
+        mean = f"{sum(values) / len(values):.3f} N" if values else "-"
+        lines.append(f"{frequency_hz:7g} Hz  {mean:>10}  {censored:>10}  {len(values):>12}")
     return lines
 
 

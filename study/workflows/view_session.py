@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.thresholds import Threshold
+from analysis.thresholds import RunEnd, Threshold
 from analysis.wording import NONE, number
 from protocols.schedule import Run
 from protocols.trial import Phase
@@ -88,10 +88,10 @@ def _threshold_rows(state: SessionState, analysis: "StudyAnalysis | None") -> tu
 
 
 def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
-    remark = "lower bound" if row.censored else ""
+    remark = "cut by the cap" if row.censored else ""
     if not row.complete:
-        remark = "not complete"
-    threshold = f"{'≥ ' if row.censored else ''}{number(row.threshold_n, 3)} N" if row.complete else NONE
+        remark = "trial limit" if row.ended is RunEnd.TRIAL_LIMIT else "not complete"
+    threshold = f"{number(row.threshold_n, 3)} N" if row.complete else NONE
     return (
         str(row.run + 1),
         run.phase.value,

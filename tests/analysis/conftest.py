@@ -170,6 +170,7 @@ def simulate_study() -> Callable[..., list[Trial]]:
         true_n: Sequence[float] = (0.6, 0.7, 0.8, 2.4, 6.0),
         seed: int = 1,
         felt: bool | None = None,
+        rule: StaircaseRule = PUBLISHED,
     ) -> list[Trial]:
         frequencies = (5.0, 15.0, 25.0, 35.0, 45.0)
         trials: list[Trial] = []
@@ -180,6 +181,7 @@ def simulate_study() -> Callable[..., list[Trial]]:
                 trials += simulated_run(
                     true_n[index] * factor,
                     generator,
+                    rule=rule,
                     subject=f"s{number + 1:02d}",
                     run=run,
                     frequency_hz=frequencies[index],

@@ -40,7 +40,7 @@ def test_the_threshold_of_somebody_who_feels_is_recovered(felt, asking):
     assert mean_db == pytest.approx(20 * np.log10(0.2), abs=0.8)
 
 
-def test_somebody_who_feels_nothing_has_a_lower_bound_at_most(felt, asking):
+def test_somebody_who_feels_nothing_is_cut_by_the_cap(felt, asking):
     generator = np.random.default_rng(5)
     rows = detection_thresholds([t for run in range(20) for t in felt(float("inf"), generator, run=run)], asking)
     assert sum(row.censored for row in rows) >= 19

@@ -31,7 +31,7 @@ def test_a_whole_study_is_analysed(simulate_study, protocol, quick_json):
     assert len(analysis.comparisons.pairs) == 10
     document = quick_json(analysis)
     assert (document["format"], document["version"]) == ("hapteq-anova", 1)
-    assert document["lower_bounds"] == sum(row.censored for row in analysis.thresholds)
+    assert document["cut_by_cap"] == document["lower_bounds"] == sum(row.censored for row in analysis.thresholds)
 
 
 def test_thresholds_rise_where_they_were_made_to_rise(simulate_study, protocol):

@@ -5,8 +5,7 @@ import pytest
 
 from analysis.anova import one_way
 from analysis.repeated_measures import repeated_measures
-from analysis.study_analysis import analyse_study
-from analysis.study_warnings import design_difference
+from analysis.study_analysis import analyse_study, design_difference
 from protocols.run_rules import staircase_rule
 from protocols.trial import Phase, TrialStatus
 
@@ -39,11 +38,13 @@ def test_a_run_that_was_broken_off_is_named(able, protocol):
     assert unequal == "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
 
 
-def test_lower_bounds_are_named(simulate_study, protocol):
+def test_thresholds_that_the_cap_cut_are_named(simulate_study, protocol):
     trials = simulate_study(subjects=5, true_n=(0.3, 0.3, 0.3, 0.3, float("inf")), seed=2)
     bounds, guessed = warnings(trials, protocol)
-    assert guessed.startswith("Answers no better than chance (one-sided binomial test, 5 %): s01 at 45 Hz (")
-    assert bounds.startswith("5 thresholds are only a lower bound, because the cap of 3 N cut off peaks")
+    assert guessed.startswith(
+        "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far"
+    )
+    assert bounds.startswith("5 thresholds are cut by the cap of 3 N, which cut off peaks")
     assert "s05 at 45 Hz" in bounds
 
 
@@ -56,6 +57,17 @@ def test_lower_bounds_are_named(simulate_study, protocol):
 )
 def test_few_participants_are_said(simulate_study, protocol, subjects, sentence):
     assert sentence in warnings(simulate_study(subjects=subjects, true_n=(0.4,) * 5), protocol)
+
+
+def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate_study, protocol):
+    limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
+    trials = simulate_study(subjects=5, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), seed=2, rule=limited.staircase)
+    analysis = analyse_study(trials, limited)
+    (stopped,) = [sentence for sentence in analysis.warnings if "limit of 90 trials" in sentence]
+    assert stopped.startswith("4 runs are stopped by the limit of 90 trials, without a threshold: s01 at 45 Hz (")
+    assert "the means that are left are too low" in stopped
+    assert not any("not complete" in sentence for sentence in analysis.warnings)
+    assert "4 are missing because of the trial limit" in analysis.table.coverage
 
 
 def test_a_liking_for_one_answer_is_named(able, protocol):
@@ -137,8 +149,8 @@ def test_a_vibration_that_is_felt_before_its_direction_is_as_it_should_be(able, 
 
 def test_somebody_who_feels_nothing_is_named(able, full_protocol, with_detection):
     bound, chance, _ = warnings(with_detection(able, float("inf")), full_protocol)
-    assert bound == "1 detection threshold is only a lower bound: s01 at 35 Hz."
-    assert chance.startswith("Vibration was not detected better than by chance: s01 at 35 Hz (")
+    assert bound == "1 detection threshold is cut by the cap: s01 at 35 Hz."
+    assert chance.startswith("Detection not shown to be better than chance: s01 at 35 Hz (")
 
 
 def test_a_detection_run_that_was_broken_off_is_named(able, full_protocol, with_detection):

@@ -52,7 +52,7 @@ def test_nothing_measured_leaves_the_delivered_threshold_empty(answered, rule):
     assert (row.threshold_mps2, row.threshold_mm, row.measured_reversals) == (None, None, 0)
 
 
-def test_one_peak_at_the_cap_among_the_averaged_marks_a_lower_bound(answered, rule):
+def test_one_peak_at_the_cap_among_the_averaged_marks_it_as_cut(answered, rule):
     # Climb to the cap, three turns by 4 dB, climb again; then peaks at the cap and valleys one step below.
     (row,) = thresholds(answered("0" * 4 + "111" + "0" + "111" + "0" * 6 + "1110" * 6), rule)
     assert row.complete

@@ -1,9 +1,12 @@
+from collections import Counter
+from dataclasses import replace
+
 import pytest
 from matplotlib.figure import Figure
 
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
-from analysis.figures.style import CENSORED_MARKER, MARKERS
+from analysis.figures.style import MARKERS
 from analysis.study_analysis import analyse_study
 
 
@@ -46,16 +49,48 @@ def test_a_study_has_its_figures_in_the_order_of_the_report(draw, simulate_study
     ]  # fmt: skip
 
 
-def test_every_threshold_is_a_marker_and_every_lower_bound_a_triangle(ten_drawn, ten, protocol):
+def test_every_threshold_keeps_its_participants_marker_and_is_hollow_where_the_cap_cut(ten_drawn, ten, protocol):
     analysis = analyse_study(ten, protocol)
-    shown = [marker for marker in markers(ten_drawn["thresholds"].figure) if marker in (*MARKERS, CENSORED_MARKER)]
+    shown = [line for line in ten_drawn["thresholds"].figure.axes[0].lines if line.get_marker() in MARKERS]
     assert len(shown) == 50
-    assert shown.count(CENSORED_MARKER) == sum(row.censored for row in analysis.thresholds)
+    # Ten participants, ten markers, five frequencies: also those that the cap cut are told apart.
+    assert Counter(str(line.get_marker()) for line in shown) == Counter(dict.fromkeys(MARKERS, 5))
+    hollow = [line for line in shown if line.get_markerfacecolor() == "white"]
+    assert len(hollow) == sum(row.censored for row in analysis.thresholds) > 0
+    arrows = [text for text in ten_drawn["thresholds"].figure.axes[0].texts if text.arrow_patch is not None]
+    assert len(arrows) == len(hollow)
+
+
+def test_each_participant_has_a_line_and_each_mean_stands_over_its_tick(ten_drawn):
+    axes = ten_drawn["thresholds"].figure.axes[0]
+    lines = [line for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 5]
+    assert len(lines) == 10
+    assert [float(container.lines[0].get_xdata()[0]) for container in axes.containers] == list(axes.get_xticks())
+
+
+def test_a_run_that_the_trial_limit_stopped_is_drawn_and_said(simulate_study, protocol):
+    limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
+    trials = simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), rule=limited.staircase)
+    pictures = {picture.name: picture for picture in study_pictures(analyse_study(trials, limited))}
+    figure = pictures["thresholds"].figure
+    above = [line for line in figure.axes[0].lines if line.get_marker() in MARKERS and line.get_ydata()[0] > 3.0]
+    assert [str(line.get_marker()) for line in above] == list(MARKERS[:2])
+    assert "by the trial limit" in texts(figure)
+    titles = [axes.get_title(loc="left") for axes in pictures["staircases-1-s01"].figure.axes]
+    assert "45 Hz (stopped by the trial limit)" in titles
 
 
 def test_the_threshold_figure_says_its_units_cap_and_intervals(ten_drawn):
     said = texts(ten_drawn["thresholds"].figure)
-    for words in ("Frequency (Hz)", "(N)", "cap 3 N", "comparison interval", "lower bound", "s10"):
+    for words in (
+        "Frequency (Hz)",
+        "(N)",
+        "cap 3 N",
+        "comparison interval",
+        "cut by the cap",
+        "without coverage",
+        "s10",
+    ):
         assert words in said
 
 
@@ -76,11 +111,14 @@ def test_one_participant_has_means_without_an_interval(one_drawn):
     assert "comparison interval" not in texts(figure)
 
 
-def test_a_panel_per_frequency_marks_every_turn(one_drawn):
+def test_a_panel_per_frequency_marks_every_reversal_and_the_threshold(one_drawn):
     figure = one_drawn["staircases-1-s01"].figure
-    assert {axes.get_title(loc="left") for axes in figure.axes} >= {"5 Hz", "15 Hz", "25 Hz", "35 Hz", "45 Hz"}
-    *_, all_turns, averaged = figure.axes[0].lines
-    assert (len(all_turns.get_xdata()), len(averaged.get_xdata())) == (13, 10)
+    titles = [axes.get_title(loc="left").split(":")[0] for axes in figure.axes]
+    assert {*titles} >= {"5 Hz", "15 Hz", "25 Hz", "35 Hz", "45 Hz"}
+    *_, all_reversals, averaged, threshold = figure.axes[0].lines
+    assert (len(all_reversals.get_xdata()), len(averaged.get_xdata())) == (13, 10)
+    assert threshold.get_ydata()[0] == pytest.approx(sum(averaged.get_ydata()) / 10)
+    assert f": {threshold.get_ydata()[0]:.2f} N" in figure.axes[0].get_title(loc="left")
     assert "Level (N)" in texts(figure)
 
 

@@ -168,7 +168,7 @@ def test_without_such_trials_there_is_no_such_section(words, simulate_study, ful
 def test_detection_is_compared_with_direction_only_where_both_are_thresholds(everything, full_protocol):
     table = detection_table(analyse_study(everything, full_protocol))
     for _, _, felt, told, above in table.rows:
-        assert (above == "–") == ("≥" in felt + told)
+        assert (above == "–") == ("cut" in felt + told)
     assert {row[4][0] for row in table.rows} == {"+", "–"}
 
 
@@ -187,8 +187,28 @@ def test_practice_says_how_it_ended(everything, full_protocol, answers, outcome)
     assert row[-1] == outcome
 
 
-def test_lower_bounds_are_marked_in_the_table(words, simulate_study):
-    assert "<td>≥ 2." in words(simulate_study(subjects=1, true_n=(0.4, 0.4, 0.4, 0.4, float("inf"))))
+def test_what_the_cap_cut_is_marked_in_rows_means_intervals_and_effect_sizes(words, simulate_study):
+    html = words(simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf"))))
+    rows = re.findall(r"<tr>.*?</tr>", html, re.DOTALL)
+    (group,) = [row for row in rows if ">45 Hz<" in row and row.count("<td") == 6]
+    assert re.search(r"2\.\d\d cut", group)
+    assert html.count("interval, without coverage") == 2
+    assert "Effect size, without coverage: η²" in html
+    assert "Effect size, without coverage: partial η²" in html
+    assert "lower bound" not in html.lower()
+    assert "≥" not in html
+
+
+def test_without_a_cut_nothing_is_without_coverage(words, simulate_study):
+    assert "without coverage" not in words(simulate_study(subjects=5, true_n=(0.4,) * 5, seed=2, felt=True)).lower()
+
+
+def test_runs_that_the_trial_limit_stopped_are_in_the_tables(words, simulate_study, protocol):
+    limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
+    trials = simulate_study(subjects=3, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), rule=limited.staircase)
+    html = words(trials, protocol=limited)
+    assert html.count("<td>stopped</td>") == 2 * 2
+    assert "missing because of the trial limit" in html
 
 
 def test_no_number_is_ever_nan(report, simulate_study):

@@ -42,7 +42,7 @@ def data(finished, tmp_path) -> Path:
 def test_a_simulated_participant_takes_the_study_and_results_go_to_stdout(run, small_file, tmp_path):
     code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert code == 0
-    assert out.splitlines()[0].split() == ["frequency", "threshold", "lower", "bounds", "participants"]
+    assert out.splitlines()[0].split() == ["frequency", "threshold", "cut", "by", "cap", "participants"]
     assert "25 Hz" in out
     assert "Report:" in err
     assert (tmp_path / "d" / "ideal1_001" / "analysis" / "report.html").exists()

@@ -158,7 +158,7 @@ def session(line, staircase) -> SessionView:
                ("begun", "2026-05-04 09:30:12 UTC"), ("runs", "6 of 6"), ("answers", "365"), ("seed", "62818196")),
         thresholds=(("run", "phase", "at", "threshold", "delivered", "turns", "trials", "right", "remark"),
                     ("2", "test", "5 Hz", "0.475 N", "0.56 m/s²", "13", "68", "82 %", ""),
-                    ("3", "test", "35 Hz", "≥ 2.681 N", "5.60 m/s²", "13", "53", "77 %", "lower bound")),
+                    ("3", "test", "35 Hz", "2.681 N", "5.60 m/s²", "13", "53", "77 %", "cut by the cap")),
         warnings=("There is one participant: individual thresholds can be shown, nothing can be tested.",),
         staircases=tuple(replace(staircase, title=f"Run {n}: {f} Hz, test") for n, f in ((2, 5), (3, 35), (4, 15))),
         events=("2026-05-04 (times are UTC)", "09:30:12  Session P01_001 began: P01, a person, on omega.3.",
