@@ -46,23 +46,25 @@ def begin(
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
     _say_wait(sitter.observer)
-    with _participant(sitter.observer, plan.session.seed, sitter.keys) as participant:
+    clock: Clock = RealClock() if sitter.observer is None else VirtualClock()
+    with _participant(sitter.observer, plan.session.seed, sitter.keys, clock) as participant:
         end = conduct_new(plan.session, device, participant)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
 def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
     folder = find_session(session, data)
-    opened = fold_session(folder).state.opened
+    state = fold_session(folder).state
+    opened = state.opened
+    clock: Clock = RealClock() if opened.observer is None else VirtualClock.not_before(state.sitting.last.utc)
     _say_wait(opened.observer)
-    with _participant(opened.observer, opened.seed, keys) as participant:
+    with _participant(opened.observer, opened.seed, keys, clock) as participant:
         end = conduct_resumed(folder, device, participant)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
 @contextmanager
-def _participant(observer: str | None, seed: int, keys: AnswerKeys) -> Iterator[Participant]:
-    clock: Clock = RealClock() if observer is None else VirtualClock()
+def _participant(observer: str | None, seed: int, keys: AnswerKeys, clock: Clock) -> Iterator[Participant]:
     if observer is None and sys.stdin is None:
         raise WrongUseError(
             "There is nothing to read answers from",

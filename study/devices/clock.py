@@ -60,6 +60,11 @@ class VirtualClock:
     def utc(self) -> str:
         return (self._start + timedelta(seconds=self._now_s)).isoformat(timespec="milliseconds")
 
+    @classmethod
+    def not_before(cls, utc: str) -> "VirtualClock":
+        """From now on, or from this time where it is later: a simulated session runs ahead of real time."""
+        return cls(max(datetime.now(UTC), datetime.fromisoformat(utc)))
+
     def listen(self, listener: Callable[[float], None]) -> None:
         """`listener(now_s)` is called after every passing of time."""
         self._listeners.append(listener)

@@ -96,6 +96,7 @@ class SessionOpened:
     versions: dict[str, str]
     equalized: EqualizedFacts | None = None
     """Null: the commanded force is what was wanted."""
+    monotonic_s: Seconds | None = None
     event: Literal["session_opened"] = "session_opened"
 
 
@@ -117,6 +118,7 @@ class TrialPresented:
     polarity: Literal[-1, 1]
     wanted_mps2: Magnitude | None = None
     """The acceleration that the level stands for; null where levels are commanded forces."""
+    monotonic_s: Seconds | None = None
     event: Literal["trial_presented"] = "trial_presented"
 
 
@@ -130,6 +132,7 @@ class AnswerGiven:
     attempt: Index
     answer: Literal[1, 2]
     response_time_s: Seconds
+    monotonic_s: Seconds | None = None
     event: Literal["answer_given"] = "answer_given"
 
 
@@ -153,6 +156,7 @@ class TrialMeasured:
     """How long the hand was shaken, fades included: for the vibration dose."""
     offset_mm: Magnitude | None = None
     """Farthest the handle was from its place while recorded: a lean on the spring."""
+    monotonic_s: Seconds | None = None
     event: Literal["trial_measured"] = "trial_measured"
 
 
@@ -167,6 +171,7 @@ class TrialSpoiled:
     reason: str
     missed_ticks: Count | None = None
     vibrated_s: Seconds | None = None
+    monotonic_s: Seconds | None = None
     event: Literal["trial_spoiled"] = "trial_spoiled"
 
 
@@ -177,6 +182,7 @@ class RestTaken:
     trial: Index
     """Index of the trial that comes after the rest."""
     rested_s: Seconds
+    monotonic_s: Seconds | None = None
     event: Literal["rest_taken"] = "rest_taken"
 
 
@@ -186,6 +192,7 @@ class SessionInterrupted:
 
     utc: UtcTime
     reason: str
+    monotonic_s: Seconds | None = None
     event: Literal["session_interrupted"] = "session_interrupted"
 
 
@@ -196,6 +203,7 @@ class SessionResumed:
     versions: dict[str, str]
     mended: str = ""
     """A torn last line that a crash left behind, kept here for the record."""
+    monotonic_s: Seconds | None = None
     event: Literal["session_resumed"] = "session_resumed"
 
 
@@ -205,6 +213,7 @@ class SessionClosed:
 
     utc: UtcTime
     outcome: Literal["completed"]
+    monotonic_s: Seconds | None = None
     event: Literal["session_closed"] = "session_closed"
 
 
@@ -230,8 +239,8 @@ EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="e
 
 
 def event_line(event: Event) -> bytes:
-    """One line of JSON, newline included."""
-    return EVENTS.dump_json(event) + b"\n"
+    """One line of JSON, newline included. What earlier versions did not log is left out where it is not known."""
+    return EVENTS.dump_json(event, exclude={"monotonic_s"} if event.monotonic_s is None else None) + b"\n"
 
 
 def parse_event(line: bytes) -> Event:

@@ -46,7 +46,8 @@ Index = Annotated[int, Field(ge=0, le=10**6)]
 """Of a run, a trial or an attempt, from 0."""
 Seed = Annotated[int, Field(ge=0, lt=2**256)]
 Seconds = Annotated[float, Field(ge=0, le=1e9)]
-"""A duration."""
+"""A duration; as `monotonic_s`, a reading of the computer's monotonic clock beside `utc`, of which only differences
+within a sitting say anything (null where it was not logged)."""
 FrequencyHz = Annotated[float, Field(gt=0, le=1e6)]
 ForceN = Annotated[float, Field(ge=0, le=1e3)]
 LevelDb = Annotated[float, Field(ge=-1e4, le=1e4)]

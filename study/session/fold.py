@@ -25,13 +25,16 @@ from study.session.events import (
     TrialPresented,
     TrialSpoiled,
 )
+from study.session.log_time import Moment
 from study.session.sitting_state import (
+    SittingState,
     check,
     demonstrated,
     exposed,
     fill_in,
     likely_amplitude_mps2,
     moved,
+    pass_time,
     sit_down_again,
 )
 from study.session.state import SessionState, begin_session, current_rule, due, felt
@@ -44,6 +47,7 @@ def apply(state: SessionState, event: Event) -> SessionState:
     """The state after one more event. Raises LogContradiction where it cannot follow."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
+    state = replace(state, sitting=_up_to(state.sitting, event))
     match event:
         case TrialPresented():
             return _present(state, event)
@@ -55,6 +59,10 @@ def apply(state: SessionState, event: Event) -> SessionState:
             return _spoil(state, event)
         case _:
             return _apply_between_trials(state, event)
+
+
+def _up_to(sitting: SittingState, event: Event) -> SittingState:
+    return pass_time(sitting, Moment(event.utc, event.monotonic_s), resumed=isinstance(event, SessionResumed))
 
 
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
@@ -80,7 +88,7 @@ def _present(state: SessionState, event: TrialPresented) -> SessionState:
         raise LogContradiction(f"{place_of(event)} presented after the last run")
     check_draw(event, due(state))
     row = trial_row(state.opened, event, felt(state.opened))
-    return replace(state, presented=event, trials=(*state.trials, row), sitting=moved(state.sitting, event.utc))
+    return replace(state, presented=event, trials=(*state.trials, row), sitting=moved(state.sitting))
 
 
 def _answer(state: SessionState, event: AnswerGiven) -> SessionState:
@@ -173,7 +181,7 @@ def _around(state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed 
             return replace(state, sitting=demonstrated(state.sitting, event))
         case DemoPlayed():
             amplitude = likely_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
-            sitting = exposed(moved(state.sitting, event.utc), event.frequency_hz, amplitude, event.seconds)
+            sitting = exposed(moved(state.sitting), event.frequency_hz, amplitude, event.seconds)
             return replace(state, sitting=sitting)
 
 

@@ -27,3 +27,5 @@ class Live:
     sensor_clipped: bool
     missed_ticks: int
     """In the present stimulus."""
+    monotonic_s: float | None = None
+    """Reading of the session's monotonic clock at `utc`, as in its log; None from older versions."""

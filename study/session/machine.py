@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from study.session.due_trial import Present
 from study.session.form_views import Form, FormKind
 from study.session.forms import form_of
-from study.session.sitting_state import dose_now, minutes_between
+from study.session.log_time import Moment
+from study.session.sitting_state import dose_now, pass_time
 from study.session.state import SessionState, due
 from study.session.vibration_dose import a8_mps2
 
@@ -65,10 +66,10 @@ def next_preparation(state: SessionState) -> Preparation | None:
     return None if sitting.device_checked else CheckDevice()
 
 
-def next_action(state: SessionState, utc: str = "") -> Action:
+def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
     """Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
 
-    utc: the time now, ISO 8601, against the limits of a sitting; empty where nobody is to be sent home.
+    utc, monotonic_s: the time now, against the limits of a sitting; utc is empty where the limits are not to end it.
     """
     if state.presented is not None:
         raise ValueError("a trial is open; it must be closed before the next action")
@@ -76,7 +77,7 @@ def next_action(state: SessionState, utc: str = "") -> Action:
     if state.finished:
         form = form_of(state.protocol, FormKind.DEBRIEF) if person and not state.sitting.debriefed else None
         return FillIn(form) if form is not None and not state.closed else Finish()
-    if person and utc and (reason := limit_reached(state, utc)):
+    if person and utc and (reason := limit_reached(state, utc, monotonic_s)):
         return Leave(reason)
     if person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
         return Demonstrate()
@@ -85,13 +86,13 @@ def next_action(state: SessionState, utc: str = "") -> Action:
     return due(state)
 
 
-def limit_reached(state: SessionState, utc: str) -> str:
+def limit_reached(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
     """Why this sitting must end; empty where it may go on."""
     limits = state.protocol.limits
-    minutes = minutes_between(state.sitting.began_utc, utc)
-    if minutes >= limits.longest_min:
+    sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
+    if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:
         return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
-    dose = a8_mps2(dose_now(state.sitting, utc))
+    dose = a8_mps2(dose_now(sitting))
     if dose >= limits.dose_a8_mps2:
         return (
             f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "

@@ -23,6 +23,7 @@ class FormFilled:
     passed: bool
     """False: consent was not given, or somebody may not take part. Always true for the other forms."""
     answers: dict[str, str]
+    monotonic_s: Seconds | None = None
     event: Literal["form_filled"] = "form_filled"
 
 
@@ -32,6 +33,7 @@ class DeviceChecked:
     passed: bool
     findings: tuple[str, ...]
     """One sentence each."""
+    monotonic_s: Seconds | None = None
     event: Literal["device_checked"] = "device_checked"
 
 
@@ -46,12 +48,14 @@ class DemoPlayed:
     """The number on the screen."""
     angle_deg: AngleDeg
     seconds: Seconds
+    monotonic_s: Seconds | None = None
     event: Literal["demo_played"] = "demo_played"
 
 
 @dataclass(frozen=True, config=FACT)
 class DemoFinished:
     utc: UtcTime
+    monotonic_s: Seconds | None = None
     event: Literal["demo_finished"] = "demo_finished"
 
 
@@ -60,6 +64,7 @@ class PauseTaken:
     utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
     paused_s: Seconds
+    monotonic_s: Seconds | None = None
     event: Literal["pause_taken"] = "pause_taken"
 
 
@@ -70,4 +75,5 @@ class NoteTaken:
     text: str
     adverse: bool = False
     """Something happened to the participant: pain, numbness, a fright."""
+    monotonic_s: Seconds | None = None
     event: Literal["note_taken"] = "note_taken"

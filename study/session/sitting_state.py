@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from datetime import datetime
 
 from protocols.trial import Trial
+from study.session.log_time import ClockStep, Moment, clock_step, passed_s
 from study.session.sitting_events import DemoFinished, DeviceChecked, FormFilled
-from study.session.vibration_dose import NO_DOSE, Dose, add
+from study.session.vibration_dose import NO_DOSE, Dose, add, total
+
+
+@dataclass(frozen=True, slots=True)
+class Night:
+    """A rest after which the dose began again."""
+
+    still_s: float
+    """How long the handle had not moved, as far as the clock said."""
+    dose: Dose
+    """What was set to zero by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,19 +32,27 @@ class SittingState:
     device_checked: bool = False
     demo_done: bool = False
     debriefed: bool = False
-    began_utc: str = ""
-    """First time in this sitting that the handle moved; empty before."""
+    last: Moment = Moment("")  # noqa: RUF009 - frozen
+    """Time of the last entry in the log, up to which everything here counts."""
+    sat_s: float | None = None
+    """Since the handle first moved in this sitting; None before."""
     answers_before: int = 0
     """Given in earlier sittings."""
-    moved_utc: str = ""
-    """Last time that it moved."""
+    still_s: float | None = None
+    """Since the handle last moved, in any sitting; None before."""
     dose: Dose = NO_DOSE
     """Since the last long rest: see NIGHT_H."""
+    night: Night | None = None
+    """The last long rest."""
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Where the computer's wall clock was set."""
 
 
 NIGHT_H = 10.0
 """After so long without a movement a new day begins for the hand. A date would do worse: midnight, in whatever time
-zone, may fall into a sitting."""
+zone, may fall into a sitting. Within a sitting the monotonic clock counts, between two of them the wall clock does: a
+clock that is set forward by so much between them passes for a night, unless it is set back later."""
+NIGHT_S = 3600 * NIGHT_H
 
 REFUSALS = {
     "consent": "consent was not given",
@@ -64,22 +82,56 @@ def demonstrated(sitting: SittingState, event: DemoFinished) -> SittingState:
 
 def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
     """A new sitting of the same session: whoever was refused is asked again, in case it was a slip of the finger."""
-    return replace(sitting, setup_done=False, device_checked=False, began_utc="", refused="", answers_before=answers)
+    return replace(sitting, setup_done=False, device_checked=False, sat_s=None, refused="", answers_before=answers)
 
 
-def moved(sitting: SittingState, utc: str) -> SittingState:
-    """The handle moves at this time."""
-    return replace(
+def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> SittingState:
+    """Up to this moment. resumed: a new sitting begins with it, so that its monotonic clock says nothing of before."""
+    last = Moment(sitting.last.utc) if resumed else sitting.last
+    passed, step = passed_s(last, now), clock_step(last, now, between_sittings=resumed)
+    later = replace(
         sitting,
-        began_utc=sitting.began_utc or utc,
-        moved_utc=utc,
-        dose=dose_now(sitting, utc),
+        last=now,
+        sat_s=None if sitting.sat_s is None else sitting.sat_s + passed,
+        still_s=None if sitting.still_s is None else sitting.still_s + passed,
     )
+    return later if step is None else _stepped(later, step)
 
 
-def dose_now(sitting: SittingState, utc: str) -> Dose:
+def _stepped(sitting: SittingState, step: ClockStep) -> SittingState:
+    """A clock set back may take back a step forward that passed for rest, because it happened between two sittings: the
+    rest may then be shorter by as much. A night that was none gives its dose back."""
+    steps = (*sitting.clock_steps, step)
+    known = replace(sitting, clock_steps=steps)
+    # Steps forward that are known never passed for rest: setting the clock back by as much says nothing of it.
+    doubt_s = max(0.0, -_sum_s(steps)) - max(0.0, -_sum_s(sitting.clock_steps))
+    if doubt_s <= 0:
+        return known
+    if known.still_s is not None:
+        known = replace(known, still_s=max(0.0, known.still_s - doubt_s))
+    if known.night is None:
+        return known
+    night = replace(known.night, still_s=known.night.still_s - doubt_s)
+    if night.still_s >= NIGHT_S:
+        return replace(known, night=night)
+    return replace(known, night=None, dose=total(night.dose, known.dose))
+
+
+def _sum_s(steps: tuple[ClockStep, ...]) -> float:
+    return sum(step.by_s for step in steps)
+
+
+def moved(sitting: SittingState) -> SittingState:
+    """The handle moves now."""
+    if sitting.still_s is not None and sitting.still_s >= NIGHT_S:
+        sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE)
+    return replace(sitting, sat_s=sitting.sat_s or 0.0, still_s=0.0)
+
+
+def dose_now(sitting: SittingState) -> Dose:
     """What counts today: nothing after a night's rest."""
-    return NO_DOSE if minutes_between(sitting.moved_utc, utc) >= 60 * NIGHT_H else sitting.dose
+    rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
+    return NO_DOSE if rested else sitting.dose
 
 
 def exposed(
@@ -99,10 +151,3 @@ def likely_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_
         if trial.frequency_hz == frequency_hz and trial.delivered_mps2 is not None
     ]
     return level_n * max(ratios) if ratios else None
-
-
-def minutes_between(first_utc: str, second_utc: str) -> float:
-    """Both ISO 8601; 0 where the first is empty."""
-    if not first_utc:
-        return 0.0
-    return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds() / 60.0

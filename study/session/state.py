@@ -12,6 +12,7 @@ from protocols.trial import Trial
 from study.session.draw_check import LogContradiction
 from study.session.due_trial import Place, Present, due_trial
 from study.session.events import AnswerGiven, SessionOpened, TrialPresented
+from study.session.log_time import Moment
 from study.session.sitting_state import SittingState
 
 
@@ -63,6 +64,7 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
         trials=(),
         rest_due_s=0.0,
         closed=False,
+        sitting=SittingState(last=Moment(opened.utc, opened.monotonic_s)),
     )
     return replace(state, staircase=begin(current_rule(state)))
 

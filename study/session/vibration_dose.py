@@ -62,6 +62,15 @@ def add(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: 
     return replace(longer, squared_s=dose.squared_s + _weighted_rms(frequency_hz, amplitude_mps2) ** 2 * seconds)
 
 
+def total(*doses: Dose) -> Dose:
+    """Of one hand on one day."""
+    return Dose(
+        squared_s=sum(dose.squared_s for dose in doses),
+        vibrated_s=sum(dose.vibrated_s for dose in doses),
+        unmeasured_s=sum(dose.unmeasured_s for dose in doses),
+    )
+
+
 def a8_mps2(dose: Dose) -> float:
     """The exposure as the constant weighted rms acceleration that would give it in eight hours."""
     return math.sqrt(dose.squared_s / WORKING_DAY_S)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.live import Live
-from study.session.sitting_state import minutes_between
+from study.session.log_time import minutes_between
 from study.session.watch_view import ON, Alarm, Exposure, Standing
 from study.session.watched import Watched
 
@@ -114,7 +114,7 @@ def _handle(now: Situation) -> Alarm | None:
 
 
 def _adverse(now: Situation) -> Alarm | None:
-    adverse = [note for note in now.watched.notes if note.adverse and note.utc >= now.watched.sitting_utc]
+    adverse = [note for note in now.watched.notes[now.watched.notes_before :] if note.adverse]
     return Alarm("adverse", f"Adverse event: {adverse[-1].text}", adverse[-1].utc, event=True) if adverse else None
 
 

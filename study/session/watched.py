@@ -30,6 +30,8 @@ class Watched:
     """Why the sitting was ended; empty while nobody ended it."""
     sitting_utc: str
     """When the present sitting was opened."""
+    notes_before: int
+    """How many of `notes` are older than the present sitting."""
     last_utc: str
     """Of the last fact."""
 
@@ -42,6 +44,7 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
         notes=(),
         left="",
         sitting_utc=opened.utc,
+        notes_before=0,
         last_utc=opened.utc,
     )
 
@@ -64,7 +67,7 @@ def follow(watched: Watched, event: Event) -> Watched:
         case SessionInterrupted():
             return replace(after, left=event.reason)
         case SessionResumed():
-            return replace(after, left="", sitting_utc=event.utc)
+            return replace(after, left="", sitting_utc=event.utc, notes_before=len(watched.notes))
         case _:
             return after
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from protocols.trial import Phase
 from study.session.live import Live
-from study.session.sitting_state import dose_now, minutes_between
+from study.session.log_time import Moment, minutes_between
+from study.session.sitting_state import SittingState, dose_now, pass_time
 from study.session.vibration_dose import a8_mps2
 from study.session.watch_alarms import Situation, alarms_of
 from study.session.watch_view import ON, Exposure, Standing, WatchView
@@ -28,7 +29,7 @@ def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView
     state = watched.state
     live = _of_this_sitting(watched, beside.live)
     standing = _standing(watched, live, beside.writer)
-    exposure = _exposure(watched, standing, now_utc)
+    exposure = _exposure(watched, live, standing, now_utc)
     situation = Situation(watched, live, beside.problem, standing, exposure, now_utc)
     activity, since_utc = _activity(watched, live, standing)
     catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.counts]
@@ -66,8 +67,10 @@ def watch_view(watched: Watched, beside: Beside, now_utc: str, before: WatchView
 
 
 def _of_this_sitting(watched: Watched, live: Live | None) -> Live | None:
-    """What an earlier sitting left behind says nothing of this one."""
-    return live if live is not None and live.utc >= watched.sitting_utc else None
+    """What an earlier sitting left behind says nothing of this one. Versions that log the monotonic clock take it away
+    before a sitting; of others only the times tell."""
+    ours = live is not None and (live.monotonic_s is not None or live.utc >= watched.sitting_utc)
+    return live if ours else None
 
 
 def _standing(watched: Watched, live: Live | None, writer: bool | None) -> Standing:
@@ -121,15 +124,23 @@ def _activity(watched: Watched, live: Live | None, standing: Standing) -> tuple[
     return _WORDS[live.activity], live.since_utc
 
 
-def _exposure(watched: Watched, standing: Standing, now_utc: str) -> Exposure:
-    sitting, limits = watched.state.sitting, watched.state.protocol.limits
-    until_utc = max(now_utc, watched.last_utc) if standing in ON else watched.last_utc
+def _exposure(watched: Watched, live: Live | None, standing: Standing, now_utc: str) -> Exposure:
+    state, limits = watched.state, watched.state.protocol.limits
+    sitting = _until_now(state.sitting, live, now_utc) if standing in ON else state.sitting
     return Exposure(
-        elapsed_min=max(0.0, minutes_between(sitting.began_utc, until_utc)),
+        elapsed_min=(sitting.sat_s or 0.0) / 60.0,
         limit_min=limits.longest_min,
-        dose_a8_mps2=a8_mps2(dose_now(sitting, until_utc)),
+        dose_a8_mps2=a8_mps2(dose_now(sitting)),
         dose_limit_mps2=limits.dose_a8_mps2,
     )
+
+
+def _until_now(sitting: SittingState, live: Live | None, now_utc: str) -> SittingState:
+    """By the session's own monotonic clock where its live state tells it, else by the clock of who watches."""
+    stamped = live is not None and live.monotonic_s is not None and sitting.last.monotonic_s is not None
+    if live is not None and stamped:
+        return pass_time(sitting, Moment(live.utc, live.monotonic_s))
+    return pass_time(sitting, Moment(now_utc))
 
 
 def _seconds(since_utc: str, now_utc: str) -> float:

@@ -34,7 +34,7 @@ def write_live(folder: Path, live: Live) -> None:
 
 
 def remove_live(folder: Path) -> None:
-    """At the end of a sitting. Never raises."""
+    """What an earlier sitting left behind. Never raises."""
     with suppress(OSError):
         (folder / LIVE_NAME).unlink()
 
@@ -53,6 +53,7 @@ def read_live(folder: Path) -> Live | None:
 
 
 def _fits(values: dict[str, Any]) -> bool:
+    values = {"monotonic_s": None, **values}
     number = (int, float)
     kinds: dict[str, tuple[type, ...]] = {
         "utc": (str,),
@@ -64,6 +65,7 @@ def _fits(values: dict[str, Any]) -> bool:
         "acceleration_mps2": (*number, type(None)),
         "sensor_clipped": (bool,),
         "missed_ticks": (int,),
+        "monotonic_s": (*number, type(None)),
     }
     return (
         values.keys() == kinds.keys()

@@ -137,4 +137,5 @@ class Attendant:
             acceleration_mps2=None if acceleration is None else math.hypot(*acceleration),
             sensor_clipped=look.sensor_clipped,
             missed_ticks=look.missed_ticks,
+            monotonic_s=self._clock.now_s(),
         )

@@ -24,7 +24,7 @@ from study.workflows.open_session import (
 from study.workflows.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.resume_session import resumed_session
 from study.workflows.run_session import run_session
-from study.workflows.sitting import Sitting
+from study.workflows.sitting import Sitting, tell_clock_steps
 
 
 def _nobody_listens(folder: SessionFolder, device: Device) -> None:
@@ -73,10 +73,13 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     with contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device:
         equalized = equalized_again(folder, state, device.info)
         with resumed_session(folder, device.info, participant.clock) as opened:
-            return _run(opened, device, equalized, participant)
+            return _run(opened, device, equalized, participant, known_steps=len(state.sitting.clock_steps))
 
 
-def _run(opened: OpenedSession, device: Device, equalized: Equalized, participant: Participant) -> Conducted:
+def _run(
+    opened: OpenedSession, device: Device, equalized: Equalized, participant: Participant, known_steps: int = 0
+) -> Conducted:
+    """known_steps: how often the computer's clock was set before this sitting; only what is new is told."""
     folder, protocol = opened.folder, opened.state.protocol
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
@@ -100,5 +103,6 @@ def _run(opened: OpenedSession, device: Device, equalized: Equalized, participan
         attendant=attendant,
         place_m=place_m,
     )
+    tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
     end = run_session(opened.state, sitting)
     return Conducted(folder, end.state, end.left, end.fault, end.withdrawn)

@@ -86,6 +86,7 @@ def opened_session(
         equalizer=equalized.equalizer.name,
         versions=versions(),
         equalized=equalized.facts,
+        monotonic_s=clock.now_s(),
     )
     with locked(folder.path):
         keep_model(equalized, folder)

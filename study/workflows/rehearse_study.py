@@ -84,8 +84,7 @@ def subject_seed(seed: int, number: int) -> int:
 
 def _sit(rehearsal: Rehearsal, number: int) -> None:
     observer = population(rehearsal.subjects, rehearsal.seed)[number]
-    clock, seed = VirtualClock(), subject_seed(rehearsal.seed, number)
-    participant = seated(observer, seed, clock)
+    seed = subject_seed(rehearsal.seed, number)
     if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
         return
     begun = _begun(rehearsal.data, subject_code(number))
@@ -101,11 +100,12 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
             participant_number=number,
             model=rehearsal.model,
         )
-        conducted = conduct_new(plan, DEVICE, participant)
-    elif fold_session(begun).state.closed:
+        conducted = conduct_new(plan, DEVICE, seated(observer, seed, VirtualClock()))
+    elif (state := fold_session(begun).state).closed:
         return
     else:
-        conducted = conduct_resumed(begun, DEVICE, participant)
+        clock = VirtualClock.not_before(state.sitting.last.utc)
+        conducted = conduct_resumed(begun, DEVICE, seated(observer, seed, clock))
     write_tables(conducted.folder)
     if conducted.left:
         raise StudyError(

@@ -16,6 +16,7 @@ from study.session.state import SessionState
 from study.session.stimulus import direction_vector
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend
+from study.store.live_file import remove_live
 from study.store.provenance import versions
 from study.store.request_inbox import RequestInbox
 from study.store.session_lock import locked
@@ -29,14 +30,20 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
     """An existing session, mended and locked as long as the context lasts."""
     with locked(folder.path):
         log = EventLog.reopen(folder.log)
-        # Yesterday's stop must not end today's sitting; from now on somebody hears.
+        # Yesterday's stop must not end today's sitting; from now on somebody hears. Nor does yesterday's live state
+        # say anything of today, whatever its time is.
         RequestInbox(folder.path).clear()
+        remove_live(folder.path)
         try:
             folded = fold_session(folder)
             _check_resumable(folded.state, device, folder)
             mend(folder.log, folded.contents)
             resumed = SessionResumed(
-                utc=clock.utc(), device=device_facts(device), versions=versions(), mended=folded.contents.torn
+                utc=clock.utc(),
+                device=device_facts(device),
+                versions=versions(),
+                mended=folded.contents.torn,
+                monotonic_s=clock.now_s(),
             )
             log.append(resumed)
             state = _close_open_trial(apply(folded.state, resumed), folder, log, clock)
@@ -75,6 +82,7 @@ def _close_open_trial(state: SessionState, folder: SessionFolder, log: EventLog,
             trial=presented.trial,
             attempt=presented.attempt,
             reason="the program ended before the answer",
+            monotonic_s=clock.now_s(),
         )
     else:
         event = _measured_late(state, presented, folder, clock)
@@ -99,6 +107,7 @@ def _measured_late(
             attempt=presented.attempt,
             status="unmeasured",
             flags=("its recording was lost when the program ended",),
+            monotonic_s=clock.now_s(),
         )
     saved, recording = found
     direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
@@ -117,4 +126,5 @@ def _measured_late(
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
         missed_ticks=recording.meta.get("missed_ticks"),
+        monotonic_s=clock.now_s(),
     )

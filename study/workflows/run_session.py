@@ -80,7 +80,11 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
         sitting.log.append(
-            SessionInterrupted(utc=sitting.clock.utc(), reason="interrupted: Ctrl-C, or the terminal was closed")
+            SessionInterrupted(
+                utc=sitting.clock.utc(),
+                reason="interrupted: Ctrl-C, or the terminal was closed",
+                monotonic_s=sitting.clock.now_s(),
+            )
         )
     way_back = f"Go on with: hapteq resume {sitting.folder.path}"
     saved = f"{answers_are(state.answers)} on disk."
@@ -101,7 +105,7 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
     voids = 0
     while True:
         state = write_notes(state, sitting)
-        action = next_action(state, sitting.clock.utc())
+        action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
         if isinstance(action, Finish):
             closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
             return SessionEnd(record(state, closed, sitting), left="")

@@ -19,8 +19,8 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("device", _device(opened)),
         ("equalizer", opened.equalizer),
         ("within reach", _reach(opened)),
-        ("begun", _when(opened.utc)),
-        ("finished" if state.closed else "last entry", _when(_last_utc(folded))),
+        ("begun", when(opened.utc)),
+        ("finished" if state.closed else "last entry", when(_last_utc(folded))),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
         ("answers", _answers(state)),
@@ -67,5 +67,5 @@ def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
     return tuple(facts)
 
 
-def _when(utc: str) -> str:
+def when(utc: str) -> str:
     return f"{utc[:19].replace('T', ' ')} UTC"

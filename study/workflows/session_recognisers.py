@@ -1,6 +1,6 @@
 """Recognisers of what a study leaves behind: session folders and logs, summaries, statistics, locks, tombstones."""
 
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 
 from analysis.detection import detection_thresholds
@@ -29,7 +29,7 @@ KIND = "session"
 DOCUMENTS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
     "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
-    LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live))),
+    LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live) if field.default is MISSING)),
     REQUEST_FORMAT: ("request to a running session", ("request", "who")),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
@@ -143,7 +143,8 @@ def _described(folded: FoldedSession) -> str:
     state = folded.state
     who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end = "finished" if state.closed else "not finished"
-    return f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"
+    steps = "".join(f". Before {step.utc}: {step.sentence}" for step in state.sitting.clock_steps).rstrip(".")
+    return f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}{steps}"
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

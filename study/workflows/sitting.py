@@ -1,12 +1,14 @@
 """The ports of one sitting, and the only way a fact gets into its state: through the log."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from equalizer.tracking.equalizer import Equalizer
 from study.devices.clock import Clock
 from study.devices.device import Device
 from study.session.events import Event, NoteTaken
 from study.session.fold import apply
+from study.session.log_time import ClockStep
+from study.session.requests import NoteAsked
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog
@@ -30,9 +32,18 @@ class Sitting:
 
 def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
     """First the fold, which refuses what cannot be; then the disk; only then may anybody act on it."""
+    event = replace(event, monotonic_s=sitting.clock.now_s())
     after = apply(state, event)
     sitting.log.append(event)
+    tell_clock_steps(after.sitting.clock_steps[len(state.sitting.clock_steps) :], sitting)
     return after
+
+
+def tell_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
+    """On the screen now, and in the log with the next notes."""
+    for step in steps:
+        sitting.display.trouble(step.sentence)
+        sitting.attendant.note(NoteAsked("program", step.sentence))
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:

@@ -16,7 +16,7 @@ from study.store.archive import SessionFolder
 from study.store.event_log import readable_events
 from study.workflows.analysis_files import ANALYSIS_NAME
 from study.workflows.fold_session import FoldedSession, fold_session
-from study.workflows.session_facts import session_facts
+from study.workflows.session_facts import session_facts, when
 from study.workflows.session_line import line_of, session_line, with_writer
 
 if TYPE_CHECKING:
@@ -38,12 +38,18 @@ def session_view(path: Path) -> SessionView:
 def _whole(folder: SessionFolder, folded: FoldedSession) -> SessionView:
     state = folded.state
     analysis, problem = _analysis(state)
+    clock = (f"Before {when(step.utc)}: {step.sentence}" for step in state.sitting.clock_steps)
     torn = "A crash tore the last line of the log; it is taken off when the session is resumed."
     return SessionView(
         line=with_writer(line_of(state, folder), folder),
         facts=session_facts(folded),
         thresholds=_threshold_rows(state, analysis),
-        warnings=(*((torn,) if folded.contents.torn_bytes else ()), *problem, *(analysis.warnings if analysis else ())),
+        warnings=(
+            *((torn,) if folded.contents.torn_bytes else ()),
+            *clock,
+            *problem,
+            *(analysis.warnings if analysis else ()),
+        ),
         staircases=_staircases(state, analysis),
         events=log_in_words(folded.contents.events),
         report=_report(folder),

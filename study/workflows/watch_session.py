@@ -7,8 +7,8 @@ from study.errors import StudyError
 from study.session.draw_check import LogContradiction
 from study.session.events import SessionOpened, parse_event
 from study.session.live import Live
+from study.session.log_time import minutes_between
 from study.session.requests import Request
-from study.session.sitting_state import minutes_between
 from study.session.watch_alarms import SILENT_AFTER_S
 from study.session.watch_view import WatchView
 from study.session.watched import Watched, begin_watching

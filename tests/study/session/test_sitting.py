@@ -27,6 +27,7 @@ from study.session.events import (
 from study.session.fold import apply, begin_session
 from study.session.form_views import FormKind, FormReply, missing
 from study.session.forms import form_of, judge_form
+from study.session.log_time import Moment
 from study.session.machine import (
     CheckDevice,
     Demonstrate,
@@ -250,7 +251,7 @@ def test_a_sitting_that_is_too_long_ends_between_two_trials(begun, small_protoco
 def test_a_hand_that_had_its_dose_rests_for_the_day(begun, small_protocol):
     protocol = replace(small_protocol, limits=SittingLimits(dose_a8_mps2=0.01))
     state = begun(protocol)
-    shaken = replace(state.sitting, dose=replace(state.sitting.dose, squared_s=100.0), moved_utc=UTC)
+    shaken = replace(state.sitting, dose=replace(state.sitting.dose, squared_s=100.0), still_s=0.0, last=Moment(UTC))
     tired = replace(state, sitting=shaken)
     assert "vibration dose for today" in next_action(tired, LATER).reason
     assert not isinstance(next_action(tired, LATER.replace("01-01", "01-02")), Leave)

@@ -456,3 +456,28 @@ def test_a_killed_program_is_an_alarm(story):
 def test_a_log_that_cannot_be_followed_is_an_alarm(story):
     view = watch_view(story.watched, Beside(problem="it contradicts the rules."), at(1))
     assert [a.sentence for a in view.alarms] == ["The log cannot be followed: it contradicts the rules."]
+
+
+def test_elapsed_time_and_dose_follow_the_monotonic_clock_of_the_session_not_a_clock_that_was_set(story):
+    story.answer(True)
+    story.watched = replace(story.watched, state=replace(story.watched.state, sitting=_stamped_sitting(story, 100.0)))
+    before = story.view(live=story.live(monotonic_s=104.0))
+    set_forward = replace(story.live(monotonic_s=104.0), utc=at(story.seconds + 36000.0))
+    after = watch_view(story.watched, Beside(set_forward, None), at(story.seconds + 36000.0))
+    assert after.exposure == before.exposure
+    assert after.exposure.dose_a8_mps2 > 0
+
+
+def _stamped_sitting(story, monotonic_s: float):
+    sitting = story.watched.state.sitting
+    return replace(sitting, last=replace(sitting.last, monotonic_s=monotonic_s))
+
+
+def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):
+    """The live state and what was noted are of this sitting, whatever their times say."""
+    story.open_trial()
+    back = story.live(monotonic_s=50.0, fault="the device stopped answering")
+    view = watch_view(story.watched, Beside(replace(back, utc=at(-3600.0)), None), at(-3599.0))
+    assert [alarm.kind for alarm in view.alarms] == ["device"]
+    noted = story.tell(NoteTaken(at(-3597.0), "participant", "numb", adverse=True)).view()
+    assert "adverse" in [alarm.kind for alarm in noted.alarms]

@@ -1,0 +1,82 @@
+"""Time as the log of a session tells it: by the monotonic clock within a sitting, by the wall clock between sittings.
+
+The wall clock of a computer can be set at any moment, forward and back; the monotonic clock cannot. Every entry of a
+sitting carries both, so that no limit of a person's exposure depends on the wall clock within a sitting. Between two
+sittings only the wall clock is left: a clock set forward there cannot be told from time that passed. A clock set back
+can, and counts as no time at all.
+
+The monotonic clock stands still while the computer sleeps: a sleep within a sitting looks like a clock set forward.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+STEP_S = 5.0
+"""From so large a disagreement of the two clocks on, the wall clock was set. Corrections by NTP while it runs are
+spread over hours, far below this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    utc: str
+    """ISO 8601; empty where nothing was logged before."""
+    monotonic_s: float | None = None
+    """None in logs of versions before 1.1 and in entries that another program wrote."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockStep:
+    """The wall clock of the computer was set between two entries of the log."""
+
+    utc: str
+    """Of the first entry after it, by the clock as it was set."""
+    by_s: float
+    """Positive: forward."""
+    between_sittings: bool
+
+    @property
+    def sentence(self) -> str:
+        """For the experimenter."""
+        step = _duration(abs(self.by_s))
+        limits = "Time limits and the vibration dose do not follow it; the times in the log do."
+        if self.by_s > 0:
+            return f"The computer's clock was set forward by {step}, or the computer slept that long. {limits}"
+        if self.between_sittings:
+            return (
+                f"The computer's clock reads {step} earlier than at the last entry of the log. No time counts as "
+                "passed since then: the vibration dose goes on from there."
+            )
+        return f"The computer's clock was set back by {step}. {limits}"
+
+
+def passed_s(before: Moment, now: Moment) -> float:
+    """Never negative. By the monotonic clock where both carry it, else by the wall clock."""
+    if before.monotonic_s is not None and now.monotonic_s is not None:
+        return max(0.0, now.monotonic_s - before.monotonic_s)
+    return max(0.0, _wall_s(before, now))
+
+
+def clock_step(before: Moment, now: Moment, between_sittings: bool = False) -> ClockStep | None:
+    """What the wall clock was set by; without monotonic times only a step back can be known."""
+    wall_s = _wall_s(before, now)
+    monotonic = before.monotonic_s is not None and now.monotonic_s is not None
+    by_s = wall_s - passed_s(before, now) if monotonic else min(0.0, wall_s)
+    return ClockStep(now.utc, by_s, between_sittings) if abs(by_s) >= STEP_S else None
+
+
+def minutes_between(first_utc: str, second_utc: str) -> float:
+    """By the wall clock: negative where it was set back. Both ISO 8601; 0 where the first is empty."""
+    if not first_utc:
+        return 0.0
+    return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds() / 60.0
+
+
+def _wall_s(before: Moment, now: Moment) -> float:
+    return 60.0 * minutes_between(before.utc, now.utc)
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
