@@ -39,8 +39,28 @@ class SessionFolder:
         return self.path / TOMBSTONE_NAME
 
     @property
+    def withdrawal(self) -> Path:
+        """There as long as the erasing of this participant's sessions is not finished."""
+        return withdrawal_file(self.path.parent, self.subject)
+
+    @property
     def withdrawn(self) -> bool:
-        return self.tombstone.exists()
+        return self.tombstone.exists() or self.withdrawal.exists()
+
+
+def withdrawal_file(data: Path, subject: str) -> Path:
+    return data / f"{subject}.withdrawal.json"
+
+
+class SessionWithdrawnError(StudyError):
+    """No data any more, whether or not all of it is erased already."""
+
+    def __init__(self, folder: SessionFolder) -> None:
+        super().__init__(
+            "This session was withdrawn",
+            f"The participant of {folder.name} withdrew; the data were erased.",
+            f"Nothing can be done with it; hapteq validate {folder.path} says whether anything is left.",
+        )
 
 
 def check_subject(code: str) -> str:
@@ -100,11 +120,7 @@ def find_session(session: str, data: Path) -> SessionFolder:
     for path in (Path(session), data / session):
         folder = SessionFolder(path.resolve())
         if folder.withdrawn:
-            raise StudyError(
-                "This session was withdrawn",
-                f"The participant of {folder.name} withdrew; the data were erased.",
-                "Nothing can be done with it.",
-            )
+            raise SessionWithdrawnError(folder)
         if folder.log.exists():
             return folder
     known = ", ".join(f.name for f in session_folders(data) if not f.withdrawn) or "none"

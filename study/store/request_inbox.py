@@ -4,6 +4,7 @@ Whoever asks writes a file under a name of its own and renames it into place; th
 A name begins with what is asked, so that a stop is a stop even where its content cannot be read.
 """
 
+import errno
 import itertools
 import json
 import os
@@ -16,6 +17,7 @@ from typing import Any, get_args
 
 from study.errors import StudyError
 from study.session.requests import NoteAsked, PauseAsked, Request, StopAsked, Who
+from study.store.real_folder import is_real_folder
 
 REQUESTS_NAME = "requests"
 REQUEST_FORMAT = "hapteq-request"
@@ -48,7 +50,7 @@ class RequestInbox:
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
         part = self._folder / f".{name}.part"
         try:
-            self._folder.mkdir(exist_ok=True)
+            self._make_folder()
             # No fsync: a request is for now, and nobody wants it after a power cut.
             part.write_text(json.dumps(document) + "\n", "utf-8")
             part.replace(self._folder / name)
@@ -76,7 +78,7 @@ class RequestInbox:
         """At the start of a sitting: yesterday's stop must not end today's. Notes that nobody took any more are kept:
         they are still for the log. Never raises."""
         try:
-            self._folder.mkdir(exist_ok=True)
+            self._make_folder()
             names = os.listdir(self._folder)  # noqa: PTH208
         except OSError:
             return
@@ -88,11 +90,17 @@ class RequestInbox:
         """Stops first, then the oldest first; what was taken is removed. Never raises."""
         try:
             # listdir takes half the time of Path.iterdir, twenty times a second.
-            present = os.listdir(self._folder)  # noqa: PTH208
+            present = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
         except OSError:
             return ()
         names = sorted((n for n in present if n[0] != "." and n not in self._passed_over), key=_stops_then_oldest)
         return tuple(request for name in names[:_AT_ONCE] if (request := self._take_one(name)) is not None)
+
+    def _make_folder(self) -> None:
+        """Raises OSError; also where it is a link: what that leads to is not the session's, and would be removed."""
+        self._folder.mkdir(exist_ok=True)
+        if not is_real_folder(self._folder):
+            raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
 
     def _take_one(self, name: str) -> Request | None:
         request = _parsed(_content(self._folder / name))

@@ -20,6 +20,7 @@ from study.store.provenance import Provenance, gather_provenance
 from study.store.recording_file import read_recording
 from study.store.text_file import write_text
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
+from study.store.written_elsewhere import note_written
 from study.workflows.analysis_files import written_by_analysis
 from study.workflows.collect_sessions import Collected, collect_sessions
 from study.workflows.picture_files import write_pictures
@@ -48,6 +49,7 @@ def analyze_data(
         parents=parents,
     )
     pictures = study_pictures(analysis, shapes)
+    note_written(data, out)
     _write(out, analysis, pictures, shapes, provenance, collected)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,

@@ -18,6 +18,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.new_folder import new_folder, require_new_folder
+from study.store.written_elsewhere import note_written
 from study.workflows.clean_recordings import with_clean
 from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, nothing_to_diagnose, read_input
 from study.workflows.spring_in_model import spring_words, with_spring
@@ -103,10 +104,16 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     )
     on_progress("writing the report", DIAGNOSED)
     parents = (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
-    with new_folder(plan.out) as folder:
-        write_diagnosis_into(folder, findings, parents)
+    _write(plan, findings, parents)
     on_progress("done", 1.0)
     return DiagnosedRecordings(findings, plan.out)
+
+
+def _write(plan: DiagnosePlan, findings: Findings, parents: Sequence[Path]) -> None:
+    for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
+        note_written(session, plan.out)
+    with new_folder(plan.out) as folder:
+        write_diagnosis_into(folder, findings, parents)
 
 
 def check_names(without: Sequence[str]) -> None:

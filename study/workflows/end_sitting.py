@@ -5,7 +5,7 @@ from study.errors import DeviceError, LeftError, StudyError
 from study.session.counted import answers_are
 from study.workflows.conduct_session import Conducted
 from study.workflows.session_results import write_results
-from study.workflows.withdraw_participant import plan_withdrawal, withdraw
+from study.workflows.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.written_analysis import WrittenAnalysis
 
 
@@ -30,10 +30,11 @@ def _not_finished(end: Conducted) -> StudyError:
 
 
 def _erased(end: Conducted, utc: str) -> StudyError:
-    plan = plan_withdrawal(end.folder)
-    withdraw(end.folder.path.parent, plan, utc)
+    data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
+    elsewhere = still_elsewhere(data, plan)
+    withdraw(data, plan, utc)
     return LeftError(
         "The participant withdrew",
         f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
-        "Analyses written elsewhere and copies still hold the numbers: erase them too.",
+        " ".join((*plan.doubtful, *elsewhere)),
     )

@@ -10,7 +10,7 @@ from study.session.draw_check import LogContradiction
 from study.session.events import SessionOpened
 from study.session.fold import apply, begin_session
 from study.session.state import SessionState
-from study.store.archive import SessionFolder
+from study.store.archive import SessionFolder, SessionWithdrawnError
 from study.store.event_log import LogContents, read_log
 
 
@@ -21,7 +21,10 @@ class FoldedSession:
 
 
 def fold_session(folder: SessionFolder) -> FoldedSession:
-    """Read a session without changing anything. Raises StudyError where the log contradicts itself or the rules."""
+    """Read a session without changing anything. Raises StudyError where the log contradicts itself or the rules, and
+    for a session that was withdrawn."""
+    if folder.withdrawn:
+        raise SessionWithdrawnError(folder)
     contents = read_log(folder.log)
     if not contents.events or not isinstance(contents.events[0], SessionOpened):
         raise StudyError(

@@ -1,25 +1,13 @@
 """Which participant of a protocol somebody is: chooses the row of a balanced order, and who has swapped labels."""
 
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError
 from study.session.events import SessionOpened
 from study.store.archive import SessionFolder, session_folders
 from study.store.event_log import read_opening
-from study.store.json_document import read_json
-
-TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
-
-
-@dataclass(frozen=True, slots=True)
-class Begun:
-    """What a session folder says of the participant who began it."""
-
-    protocol: str
-    simulated: bool
-    number: int
+from study.store.withdrawal_files import Begun, begun_of_tombstone, read_intent
 
 
 def participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
@@ -41,10 +29,12 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
 
 def begun_in(folder: SessionFolder) -> Begun | None:
     """None where nothing was begun, or nothing can be read of it."""
+    if folder.tombstone.exists():
+        return begun_of_tombstone(folder)
+    intent = read_intent(folder.path.parent, folder.subject)
+    if intent is not None and folder.name in intent.sessions:
+        return intent.sessions[folder.name]
     try:
-        if folder.withdrawn:
-            left = read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION).get("begun")
-            return Begun(**left) if left else None
         opening = read_opening(folder.log)
         if not isinstance(opening, SessionOpened):
             return None

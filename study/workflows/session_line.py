@@ -17,11 +17,10 @@ from study.session.events import SessionOpened
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import read_opening
-from study.store.json_document import read_json
 from study.store.log_writer import somebody_writes
 from study.store.regular_file import read_regular
+from study.store.withdrawal_files import how_to_finish, read_intent, read_tombstone
 from study.workflows.fold_session import fold_session
-from study.workflows.participant_number import TOMBSTONE_FORMAT, TOMBSTONE_VERSION
 
 CLOSED = b'"event":"session_closed"}\n'
 MEASURED = b'"event":"trial_measured"}\n'
@@ -76,15 +75,16 @@ def unreadable(folder: SessionFolder, why: str) -> SessionLine:
 
 
 def _withdrawn(folder: SessionFolder) -> SessionLine:
-    protocol, when = "", ""
-    try:
-        left = read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION)
-    except StudyError:
-        left = {}  # that there is a tombstone says enough
-    when = str(left.get("withdrawn_utc", ""))
+    left = read_tombstone(folder)  # that there is one says enough
+    intent = read_intent(folder.path.parent, folder.subject)
+    when = str(left.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
     begun = left.get("begun")
+    if begun is None and intent is not None and (promised := intent.sessions.get(folder.name)):
+        begun = {"protocol": promised.protocol}
     protocol = str(begun.get("protocol", "")) if isinstance(begun, dict) else ""
     remark = "The participant withdrew; the data were erased."
+    if finish := how_to_finish(folder):
+        remark = f"The participant withdrew, and not everything is erased. {finish}"
     return SessionLine(
         folder.name, str(folder.path), folder.subject, protocol, when, None, 0, 0, 0, "withdrawn", remark
     )

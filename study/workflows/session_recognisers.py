@@ -19,9 +19,9 @@ from study.store.provenance import sha256_of
 from study.store.request_inbox import REQUEST_FORMAT
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds
 from study.store.trials_file import TRIALS_NAME, read_trials
+from study.store.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
 from study.workflows.file_content import FileContent
 from study.workflows.fold_session import FoldedSession, fold_session
-from study.workflows.participant_number import TOMBSTONE_FORMAT
 from study.workflows.session_results import SUMMARY_FORMAT, SUMMARY_VERSION
 
 KIND = "session"
@@ -31,6 +31,7 @@ DOCUMENTS = {
     "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
     LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live) if field.default is MISSING)),
     REQUEST_FORMAT: ("request to a running session", ("request", "who")),
+    WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
 """Format: what it is, and the keys it must have."""
@@ -41,17 +42,26 @@ def recognise_session(content: FileContent) -> str | None:
     if content.is_folder:
         folder = SessionFolder(content.path.resolve())
         if folder.withdrawn:
-            return "withdrawn session; nothing is left of it but its tombstone"
+            return _withdrawn(folder, content.path)
         return _checked(folder, content.path) if folder.log.exists() else None
     if content.path.name == LOG_NAME or f'"{SESSION_FORMAT}"' in (content.text or "")[:1000]:
         return _described(_folded(SessionFolder(content.path.resolve().parent), content.path))
     return None
 
 
+def _withdrawn(folder: SessionFolder, path: Path) -> str:
+    if finish := how_to_finish(folder):
+        raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
+    return "withdrawn session; nothing is left of it but its tombstone"
+
+
 def recognise_document(content: FileContent) -> str | None:
     if content.json_format not in DOCUMENTS:
         return None
     kind, needed = DOCUMENTS[content.json_format]
+    if content.json_format == WITHDRAWAL_FORMAT:
+        finish = "the erasing is not finished; `hapteq withdraw` goes on with it"
+        raise UnusableFileError(content.path, kind, (finish,))
     document = read_json(content.path, content.json_format, SUMMARY_VERSION)
     missing = [key for key in needed if key not in document]
     if missing:

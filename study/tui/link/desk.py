@@ -48,7 +48,7 @@ from study.workflows.list_sessions import home_view
 from study.workflows.plan_sitting import plan_sitting
 from study.workflows.session_results import write_results
 from study.workflows.view_session import session_view
-from study.workflows.withdraw_participant import plan_withdrawal, withdraw
+from study.workflows.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.written_analysis import WrittenAnalysis
 
 OPENING = "Preparing the device: some ten seconds the first time."
@@ -131,8 +131,11 @@ class Desk:
         self._link.send(Opened(folder.name, str(folder.path)))
 
     def _withdraw(self, folder: SessionFolder) -> None:
-        plan = plan_withdrawal(folder)
-        withdraw(folder.path.parent, plan, self._clock.utc())
+        data, plan = folder.path.parent, plan_withdrawal(folder)
+        elsewhere = still_elsewhere(data, plan)
+        withdraw(data, plan, self._clock.utc())
+        for sentence in (*plan.doubtful, *elsewhere):
+            self._link.send(Trouble(sentence))
         self._link.send(Withdrawn(plan.sessions))
 
     def _diagnose(self, wanted: Diagnose) -> None:

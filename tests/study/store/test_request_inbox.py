@@ -173,3 +173,18 @@ def test_an_empty_inbox_costs_next_to_nothing(inbox):
     for _ in range(looks):
         inbox.take()
     assert (time.perf_counter() - began) / looks < 0.002
+
+
+def test_an_inbox_that_is_a_link_is_neither_read_nor_emptied(tmp_path):
+    """Whoever looks into it at the start of a sitting removes what is there."""
+    elsewhere, session = tmp_path / "elsewhere", tmp_path / "P01_001"
+    elsewhere.mkdir()
+    session.mkdir()
+    (elsewhere / "thesis.txt").write_text("all of it")
+    (session / "requests").symlink_to(elsewhere)
+    inbox = RequestInbox(session)
+    inbox.clear()
+    assert inbox.take() == ()
+    with pytest.raises(StudyError, match="it is a link"):
+        inbox.send(StopAsked("experimenter"))
+    assert [path.name for path in elsewhere.iterdir()] == ["thesis.txt"]

@@ -1,0 +1,88 @@
+"""A folder held open, to erase what is in it: no link is ever followed, whatever is put there meanwhile."""
+
+import os
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+
+def is_real_folder(path: Path) -> bool:
+    """A folder, and no link to one."""
+    return _kind(path) == stat.S_IFDIR
+
+
+def is_real_file(path: Path) -> bool:
+    """A regular file: no link, no pipe, no device."""
+    return _kind(path) == stat.S_IFREG
+
+
+@dataclass(frozen=True, slots=True)
+class RealFolder:
+    path: Path
+    descriptor: int | None
+    """None on systems that cannot name a file relative to a descriptor (Windows)."""
+
+    def names(self) -> list[str]:
+        return sorted(os.listdir(self.path if self.descriptor is None else self.descriptor))  # noqa: PTH208
+
+    def erase(self, name: str) -> None:
+        """A file, a link itself, or a folder with everything in it; nothing where it is gone already."""
+        with suppress(FileNotFoundError):
+            if stat.S_ISDIR(os.stat(self._at(name), dir_fd=self.descriptor, follow_symlinks=False).st_mode):
+                shutil.rmtree(self._at(name), dir_fd=self.descriptor)
+            else:
+                os.unlink(self._at(name), dir_fd=self.descriptor)
+
+    def erase_if_empty(self, name: str) -> None:
+        """A folder inside this one."""
+        with suppress(FileNotFoundError, NotADirectoryError):
+            with opened_folder(self, name) as inner:
+                empty = not inner.names()
+            if empty:
+                os.rmdir(self._at(name), dir_fd=self.descriptor)
+
+    def sync(self) -> None:
+        """The list of names is on the disk."""
+        if self.descriptor is not None:
+            os.fsync(self.descriptor)
+
+    def _at(self, name: str) -> str:
+        return name if self.descriptor is not None else str(self.path / name)
+
+
+@contextmanager
+def opened_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
+    """The folder `where`, or the one that `names` lead to from it, level by level.
+
+    Raises NotADirectoryError where a level is a link or no folder, FileNotFoundError where there is none.
+    """
+    folder = _open(where, None) if isinstance(where, Path) else where
+    opened = [] if folder is where else [folder]
+    try:
+        for name in names:
+            folder = _open(folder.path / name, folder.descriptor)
+            opened.append(folder)
+        yield folder
+    finally:
+        for one in opened:
+            if one.descriptor is not None:
+                os.close(one.descriptor)
+
+
+def _open(path: Path, parent: int | None) -> RealFolder:
+    if os.open not in os.supports_dir_fd:
+        if not is_real_folder(path):
+            raise NotADirectoryError(f"{path.name} is a link or no folder")
+        return RealFolder(path, None)
+    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+    return RealFolder(path, os.open(path if parent is None else path.name, flags, dir_fd=parent))
+
+
+def _kind(path: Path) -> int:
+    try:
+        return stat.S_IFMT(path.lstat().st_mode)
+    except OSError:
+        return 0
