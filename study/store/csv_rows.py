@@ -6,12 +6,15 @@ True and false as `true` and `false`, nothing as an empty field, numbers with al
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from enum import Enum
 from types import NoneType, UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
-Row = TypeVar("Row")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Row = TypeVar("Row", bound="DataclassInstance")
 
 _SHOWN = 8
 """No more problems than this are listed one by one."""
@@ -63,6 +66,14 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
         rest = len(problems) - _SHOWN
         raise CsvError((*problems[:_SHOWN], *([f"and {rest} problems more like these"] if rest > 0 else [])))
     return tuple(found)
+
+
+def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
+    """Rows as a table of an earlier version holds them: columns that it was written without are at their defaults."""
+    header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
+    absent = columns(row_type)[len(_present(tuple(header), row_type)) :]
+    defaults = {field.name: field.default for field in fields(row_type) if field.name in absent}
+    return tuple(replace(row, **defaults) for row in rows)
 
 
 def _present(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:

@@ -7,16 +7,19 @@ from analysis.detection import detection_thresholds
 from analysis.thresholds import Threshold, thresholds
 from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
+from protocols.trial import Trial
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, TrialMeasured
 from study.session.live import Live
 from study.store.archive import SessionFolder
+from study.store.csv_rows import as_written_in
 from study.store.event_log import LOG_NAME
 from study.store.file_errors import UnusableFileError
 from study.store.json_document import read_json
 from study.store.live_file import LIVE_FORMAT
 from study.store.provenance import sha256_of
 from study.store.request_inbox import REQUEST_FORMAT
+from study.store.text_file import read_text
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.store.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
@@ -123,7 +126,7 @@ def _table_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
     if not table.exists():
         return []
     try:
-        if read_trials(table) == folded.state.trials:
+        if read_trials(table) == as_written_in(read_text(table), folded.state.trials, Trial):
             return []
     except UnusableFileError as error:
         return [f"{TRIALS_NAME}: {problem}" for problem in error.problems]
@@ -142,7 +145,7 @@ def _computed_problems(table: Path, computed: tuple[Threshold, ...]) -> list[str
     if not table.exists():
         return []
     try:
-        if read_thresholds(table) == computed:
+        if read_thresholds(table) == as_written_in(read_text(table), computed, Threshold):
             return []
     except UnusableFileError as error:
         return [f"{table.name}: {problem}" for problem in error.problems]
