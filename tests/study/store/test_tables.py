@@ -74,6 +74,79 @@ def test_thresholds_go_to_disk_and_back(tmp_path):
     assert read_thresholds(tmp_path / "thresholds.csv") == (row,)
 
 
+def test_a_table_of_before_a_column_was_is_still_read():
+    lines = rows_to_csv([TRIAL], Trial).splitlines()
+    older = "\n".join(line.removesuffix(",wanted_mps2").removesuffix(",") for line in lines)
+    assert rows_from_csv(older, Trial) == (TRIAL,)
+    foreign = older.replace("angle_deg", "remark").replace("135.0", "late")
+    assert rows_from_csv(foreign, Trial) == (replace(TRIAL, angle_deg=None),)
+
+
+def test_columns_after_the_known_ones_do_no_harm():
+    lines = rows_to_csv([TRIAL], Trial).splitlines()
+    assert rows_from_csv(f"{lines[0]},more\r\n{lines[1]},1\r\n", Trial) == (TRIAL,)
+
+
+@pytest.mark.parametrize("odd", ["\r", "a\rb", "a\nb", "\r\n", 'a"b', "a,b", " ", "", "\x00"])
+def test_a_name_may_hold_what_tables_are_made_of(odd):
+    row = replace(TRIAL, session=odd)
+    assert rows_from_csv(rows_to_csv([row], Trial), Trial) == (row,)
+
+
+def test_a_text_that_is_no_table_is_refused():
+    with pytest.raises(CsvError, match="this is not CSV: new-line character seen in unquoted field"):
+        rows_from_csv("subject\rsession,x\n", Trial)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("frequency_hz", "freq", "column 7 of the header is 'freq'; it must be 'frequency_hz' (of subject, session"),
+        (",status,angle_deg,wanted_mps2\n", "\n", "column 19 of the header is missing; it must be 'status'"),
+        (",135.0,\n", "\n", "line 2 has 19 fields, but the header names 21"),
+        (",3,1,test", ",three,1,test", "line 2, column trial: 'three' is not a whole number"),
+        ("25.0", "high", "line 2, column frequency_hz: 'high' is not a number"),
+        ("25.0", "", "line 2, column frequency_hz: it is empty, but a value is needed"),
+        ("true", "yes", "line 2, column correct: 'yes' is neither true nor false"),
+        ("test", "pause", "line 2, column phase: 'pause' is none of training, detection, test, catch"),
+        ("25.0,0.3", "25.0,-0.3", "line 2: level_n and frequency_hz must be above 0"),
+        ("4,1,1,true", "4,3,1,true", "line 2: direction_shown is 3; directions are 1 and 2"),
+        ("4,1,1,true", "4,1,7,false", "line 2: answer is 7; answers are 1, 2, or empty"),
+        ("4,1,1,true", "4,1,1,false", "line 2: correct does not follow from direction_shown and answer"),
+    ],
+)
+def test_every_fault_of_a_table_is_named_with_its_line(tmp_path, old, new, problem):
+    (tmp_path / "trials.csv").write_text(rows_to_csv([TRIAL], Trial).replace(old, new, 1))
+    with pytest.raises(UnusableFileError) as refused:
+        read_trials(tmp_path / "trials.csv")
+    assert any(found.startswith(problem) for found in refused.value.problems), refused.value.problems
+
+
+def test_a_faulty_table_of_thresholds_is_an_error_of_the_study(tmp_path):
+    (tmp_path / "thresholds.csv").write_text("subject,hz\n")
+    with pytest.raises(
+        UnusableFileError, match=r"thresholds\.csv is not a usable table of thresholds. Column 2 of the"
+    ):
+        read_thresholds(tmp_path / "thresholds.csv")
+
+
+def test_an_empty_text_has_no_header():
+    with pytest.raises(CsvError, match="column 1 of the header is missing; it must be 'subject'"):
+        rows_from_csv("", Trial)
+
+
+def test_of_many_faults_the_first_are_named_and_the_rest_counted():
+    with pytest.raises(CsvError) as refused:
+        rows_from_csv(",".join(TRIALS_HEADER) + "\n" + "x\n" * 20, Trial)
+    assert len(refused.value.problems) == 9
+    assert refused.value.problems[-1] == "and 12 problems more like these"
+
+
+def test_columns_are_described_for_people():
+    assert in_words(bool | None) == "`true` or `false`, or empty"
+    assert in_words(Phase) == "`training`, `detection`, `test`, `catch`"
+
+
 def test_a_table_of_before_a_column_was_added_agrees_with_rows_of_today():
     before = "\n".join(line.rpartition(",")[0] for line in rows_to_csv((TRIAL,), Trial).splitlines()) + "\n"
     (read,) = rows_from_csv(before, Trial)
