@@ -7,11 +7,17 @@ and one of 1.0 leaves 69.7 %.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1, 2 and 6;
 the log-linear correction is that of M. J. Hautus, Behav. Res. Methods Instrum. Comput. 27 (1995), 46-51.
+
+Sign of the criterion, everywhere in hapteq: c = -(z(H) + z(F)) / 2 (Macmillan and Creelman, equation 2.1), where a hit
+is the answer 1 to a 1 and a false alarm the answer 1 to a 2. So c > 0 is a tendency to answer 2 (in a detection run,
+the second interval), c < 0 a tendency to answer 1. Simulated participants state theirs in the same way.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
+
+CRITERION_WORDS = "c = −(z(H) + z(F)) / 2 with answer 1 as the hit; positive: a tendency to answer 2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +25,7 @@ class ResponseBias:
     d_prime: float
     """Over all levels of the run, so it describes the run and is no threshold."""
     criterion: float
-    """0: no liking. Positive: inclined to answer direction 2; negative: direction 1."""
+    """c. 0: no tendency. Positive: to answer 2; negative: to answer 1."""
 
 
 def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> ResponseBias | None:

@@ -29,7 +29,7 @@ class Below:
 
 
 def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[Threshold, ...]:
-    """One row per detection run. `d_prime` is that of two intervals; a positive criterion: inclined to the second.
+    """One row per detection run. `d_prime` is that of two intervals; the criterion as in `analysis.bias`.
 
     Raises InconsistentTrialsError where the rows contradict the rule.
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from protocols.staircase import StaircaseState, begin, finished, level_n, step
 from protocols.staircase_rule import StaircaseRule
-from protocols.trial import Phase, Trial, TrialStatus
+from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
 """Relative: a thousandth of a dB. Covers rounding in a table, and is far below any step."""
@@ -32,6 +32,10 @@ class Run:
     """Where the staircase stands after the last of them."""
     complete: bool
     """Whether the run has all reversals of its rule; one that ran out of trials has not."""
+    presentations: int = 0
+    """Void ones and catch trials included."""
+    repeats_at_will: int = 0
+    """Presentations that the participant made void: asked for again, paused, left, answered too late or too early."""
 
 
 def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST) -> tuple[Run, ...]:
@@ -66,6 +70,8 @@ def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
         spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in steering),
         state=state,
         complete=state.reversals >= rule.reversals,
+        presentations=len(rows),
+        repeats_at_will=sum(trial.void_cause in AT_WILL for trial in rows),
     )
 
 

@@ -13,6 +13,7 @@ from analysis.friedman import Friedman, friedman
 from analysis.population import Population, split_by_population
 from analysis.practice import PracticeRun, practice_runs
 from analysis.repeated_measures import RepeatedMeasures, repeated_measures
+from analysis.repeated_trials import repeat_warning
 from analysis.runs import Run, recompute_runs
 from analysis.study_warnings import side_warnings, study_warnings
 from analysis.threshold_table import ThresholdTable, threshold_table
@@ -85,7 +86,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         difference=design_difference(anova, within),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
-            *filter(None, [delivery_warning(deliveries(tested))]),
+            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested))]),
             *side_warnings(catches, detection, table, detection_table),
         ),
         detection=detection,

@@ -165,7 +165,7 @@ def _biased(rows: Sequence[Threshold]) -> str:
 
 def _spoiled(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.SPOILED for trial in trials)
-    return f"{count} spoiled presentation{'s' if count != 1 else ''} drawn again; the answers do not count." * bool(
+    return f"{count} spoiled presentation{'s' if count != 1 else ''}, played again; the answers do not count." * bool(
         count
     )
 

@@ -6,6 +6,7 @@ from enum import StrEnum
 from statistics import fmean
 
 from analysis.bias import response_bias
+from analysis.repeated_trials import is_often
 from analysis.runs import Run, recompute_runs
 from protocols.staircase import finished, to_newton
 from protocols.staircase_rule import StaircaseRule
@@ -51,6 +52,7 @@ class Threshold:
     percent_correct: float | None
     d_prime: float | None
     criterion: float | None
+    """c, positive for a tendency to answer 2: see `analysis.bias`."""
     spoiled_trials: int
     threshold_mps2: float | None
     """Mean acceleration amplitude along the direction, as measured in the trials of the averaged reversals."""
@@ -60,6 +62,12 @@ class Threshold:
     """How many of the averaged reversals have a measured acceleration."""
     ended: RunEnd | None = None
     """What ended the run; None in tables of before this was written."""
+    repeats_at_will: int = 0
+    """Presentations of the run that the participant made void; catch trials among them."""
+    repeat_rate: float = 0.0
+    """Their share of all presentations of the run."""
+    asked_often: bool = False
+    """See `analysis.repeated_trials.is_often`."""
 
 
 def thresholds(trials: Iterable[Trial], rule: StaircaseRule) -> tuple[Threshold, ...]:
@@ -101,6 +109,9 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
         threshold_mm=_mean([trial.displacement_mm for trial in turned]) if run.complete else None,
         measured_reversals=sum(trial.delivered_mps2 is not None for trial in turned),
         ended=_end_of(run, rule),
+        repeats_at_will=run.repeats_at_will,
+        repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
+        asked_often=is_often(run.repeats_at_will, run.presentations),
     )
 
 

@@ -27,7 +27,7 @@ TABLES_SINCE = {
 or an old fingerprint would fit no more."""
 
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
-    "study": {"trial.device_buttons": []},
+    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3},
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": ""},
 }
 """Likewise single fields, for each kind of protocol; `segments.role` is that of every segment."""

@@ -111,6 +111,15 @@ class TrialSettings:
             "published and it would teach cues other than direction."
         ),
     ] = "none"
+    repeats_per_run: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=100,
+            description="How often in a run the participant may ask for the same stimulus again. Default 3: for a "
+            "cough or a noise in some 60 trials. 0: never.",
+        ),
+    ] = 3
     time_limit_s: Annotated[
         float,
         Field(ge=0, le=600, description="Longest time to answer. Default 0: as long as wanted, as published."),
@@ -189,7 +198,7 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial with a larger share of missed 1 kHz ticks is void and drawn again. Default 0.02: "
+            description="A trial with a larger share of missed 1 kHz ticks is void and comes again. Default 0.02: "
             "fewer cannot be felt.",
         ),
     ] = 0.02

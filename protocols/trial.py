@@ -20,9 +20,38 @@ class TrialStatus(Enum):
     UNMEASURED = "unmeasured"
     """Counts; its recording was lost (the program died after the answer was on disk)."""
     SPOILED = "spoiled"
-    """Void: drawn again as the next attempt of the same trial."""
+    """Void: presented again as the next attempt of the same trial."""
     OPEN = "open"
     """Presented and not answered yet."""
+
+
+class VoidCause(Enum):
+    """Why a presentation is void, and so comes again."""
+
+    ASKED = "asked"
+    """The participant asked for the same trial again."""
+    PAUSED = "paused"
+    """The participant asked for a pause."""
+    LEFT = "left"
+    """The participant left, or the program was interrupted at its keyboard."""
+    LATE = "late"
+    """No answer within the protocol's time limit."""
+    EARLY = "early"
+    """Answered before both intervals were over."""
+    EXPERIMENTER = "experimenter"
+    """The experimenter paused or stopped the session."""
+    FAULT = "fault"
+    """The device or its safety layer ended the stimulus."""
+    MISSED_TICKS = "missed_ticks"
+    """Too many ticks of the control loop were missed."""
+    SCREEN_LATE = "screen_late"
+    """The program or its screen gave no sign of life in time."""
+    PROGRAM_ENDED = "program_ended"
+    """The program ended before the answer."""
+
+
+AT_WILL = frozenset({VoidCause.ASKED, VoidCause.PAUSED, VoidCause.LEFT, VoidCause.LATE, VoidCause.EARLY})
+"""Causes that a participant can bring about while the stimulus is felt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +82,10 @@ class Trial:
     """Of the direction played, in the plane of the protocol's directions; does not depend on how they are labelled."""
     wanted_mps2: float | None = None
     """The acceleration that the level stands for. None where the level is the commanded force."""
+    void_cause: VoidCause | None = None
+    """Why this presentation is void. None where it counts, is open, or comes from a log that says no cause."""
+    repeat_cause: VoidCause | None = None
+    """Why this trial is presented again: the cause of the attempt before. None for a first attempt."""
 
     @property
     def counts(self) -> bool:

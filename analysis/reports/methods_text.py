@@ -60,6 +60,10 @@ def _task(protocol: StudyProtocol) -> str:
         f"{directions.symmetry_deg:g}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
         f"which of the two it was, {limit}, and {told} whether that was right."
         + (
+            " A void trial came again with the same stimulus: after pauses and faults, and where the participant asked "
+            f"for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this rule drew a new one.)"
+        )
+        + (
             " For every second participant the numbers 1 and 2 changed places; the table of trials has the angle."
             if protocol.schedule.labels == "swapped_for_half"
             else ""

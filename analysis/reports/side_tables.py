@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from analysis.bias import CRITERION_WORDS
 from analysis.equalized_delivery import deliveries
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
@@ -41,7 +42,7 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
             )
             for row in analysis.detection
         ),
-        notes=("d' of two intervals; a positive criterion is a liking of the second one. Chance is 50 % right.",),
+        notes=(f"d' of two intervals. Criterion: {CRITERION_WORDS}. Chance is 50 % right.",),
         folded=True,
     )  # fmt: skip
 

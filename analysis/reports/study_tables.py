@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
+from analysis.bias import CRITERION_WORDS
 from analysis.ellipsoid import EllipsoidResult
+from analysis.repeated_trials import OFTEN_WORDS
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
 from analysis.thresholds import RunEnd, Threshold
@@ -138,6 +140,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("at cap", lambda row: str(row.trials_at_cap)),
         ("Pushes", lambda row: str(row.pushes_against_cap)),
         ("Spoiled", lambda row: str(row.spoiled_trials)),
+        ("At will", _repeats),
         ("% right", lambda row: number(row.percent_correct, 0)),
         ("d'", lambda row: number(row.d_prime)),
         ("Criterion", lambda row: number(row.criterion)),
@@ -149,6 +152,9 @@ def run_table(analysis: StudyAnalysis) -> Table:
         notes=(
             "Reversals at the cap: of the averaged ones. Pushes: how often the rule asked for more than the cap. "
             "m/s² and mm: as measured at the averaged reversals.",
+            f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
+            f"the time), with their share; ! {OFTEN_WORDS}.",
+            f"Criterion: {CRITERION_WORDS}.",
         ),
         folded=True,
     )
@@ -156,6 +162,12 @@ def run_table(analysis: StudyAnalysis) -> Table:
 
 def _threshold(row: Threshold) -> str:
     return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else marked_if_cut(row.threshold_n, row.censored)
+
+
+def _repeats(row: Threshold) -> str:
+    if not row.repeats_at_will:
+        return "0"
+    return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"
 
 
 def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:

@@ -22,7 +22,7 @@ def resume(
     keys: KeysOption = "1,2",
     as_json: JsonOption = False,
 ) -> None:
-    """Go on with a session where it stopped. No answer is lost; a trial without an answer is drawn again."""
+    """Go on with a session where it stopped. No answer is lost; a trial without an answer comes again."""
     from study.cli.screen import has_screen, open_screen
 
     answer_keys = parse_keys(keys)

@@ -1,7 +1,7 @@
 """A participant who feels the direction, more or less well.
 
 One presentation, two answers: identification, not a choice between two intervals. With e normal around +d'/2 for
-direction 1 and -d'/2 for direction 2, spread 1, answer 1 is given where e > -criterion. Unbiased, the share of
+direction 1 and -d'/2 for direction 2, spread 1, answer 1 is given where e > criterion. Unbiased, the share of
 right answers is Phi(d'/2), so d' = 2 Phi^-1(share of the Weibull curve); a criterion lowers the share at equal d'.
 
 In a detection trial the two are intervals, and what counts is whether the vibration is felt at all: the same model
@@ -33,7 +33,7 @@ class DirectionFeeler:
     lapse: float = 0.0
     """Share of wrong answers that is left at the strongest level; such answers are a coin's, for twice this share."""
     criterion: float = 0.0
-    """Liking for answer 1 (negative: 2), in units of d'."""
+    """c of Macmillan and Creelman, as in `analysis.bias`: positive, a tendency to answer 2; negative, to answer 1."""
     drift_db_per_100_trials: float = 0.0
     """By how much the thresholds rise as the session goes on."""
     numb_above_hz: float = math.inf
@@ -49,7 +49,7 @@ class DirectionFeeler:
     def share_of_1(self, felt: Felt) -> float:
         """Probability of answer 1."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        certain = _NORMAL.cdf(sign * self._d_prime(felt) / 2 + self.criterion)
+        certain = _NORMAL.cdf(sign * self._d_prime(felt) / 2 - self.criterion)
         return self.lapse + (1.0 - 2.0 * self.lapse) * certain
 
     def share_right(self, felt: Felt) -> float:

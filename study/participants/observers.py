@@ -38,7 +38,7 @@ def observer_named(name: str, seed: int) -> Observer:
     observers: dict[str, Observer] = {
         "ideal": typical,
         "lapsing": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, lapse=0.05),
-        "biased": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion=0.5),
+        "biased": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion=-0.5),
         "guesser": Guesser(known),
         "alternator": Alternator(known),
         "always_1": Constant(known, 1),

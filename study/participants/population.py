@@ -40,7 +40,7 @@ def person(number: int, seed: int) -> DirectionFeeler:
         ),
         slope=float(np.exp(rng.normal(np.log(2.0), 0.25))),
         lapse=float(rng.beta(1.0, 60.0)),
-        criterion=float(rng.normal(0.0, 0.15)),
+        criterion=-float(rng.normal(0.0, 0.15)),
         drift_db_per_100_trials=float(abs(rng.normal(0.0, 0.2))),
         # Drawn last, so that the people of older studies are still the same.
         detection_n=_shifted(TYPICAL_DETECTION_N, rng.normal(0.0, SPREAD_OF_DETECTION_DB)),

@@ -9,6 +9,7 @@ from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase
 from study.session.events import SessionOpened
 from study.session.level_scale import wanted_mps2
+from study.session.rules import same_stimulus_again
 from study.session.stimulus import direction_angle_deg
 
 
@@ -45,11 +46,12 @@ class Place:
 
 def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> Present:
     run, polarity = place.run, protocol.stimulus.onset_polarity
-    draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, place.attempt)
+    draws = 0 if same_stimulus_again(opened) else place.attempt
+    draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
     label, direction = label_of(draw.direction, labels_are_swapped(protocol, opened)), draw.direction
     if run.phase is Phase.DETECTION:  # the answer is an interval; the direction matters to nobody
         label = draw.direction
-        direction = detection_direction(opened.seed, run.index, place.trial, place.attempt)
+        direction = detection_direction(opened.seed, run.index, place.trial, draws)
     phase, level_db = run.phase, place.staircase.level_db
     newton = level_n(rule, place.staircase)
     if run.practice:

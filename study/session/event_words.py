@@ -1,7 +1,7 @@
 """The log of a session in words: one plain sentence per fact.
 
-Nothing about health is in them, and no direction of a trial whose answer is not in: whoever reads this may sit beside
-the participant. Runs and trials count from 1 here, as on the participant's screen.
+Nothing about health is in them, and no direction of a trial that does not count (yet): it may come again, and whoever
+reads this may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
 """
 
 from collections.abc import Iterable
@@ -33,33 +33,34 @@ _Key = tuple[int, int, int]
 def log_in_words(events: Iterable[Event]) -> tuple[str, ...]:
     """One line per event, oldest first: its time (UTC) and a sentence; a line with the date wherever it changes."""
     events = tuple(events)
-    answers = {_key(event): event for event in events if isinstance(event, AnswerGiven)}
-    presented = {_key(event): event for event in events if isinstance(event, TrialPresented)}
+    counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
+    presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
     lines: list[str] = []
     day = ""
     for event in events:
         if event.utc[:10] != day:
             day = event.utc[:10]
             lines.append(f"{day} (times are UTC)")
-        lines.append(f"{event.utc[11:19]}  {_sentence(event, presented, answers)}")
+        lines.append(f"{event.utc[11:19]}  {_sentence(event, presented)}")
     return tuple(lines)
 
 
 def in_words(event: Event) -> str:
     """One event by itself: what depends on the others (which direction, right or wrong) is left out."""
-    return _sentence(event, {}, {})
+    return _sentence(event, {})
 
 
-def _sentence(event: Event, presented: dict[_Key, TrialPresented], answers: dict[_Key, AnswerGiven]) -> str:
+def _sentence(event: Event, presented: dict[_Key, TrialPresented]) -> str:
+    """presented: the trials that count."""
     match event:
         case TrialPresented():
-            return _presented(event, answered=_key(event) in answers)
+            return _presented(event, told=_key(event) in presented)
         case AnswerGiven():
             return _answer(event, presented.get(_key(event)))
         case TrialMeasured():
             return _measured(event)
         case TrialSpoiled():
-            return f"{_place(event)} is void and will be drawn again: {event.reason}."
+            return f"{_place(event)} is void and comes again: {event.reason}."
         case RestTaken():
             return f"Rested {_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
@@ -104,10 +105,10 @@ def _sitting(event: SessionOpened | SessionResumed | SessionInterrupted | Sessio
             return "The session is finished."
 
 
-def _presented(event: TrialPresented, answered: bool) -> str:
+def _presented(event: TrialPresented, told: bool) -> str:
     again = f", attempt {event.attempt + 1}" if event.attempt else ""
     what = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
-    if answered:
+    if told:
         shown = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
         what = f"{shown}, {what}"
     return f"{_place(event)} ({event.phase.value}{again}): {what}."
@@ -156,7 +157,7 @@ def _place(event: TrialPresented | TrialSpoiled) -> str:
     return f"Run {event.run + 1}, trial {event.trial + 1}"
 
 
-def _key(event: TrialPresented | AnswerGiven) -> _Key:
+def _key(event: TrialPresented | AnswerGiven | TrialMeasured) -> _Key:
     return event.run, event.trial, event.attempt
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from protocols.trial import Phase
+from protocols.trial import Phase, VoidCause
 from study.session.fact_types import (
     AngleDeg,
     Count,
@@ -35,6 +35,7 @@ from study.session.sitting_events import (
     FormFilled,
     NoteTaken,
     PauseTaken,
+    RestTaken,
 )
 
 __all__ = [
@@ -64,6 +65,9 @@ __all__ = [
 
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 SESSION_VERSION: Literal[1] = 1
+
+FIELDS_SINCE: dict[str, object] = {"monotonic_s": None, "rules": 1, "cause": None}
+"""Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
 
 @dataclass(frozen=True, config=FACT)
@@ -97,6 +101,8 @@ class SessionOpened:
     equalized: EqualizedFacts | None = None
     """Null: the commanded force is what was wanted."""
     monotonic_s: Seconds | None = None
+    rules: Literal[1, 2] = 1
+    """Of void trials, refusals and places, see `study.session.rules`. A session keeps those that it began with."""
     event: Literal["session_opened"] = "session_opened"
 
 
@@ -162,7 +168,7 @@ class TrialMeasured:
 
 @dataclass(frozen=True, config=FACT)
 class TrialSpoiled:
-    """The presentation is void, answered or not; the trial is drawn again as the next attempt."""
+    """The presentation is void, answered or not; the trial comes again as the next attempt."""
 
     utc: UtcTime
     run: Index
@@ -172,18 +178,9 @@ class TrialSpoiled:
     missed_ticks: Count | None = None
     vibrated_s: Seconds | None = None
     monotonic_s: Seconds | None = None
+    cause: VoidCause | None = None
+    """Null in logs of before there were causes."""
     event: Literal["trial_spoiled"] = "trial_spoiled"
-
-
-@dataclass(frozen=True, config=FACT)
-class RestTaken:
-    utc: UtcTime
-    run: Index
-    trial: Index
-    """Index of the trial that comes after the rest."""
-    rested_s: Seconds
-    monotonic_s: Seconds | None = None
-    event: Literal["rest_taken"] = "rest_taken"
 
 
 @dataclass(frozen=True, config=FACT)
@@ -240,7 +237,8 @@ EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="e
 
 def event_line(event: Event) -> bytes:
     """One line of JSON, newline included. What earlier versions did not log is left out where it is not known."""
-    return EVENTS.dump_json(event, exclude={"monotonic_s"} if event.monotonic_s is None else None) + b"\n"
+    unsaid = {name for name, untouched in FIELDS_SINCE.items() if getattr(event, name, untouched) == untouched}
+    return EVENTS.dump_json(event, exclude=unsaid) + b"\n"
 
 
 def parse_event(line: bytes) -> Event:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from protocols.practice import PracticeState, practice_over, practised
 from protocols.staircase import begin, finished, step
 from protocols.study_protocol import StudyProtocol
-from protocols.trial import Phase, TrialStatus
+from protocols.trial import Phase, TrialStatus, VoidCause
 from study.session.draw_check import LogContradiction, check_draw, place_of
 from study.session.events import (
     AnswerGiven,
@@ -37,7 +37,7 @@ from study.session.sitting_state import (
     pass_time,
     sit_down_again,
 )
-from study.session.state import SessionState, begin_session, current_rule, due, felt
+from study.session.state import SessionState, begin_session, current_rule, due, felt, repeats_left
 from study.session.trial_row import trial_row
 
 __all__ = ["apply", "begin_session"]
@@ -87,7 +87,8 @@ def _present(state: SessionState, event: TrialPresented) -> SessionState:
     if state.finished:
         raise LogContradiction(f"{place_of(event)} presented after the last run")
     check_draw(event, due(state))
-    row = trial_row(state.opened, event, felt(state.opened))
+    repeat_cause = state.trials[-1].void_cause if state.attempt else None
+    row = trial_row(state.opened, event, felt(state.opened), repeat_cause)
     return replace(state, presented=event, trials=(*state.trials, row), sitting=moved(state.sitting))
 
 
@@ -197,7 +198,9 @@ def _shaken(
 
 def _spoil(state: SessionState, event: TrialSpoiled) -> SessionState:
     presented = _open_trial(state, event)
-    row = replace(state.trials[-1], missed_ticks=event.missed_ticks, status=TrialStatus.SPOILED)
+    if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
+        raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
+    row = replace(state.trials[-1], missed_ticks=event.missed_ticks, status=TrialStatus.SPOILED, void_cause=event.cause)
     return replace(
         _shaken(state, presented, None, event.vibrated_s),
         presented=None,

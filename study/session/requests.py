@@ -15,7 +15,7 @@ class StopAsked:
 
 @dataclass(frozen=True, slots=True)
 class PauseAsked:
-    """Hands free at once; the present trial is void and drawn again."""
+    """Hands free at once; the present trial is void and comes again."""
 
     who: Who
 

@@ -1,11 +1,11 @@
-"""Facts of a sitting around its trials: forms, checks, demonstrations, pauses, notes."""
+"""Facts of a sitting around its trials: forms, checks, demonstrations, rests, pauses, notes."""
 
 from typing import Literal
 
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from study.session.fact_types import AngleDeg, ForceN, FrequencyHz, Seconds, UtcTime
+from study.session.fact_types import AngleDeg, ForceN, FrequencyHz, Index, Seconds, UtcTime
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -57,6 +57,17 @@ class DemoFinished:
     utc: UtcTime
     monotonic_s: Seconds | None = None
     event: Literal["demo_finished"] = "demo_finished"
+
+
+@dataclass(frozen=True, config=FACT)
+class RestTaken:
+    utc: UtcTime
+    run: Index
+    trial: Index
+    """Index of the trial that comes after the rest."""
+    rested_s: Seconds
+    monotonic_s: Seconds | None = None
+    event: Literal["rest_taken"] = "rest_taken"
 
 
 @dataclass(frozen=True, config=FACT)

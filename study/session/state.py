@@ -8,11 +8,12 @@ from protocols.schedule import Run, runs
 from protocols.staircase import StaircaseState, begin
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
-from protocols.trial import Trial
+from protocols.trial import Trial, VoidCause
 from study.session.draw_check import LogContradiction
 from study.session.due_trial import Place, Present, due_trial
 from study.session.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.log_time import Moment
+from study.session.rules import same_stimulus_again
 from study.session.sitting_state import SittingState
 
 
@@ -88,6 +89,14 @@ def due(state: SessionState) -> Present:
     """The trial that comes next."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
     return due_trial(state.protocol, state.opened, current_rule(state), place)
+
+
+def repeats_left(state: SessionState) -> int | None:
+    """How often the participant may still ask for a trial of this run again; None where the rules set no limit."""
+    if not same_stimulus_again(state.opened):
+        return None
+    asked = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
+    return max(0, state.protocol.trial.repeats_per_run - asked)
 
 
 def felt(opened: SessionOpened) -> bool | None:

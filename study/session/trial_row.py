@@ -1,10 +1,10 @@
 """A presentation as the first half of its row in `trials.csv`; answer and measurement come later."""
 
-from protocols.trial import Trial, TrialStatus
+from protocols.trial import Trial, TrialStatus, VoidCause
 from study.session.events import SessionOpened, TrialPresented
 
 
-def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None) -> Trial:
+def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None, repeat_cause: VoidCause | None) -> Trial:
     return Trial(
         subject=opened.subject,
         session=opened.session,
@@ -27,4 +27,5 @@ def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None) -
         status=TrialStatus.OPEN,
         angle_deg=event.angle_deg,
         wanted_mps2=event.wanted_mps2,
+        repeat_cause=repeat_cause,
     )

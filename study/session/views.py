@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from protocols.trial import Phase
+from protocols.trial import Phase, VoidCause
 
 if TYPE_CHECKING:
     from protocols.apparatus import TestDirections
@@ -69,13 +69,16 @@ class Question:
     trial_number: int
     """From 1, within the run."""
     repeated: bool
-    """Drawn again because the last presentation was void."""
+    """Presented again because the last presentation was void."""
     time_limit_s: float
     picture: DirectionPicture
     task: Task = Task.DIRECTION
     practice: bool = False
-    """A short practice at a fixed strength, with a criterion to pass."""
+    """A short practice, with a criterion to pass."""
     progress: Progress | None = None
+    repeats_left: int | None = None
+    """How often the participant may still ask for a trial of this run again; a display refuses the key at 0. None:
+    without limit, and a new trial is drawn (sessions of the first rules)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +220,8 @@ class Unanswered:
     """The participant asked for the trial again, and so is there."""
     pause: bool = False
     """Asked for a pause: hands free at once, and nothing is played until somebody goes on."""
+    cause: VoidCause = VoidCause.FAULT
+    """Why no answer came, where `leave`, `asked` and `pause` do not tell."""
 
 
 Reply = Answered | Unanswered

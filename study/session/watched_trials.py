@@ -79,7 +79,9 @@ def last_trials(watched: Watched) -> tuple[ClosedTrial, ...]:
 
 
 def _closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
-    answered = trial.answer is not None
+    # Of a void trial it stays hidden, answered or not: it tells something about the draws, and the same comes again.
+    # While the device is judged the answer may still turn out void.
+    known = trial.counts and not _is_open(state, trial)
     phase = "practice" if state.runs[trial.run].practice else trial.phase.value
     return ClosedTrial(
         run=trial.run,
@@ -88,10 +90,9 @@ def _closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial
         phase=phase,
         frequency_hz=trial.frequency_hz,
         level_n=trial.level_n,
-        # Of a trial that nobody answered it stays hidden for good: it tells something about the draws.
-        shown=trial.direction_shown if answered else None,
+        shown=trial.direction_shown if known else None,
         answer=trial.answer,
-        correct=trial.correct,
+        correct=trial.correct if known else None,
         reversal=trial.reversal,
         response_time_s=trial.response_time_s,
         delivered_mps2=trial.delivered_mps2,

@@ -1,5 +1,6 @@
 """Line mode: one trial, and what is said around it."""
 
+from protocols.trial import VoidCause
 from study.session.counted import answers_are
 from study.session.views import (
     Answered,
@@ -14,7 +15,7 @@ from study.session.views import (
 from study.tui.answer_keys import AnswerKeys
 from study.tui.conversation import Conversation, Line, WaitOver, shown
 from study.tui.direction_picture import drawing, sentence
-from study.tui.trial_replies import PAUSE, REPEAT
+from study.tui.trial_replies import NO_REPEATS, PAUSE, REPEAT, repeat_words
 from study.tui.trial_words import heading, plan
 from study.workflows.display import SignOfLife
 
@@ -24,7 +25,7 @@ INTERVALS = "In one of the two intervals it shook, however weakly; in the other 
 
 def keys_sentence(keys: AnswerKeys) -> str:
     return (
-        f"Keys: {keys.choice} answers, r skips this one and plays a new one, p pauses, q leaves, ? shows this. Each "
+        f"Keys: {keys.choice} answers, r plays it again, p pauses, q leaves, ? shows this. Each "
         "followed by Enter. Ctrl-C stops the device at once."
     )
 
@@ -64,8 +65,14 @@ def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: 
         talk.prompt(prompt)
         line = talk.wait(sign_of_life, until_s)
         if isinstance(line, WaitOver):
-            return Unanswered(line.value, leave=line is WaitOver.INPUT_ENDED)
+            cause = VoidCause.LATE if line is WaitOver.TIME_LIMIT else VoidCause.FAULT
+            return Unanswered(line.value, leave=line is WaitOver.INPUT_ENDED, cause=cause)
         reply = understood(line, keys)
+        if reply is REPEAT:
+            if question.repeats_left == 0:
+                talk.say(f"{NO_REPEATS} Type {keys.choice} and Enter; ? for help.")
+                continue
+            talk.say(repeat_words(question.repeats_left))
         if reply is not None:
             return reply
         if line.word == "?":

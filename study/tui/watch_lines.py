@@ -69,7 +69,7 @@ def _new_trials(before: WatchView, now: WatchView) -> list[ClosedTrial]:
 def _trial_line(trial: ClosedTrial) -> str:
     parts = [f"trial {trial.trial + 1} at {trial.frequency_hz:g} Hz, {trial.level_n:.3g} N: {verdict(trial)}"]
     if trial.answer is not None:
-        parts.append(f"shown {trial.shown}, said {trial.answer}")
+        parts.append(f"shown {trial.shown}, said {trial.answer}" if trial.shown else f"said {trial.answer}")
     if trial.response_time_s is not None:
         parts.append(f"{trial.response_time_s:.1f} s")
     if trial.delivered_mps2 is not None:

@@ -63,9 +63,11 @@ def staircase_title(view: WatchView) -> str:
 
 
 def verdict(trial: ClosedTrial) -> str:
-    """Right, wrong or void; a catch trial answered wrongly is a lapse."""
+    """Right, wrong, void, or not known yet; a catch trial answered wrongly is a lapse."""
     if trial.status == "spoiled":
         return "void"
+    if trial.correct is None:
+        return "…"
     if trial.correct:
         return "right"
     return "LAPSE" if trial.phase == "catch" else "wrong"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from protocols.trial import Phase
+from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Played
 from study.session.due_trial import Present
 from study.session.held_stimulus import HeldStimulus
@@ -35,7 +35,7 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     sitting.device.hold(_stimulus(state, present, sitting))
     sitting.hand.feel(present, state.answers)
     started_s = sitting.clock.now_s()
-    reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+    reply = _reply_to(question, sitting)
     sitting.device.keep_alive()
     return Asked(reply, started_s, sitting.device.fault() is Fault.NONE, played=None, holding=True)
 
@@ -56,9 +56,18 @@ def _in_one_of_two_intervals(state: SessionState, present: Present, question: Qu
         if cut is not None:
             return Asked(cut, sitting.clock.now_s(), False, played, holding=False)
     started_s = sitting.clock.now_s()
-    reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+    reply = _reply_to(question, sitting)
     whole = played is not None and played.health.fault is Fault.NONE
     return Asked(reply, started_s, whole, played, holding=False)
+
+
+def _reply_to(question: Question, sitting: Sitting) -> Reply:
+    """A repeat that is not left is no reply, whatever the display lets through: it is asked again."""
+    while True:
+        reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+        repeat = isinstance(reply, Unanswered) and reply.asked and not (reply.pause or reply.leave)
+        if not repeat or question.repeats_left != 0 or not sitting.attendant.glance():
+            return reply
 
 
 def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
@@ -67,7 +76,11 @@ def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswer
     if reply is None and sitting.attendant.glance():
         return None
     resolved = sitting.attendant.resolve(reply or Unanswered("the stimulus ended early", leave=False))
-    return Unanswered("answered before both intervals", leave=False) if isinstance(resolved, Answered) else resolved
+    return (
+        Unanswered("answered before both intervals", leave=False, cause=VoidCause.EARLY)
+        if isinstance(resolved, Answered)
+        else resolved
+    )
 
 
 def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldStimulus:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from protocols.study_protocol import MeasurementSettings
+from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
 
 
@@ -12,15 +13,17 @@ class Judgement:
     """Why the trial is void; empty where it counts."""
     flags: tuple[str, ...]
     """What is worth a look in a trial that counts."""
+    cause: VoidCause = VoidCause.FAULT
+    """Of a void trial."""
 
 
 def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_whole: bool) -> Judgement:
     """felt_whole: whether the stimulus was whole when the answer came; what stops it afterwards is only flagged."""
     if health.fault is not Fault.NONE and not felt_whole:
-        return Judgement(health.fault.value, ())
+        return Judgement(health.fault.value, (), cause_of(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
         share = 100 * health.missed_ticks / max(health.ticks, 1)
-        return Judgement(f"{share:.1f} % of the 1 kHz ticks were missed", ())
+        return Judgement(f"{share:.1f} % of the 1 kHz ticks were missed", (), VoidCause.MISSED_TICKS)
     observed = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
@@ -30,3 +33,8 @@ def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_wh
         (not measured, "no steady part to measure, or too little of it"),
     )
     return Judgement("", tuple(text for seen, text in observed if seen))
+
+
+def cause_of(fault: Fault) -> VoidCause:
+    """Of a trial that this fault made void."""
+    return VoidCause.SCREEN_LATE if fault is Fault.STALLED else VoidCause.FAULT

@@ -13,6 +13,7 @@ from study.devices.device import DeviceInfo, DeviceSettings
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
 from study.session.fold import begin_session
 from study.session.limits import limits_of_study
+from study.session.rules import LATEST
 from study.session.state import SessionState
 from study.store.archive import SessionFolder, new_session_folder
 from study.store.event_log import EventLog
@@ -87,6 +88,7 @@ def opened_session(
         versions=versions(),
         equalized=equalized.facts,
         monotonic_s=clock.now_s(),
+        rules=LATEST,
     )
     with locked(folder.path):
         keep_model(equalized, folder)

@@ -1,6 +1,7 @@
 """One trial: wait for the handle, log, play, ask, log, release, measure, log. Nothing moves before its fact is on the
 disk."""
 
+from protocols.trial import VoidCause
 from study.devices.device import Fault, Played
 from study.session.delivered import delivered
 from study.session.due_trial import Present
@@ -11,7 +12,7 @@ from study.session.views import Unanswered
 from study.workflows.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.ask_participant import Asked, ask_participant
 from study.workflows.await_handle import await_handle
-from study.workflows.judge_trial import judge
+from study.workflows.judge_trial import cause_of, judge
 from study.workflows.question import question_of
 from study.workflows.release import released
 from study.workflows.sitting import Sitting, record
@@ -48,7 +49,7 @@ def _close(state: SessionState, present: Present, played: Played, felt_whole: bo
     fault = played.health.fault
     leave = reason_to_leave(fault)
     if verdict.spoiled:
-        state = record(state, spoiled(present, verdict.spoiled, played.health, sitting), sitting)
+        state = record(state, spoiled(present, (verdict.spoiled, verdict.cause), played.health, sitting), sitting)
         return AfterTrial(state, leave=leave, void=verdict.spoiled, fault=fault)
     state = record(state, measured(present, Outcome(played, values, verdict.flags, vector), state, sitting), sitting)
     return AfterTrial(state, correct, leave=leave, fault=fault)
@@ -59,8 +60,10 @@ def _void(state: SessionState, present: Present, asked: Asked, reply: Unanswered
     health = played.health if played is not None else None
     fault = health.fault if health is not None else Fault.NONE
     # An emergency stop is a fault too; who pressed it says more.
-    reason = fault.value if fault is not Fault.NONE and not reply.leave else reply.reason
-    state = record(state, spoiled(present, reason, health, sitting), sitting)
+    faulty = fault is not Fault.NONE and not reply.leave
+    reason = fault.value if faulty else reply.reason
+    cause = cause_of(fault) if faulty else _cause_of(reply, sitting)
+    state = record(state, spoiled(present, (reason, cause), health, sitting), sitting)
     if reply.leave:
         return AfterTrial(state, leave=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
     if leave := reason_to_leave(fault):
@@ -69,3 +72,14 @@ def _void(state: SessionState, present: Present, asked: Asked, reply: Unanswered
         return AfterTrial(state, pause=reply.reason)
     asked_for = reply.asked and fault is Fault.NONE
     return AfterTrial(state, void="" if asked_for else reason, fault=fault)
+
+
+def _cause_of(reply: Unanswered, sitting: Sitting) -> VoidCause:
+    who = sitting.attendant.stop_asked or sitting.attendant.pause_asked
+    if who is not None and who != "participant" and (reply.leave or reply.pause):
+        return VoidCause.EXPERIMENTER
+    if reply.leave:
+        return VoidCause.LEFT
+    if reply.pause:
+        return VoidCause.PAUSED
+    return VoidCause.ASKED if reply.asked else reply.cause

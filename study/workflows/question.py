@@ -3,7 +3,7 @@
 from protocols.trial import Phase
 from study.session.due_trial import Present, labels_are_swapped
 from study.session.progress import progress
-from study.session.state import SessionState
+from study.session.state import SessionState, repeats_left
 from study.session.views import Question, Task, picture_of
 
 
@@ -21,4 +21,5 @@ def question_of(state: SessionState, present: Present) -> Question:
         task=Task.INTERVAL if run.phase is Phase.DETECTION else Task.DIRECTION,
         practice=run.practice,
         progress=progress(state),
+        repeats_left=repeats_left(state),
     )

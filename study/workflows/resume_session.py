@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from protocols.schedule import label_of
+from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
 from study.session.counted import answers_are
 from study.session.delivered import delivered
 from study.session.due_trial import labels_are_swapped
-from study.session.events import SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.events import SessionInterrupted, SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
 from study.session.fold import apply
 from study.session.state import SessionState
 from study.session.stimulus import direction_vector
@@ -46,7 +47,9 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
                 monotonic_s=clock.now_s(),
             )
             log.append(resumed)
-            state = _close_open_trial(apply(folded.state, resumed), folder, log, clock)
+            # Ctrl-C, which a participant may press too, is told from a program that died.
+            interrupted = isinstance(folded.contents.events[-1], SessionInterrupted)
+            state = _close_open_trial(apply(folded.state, resumed), folder, log, clock, interrupted)
             yield OpenedSession(folder, log, state)
         finally:
             log.close()
@@ -70,7 +73,9 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
         )
 
 
-def _close_open_trial(state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock) -> SessionState:
+def _close_open_trial(
+    state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock, interrupted: bool
+) -> SessionState:
     """An answered trial counts; an unanswered one is void, because it may have been felt."""
     presented = state.presented
     if presented is None:
@@ -83,6 +88,7 @@ def _close_open_trial(state: SessionState, folder: SessionFolder, log: EventLog,
             attempt=presented.attempt,
             reason="the program ended before the answer",
             monotonic_s=clock.now_s(),
+            cause=VoidCause.LEFT if interrupted else VoidCause.PROGRAM_ENDED,
         )
     else:
         event = _measured_late(state, presented, folder, clock)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.participants.observer import Felt, Observer
 from study.session.due_trial import Present
@@ -91,7 +92,7 @@ class SimulatedDisplay:
         if not self._waited(question.time_limit_s if too_slow else reply.response_time_s, sign_of_life):
             return CUT_SHORT
         if too_slow:
-            return Unanswered("no answer within the time limit", leave=False)
+            return Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
         return Answered(reply.answer, self._clock.now_s())
 
     def feedback(self, correct: bool) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from protocols.trial import VoidCause
 from study.devices.device import Health, Played
 from study.session.delivered import Delivered
 from study.session.due_trial import Present
@@ -44,8 +45,9 @@ def presented(present: Present, sitting: Sitting) -> TrialPresented:
     )
 
 
-def spoiled(present: Present, reason: str, health: Health | None, sitting: Sitting) -> TrialSpoiled:
-    """health: None where nothing was played yet."""
+def spoiled(present: Present, why: tuple[str, VoidCause], health: Health | None, sitting: Sitting) -> TrialSpoiled:
+    """why: in words, and as a cause. health: None where nothing was played yet."""
+    reason, cause = why
     return TrialSpoiled(
         utc=sitting.clock.utc(),
         run=present.run,
@@ -54,6 +56,7 @@ def spoiled(present: Present, reason: str, health: Health | None, sitting: Sitti
         reason=reason,
         missed_ticks=health.missed_ticks if health else None,
         vibrated_s=_seconds(health, sitting) if health else 0.0,
+        cause=cause,
     )
 
 

@@ -86,7 +86,7 @@ def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):
     able[4] = replace(able[4], status=TrialStatus.FLAGGED)
     able[5] = replace(able[5], status=TrialStatus.UNMEASURED, delivered_mps2=None)
     assert warnings([*able, spoiled], protocol) == (
-        "1 spoiled presentation drawn again; the answers do not count.",
+        "1 spoiled presentation, played again; the answers do not count.",
         "1 trial flagged: counted, but the stimulus is worth a look.",
         "1 counted trial without a measured acceleration.",
     )

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.session.form_views import Form, FormReply
 from study.session.views import (
@@ -36,9 +37,9 @@ UNSHOWN_S = 1.0
 SILENT_AFTER_S = 0.5
 """A screen without a heartbeat for so long is suspended, dead or hung: nobody could stop what plays."""
 
-SILENT = Unanswered("the screen gave no sign of life", leave=False)
+SILENT = Unanswered("the screen gave no sign of life", leave=False, cause=VoidCause.SCREEN_LATE)
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
-TOO_LATE = Unanswered("no answer within the time limit", leave=False)
+TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
 
 
 class RemoteDisplay:

@@ -16,7 +16,7 @@ class AwaitReturnScreen(Screen[None]):
     HELP = """\
 # A trial that did not count
 
-- The last trial was cut short and does not count. It is drawn again, so nothing is lost.
+- The last trial was cut short and does not count. It comes again, so nothing is lost.
 - Nothing is played until you press **Enter**.
 - **Ctrl+C** leaves; the session can be resumed.
 """
@@ -30,7 +30,7 @@ class AwaitReturnScreen(Screen[None]):
     def compose(self) -> ComposeResult:
         with Card("The last trial does not count"):
             yield Said(f"It is void: {self._reason}.")
-            yield Said("All answers before it are saved, and it will be drawn again.", classes="gap")
+            yield Said("All answers before it are saved, and it will come again.", classes="gap")
             yield Said("Take hold of the handle and press Enter when you are ready.", classes="gap strong")
         yield Footer(show_command_palette=False)
 

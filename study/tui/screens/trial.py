@@ -16,7 +16,7 @@ from textual.widgets import Footer
 from study.session.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.key_presses import KeyPresses, arrival_s
-from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
+from study.tui.trial_replies import LEAVING, NO_REPEATS, PAUSE, REPEAT, TIME_OVER, repeat_words
 from study.tui.trial_words import heading, run_name
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.said import Said
@@ -31,8 +31,7 @@ REPLIES = {"pause": PAUSE, "leave": LEAVING, "repeat": REPEAT}
 AFTER = {
     PAUSE: "Pause. Let go of the handle.",
     LEAVING: "Pause. Let go of the handle.",
-    REPEAT: "A new trial comes.",
-    TIME_OVER: "The time for this answer is over. A new trial comes.",
+    TIME_OVER: "The time for this answer is over. The next vibration comes.",
 }
 WANTED_FOR_S = 3.0
 """A pause asked for between two trials begins with the next; much later it would be forgotten."""
@@ -49,8 +48,8 @@ class TrialScreen(Screen[None]):
 - Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes. Where two intervals
   are asked about, press the number of the one in which it shook.
 - If you cannot tell, guess. Many trials are meant to be hard, and no answer can do harm.
-- **p** pauses: the handle stops at once, and this trial is drawn again later.
-- **r** skips this trial and plays a new one, for instance when you were disturbed.
+- **p** pauses: the handle stops at once, and this trial comes again afterwards.
+- **r** plays this trial again, for instance when you were disturbed. It works a few times in each run.
 - **q** pauses too, and offers to leave. What you have answered is kept.
 - **Ctrl+C** takes the force off at once and leaves.
 """
@@ -66,7 +65,7 @@ class TrialScreen(Screen[None]):
         Binding("1", "heard(1)", "Answer 1"),
         Binding("2", "heard(2)", "Answer 2"),
         Binding("p", "reply('pause')", "Pause"),
-        Binding("r", "reply('repeat')", "New trial"),
+        Binding("r", "reply('repeat')", "Again"),
         Binding("q", "reply('leave')", "Leave"),
     ]
 
@@ -81,6 +80,7 @@ class TrialScreen(Screen[None]):
         self._keys = keys
         self._presses = KeyPresses()
         self._question: Question | None = None
+        self._repeats_left: int | None = None
         self._armed_s: float | None = None
         self._taken = 0
         self._limit: Timer | None = None
@@ -107,7 +107,7 @@ class TrialScreen(Screen[None]):
         self._drop_limit()
         if self._question is not None and run_name(question) != run_name(self._question):
             self._verdict = ""  # of practice: nothing is told about the answers that come now
-        self._question, self._taken = question, 0
+        self._question, self._repeats_left, self._taken = question, question.repeats_left, 0
         # Its own trial ends a moment after the answer: it could not be read if it went with it.
         last, self._verdict = self._verdict, ""
         if self._trouble_is_old:
@@ -162,7 +162,9 @@ class TrialScreen(Screen[None]):
 
     def action_reply(self, name: str) -> None:
         reply = REPLIES[name]
-        if self._armed_s is not None:
+        if self._armed_s is not None and reply is REPEAT and self._repeats_left == 0:
+            self._say(f"{NO_REPEATS} {self._press()}")
+        elif self._armed_s is not None:
             self._reply(reply)
         elif reply.pause:
             self._wanted = reply, time.monotonic()
@@ -190,7 +192,7 @@ class TrialScreen(Screen[None]):
         self._armed_s = None
         self.post_message(self.Replied(reply))
         self._drop_limit()
-        self._say(AFTER[reply])
+        self._say(AFTER.get(reply) or repeat_words(self._repeats_left))
 
     def _time_over(self) -> None:
         if self._armed_s is not None:

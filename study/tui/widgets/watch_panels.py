@@ -32,7 +32,7 @@ _STANDING_STYLES = {
     "not running": "bold $text-error",
 }
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
-_VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error", "void": MUTED}
+_VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
 BAR_CELLS = 6
 
 
@@ -132,7 +132,7 @@ def _trial_line(trial: ClosedTrial, columns: int) -> Content:
         remark = f"catch {remark}".rstrip()
     shortened = remark if len(remark) <= room else f"{remark[: room - 1]}…"
     tail = f"  {shortened}" if room >= 8 else " !" if remark else ""
-    return Content.assemble(left, (f"{word:<5}", _VERDICT_STYLES[word]), f"{turned} {right}", (tail, MUTED))
+    return Content.assemble(left, (f"{word:<5}", _VERDICT_STYLES.get(word, MUTED)), f"{turned} {right}", (tail, MUTED))
 
 
 def _or_dash(value: int | None, width: int) -> str:

@@ -46,7 +46,7 @@ SENTENCES = [
     ),
     (
         TrialSpoiled(UTC, 1, 4, 0, "the handle was let go"),
-        "Run 2, trial 5 is void and will be drawn again: the handle was let go.",
+        "Run 2, trial 5 is void and comes again: the handle was let go.",
     ),
     (RestTaken(UTC, 2, 0, 60.0), "Rested 60 s before trial 1 of run 3."),
     (
@@ -102,29 +102,35 @@ def test_nothing_about_health_is_in_the_words(form):
     assert "question_1" not in said
 
 
-def test_the_direction_is_told_once_the_answer_is_in():
-    (_, presented, answer) = log_in_words((PRESENTED, ANSWER))
+def test_the_direction_is_told_once_the_answer_counts():
+    (_, presented, answer, _) = log_in_words((PRESENTED, ANSWER, MEASURED))
     assert presented == "09:30:12  Run 2, trial 5 (test): direction 2, 1.000 N at 35 Hz."
     assert answer == "09:30:12  Answer 2 after 1.23 s: right."
 
 
-@pytest.mark.parametrize("end", [(), (TrialSpoiled(UTC, 1, 4, 0, "no answer"),)])
-def test_the_direction_of_a_trial_without_an_answer_is_told_nowhere(end):
+VOID = TrialSpoiled(UTC, 1, 4, 0, "no answer")
+
+
+@pytest.mark.parametrize("end", [(), (VOID,), (ANSWER,), (ANSWER, VOID)])
+def test_the_direction_of_a_trial_that_does_not_count_is_told_nowhere(end):
+    """It may come again, or was told to be void: the same stimulus is played again."""
     words = " ".join(log_in_words((PRESENTED, *end)))
     assert "direction" not in words
+    assert "right" not in words
+    assert "wrong" not in words
     assert "45" not in words
 
 
 def test_another_attempt_of_the_same_trial_keeps_its_own_direction_hidden():
     again = TrialPresented(UTC, 1, 4, 1, Phase.TEST, 35.0, 0.0, 1.0, 1, 135.0, 1)
-    words = log_in_words((PRESENTED, ANSWER, again))
+    words = log_in_words((PRESENTED, ANSWER, MEASURED, again))
     assert "direction 2" in words[1]
-    assert words[3] == "09:30:12  Run 2, trial 5 (test, attempt 2): 1.000 N at 35 Hz."
+    assert words[4] == "09:30:12  Run 2, trial 5 (test, attempt 2): 1.000 N at 35 Hz."
 
 
 def test_a_detection_trial_has_an_interval():
     shown = TrialPresented(UTC, 1, 4, 0, Phase.DETECTION, 35.0, 0.0, 1.0, 2, 45.0, 1)
-    assert "interval 2" in log_in_words((shown, ANSWER))[1]
+    assert "interval 2" in log_in_words((shown, ANSWER, MEASURED))[1]
 
 
 def test_each_day_has_a_line_of_its_own():

@@ -179,14 +179,24 @@ def test_no_field_tells_the_open_trial_wherever_in_the_session_it_is(story, answ
     assert watch_view(swapped, Beside(), now) == story.view()
 
 
-def test_the_direction_appears_with_the_answer(story):
+def test_the_direction_appears_once_the_answer_counts(story):
+    """While it is measured it may still turn out void: then the same stimulus comes again."""
     action = story.open_trial()
     assert story.view().last == ()
     story.tell(AnswerGiven(at(12), **place(action), answer=3 - action.label, response_time_s=2.0))
     seen = story.view().last[0]
-    assert (seen.shown, seen.answer, seen.correct, seen.status) == (action.label, 3 - action.label, False, "measuring")
+    assert (seen.shown, seen.answer, seen.correct, seen.status) == (None, 3 - action.label, None, "measuring")
     assert story.view().open_trial is None
     assert story.view().activity == "measuring"
+    seen = story.tell(TrialMeasured(at(13), **place(action), status="ok")).view().last[0]
+    assert (seen.shown, seen.correct) == (action.label, False)
+
+
+def test_the_direction_of_an_answered_trial_that_turned_out_void_stays_hidden(story):
+    action = story.open_trial()
+    story.tell(AnswerGiven(at(12), **place(action), answer=action.label, response_time_s=2.0))
+    seen = story.tell(TrialSpoiled(at(13), **place(action), reason="ticks were missed")).view().last[0]
+    assert (seen.shown, seen.correct, seen.status) == (None, None, "spoiled")
 
 
 def test_the_direction_of_a_void_trial_without_an_answer_stays_hidden(story):

@@ -16,6 +16,7 @@ from study.session.views import (
 )
 from study.tui.answer_keys import AnswerKeys
 from study.tui.direction_picture import drawing, sentence
+from study.tui.trial_replies import REPEAT, TIME_OVER
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
 QUESTION = Question(Phase.TEST, 2, 5, trial_number=7, repeated=False, time_limit_s=0.0, picture=PICTURE)
@@ -51,6 +52,15 @@ def test_leaving_and_repeating_are_no_answers(typed):
     assert ask(typed) == Unanswered("asked to repeat", leave=False, asked=True)
 
 
+def test_a_used_up_repeat_says_so_and_waits_for_an_answer(typed):
+    typed.type("r", "2")
+    assert ask(typed, replace(QUESTION, repeats_left=0)).answer == 2
+    assert "No repeats are left in this run." in typed.out.getvalue()
+    typed.type("r")
+    assert ask(typed, replace(QUESTION, repeats_left=1)) == REPEAT
+    assert "The same vibration comes again. No more repeats in this run." in typed.out.getvalue()
+
+
 def test_the_end_of_the_input_leaves(typed):
     typed.end()
     assert ask(typed) == Unanswered("the input ended", leave=True)
@@ -63,7 +73,7 @@ def test_a_stimulus_that_ended_by_a_fault_ends_the_question(typed):
 
 def test_the_time_limit_ends_the_question(typed):
     question = Question(Phase.TEST, 1, 1, 1, repeated=False, time_limit_s=0.05, picture=PICTURE)
-    assert ask(typed, question) == Unanswered("no answer within the time limit", leave=False)
+    assert ask(typed, question) == TIME_OVER
 
 
 def test_the_device_gets_signs_of_life_while_nobody_answers(typed):

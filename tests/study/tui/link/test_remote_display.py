@@ -23,9 +23,10 @@ from study.session.views import (
     Unanswered,
 )
 from study.tui.link.from_engine import Ask, Call, Close, LookUpdate
-from study.tui.link.remote_display import SILENT_AFTER_S, RemoteDisplay
+from study.tui.link.remote_display import SILENT, SILENT_AFTER_S, RemoteDisplay
 from study.tui.link.screen_link import ScreenLink
 from study.tui.link.to_engine import Heartbeat, Reply
+from study.tui.trial_replies import TIME_OVER
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -118,7 +119,7 @@ def test_a_silent_screen_ends_whatever_may_shake_a_hand(screen, wait):
     began_s = time.monotonic()
     reply = wait(screen.display)
     assert SILENT_AFTER_S - 0.15 < time.monotonic() - began_s < SILENT_AFTER_S + 0.3
-    assert reply == Unanswered("the screen gave no sign of life", leave=False)
+    assert reply == SILENT
 
 
 def test_a_silent_screen_may_take_its_time_while_nothing_plays(screen):
@@ -146,7 +147,7 @@ def test_what_plays_is_closed_when_its_time_is_over(screen):
 
 def test_the_time_limit_is_the_engines(screen):
     reply = screen.display.ask(replace(QUESTION, time_limit_s=0.2), alive)
-    assert reply == Unanswered("no answer within the time limit", leave=False)
+    assert reply == TIME_OVER
     screen.hear()
     assert screen.hear() == Close(1)
 

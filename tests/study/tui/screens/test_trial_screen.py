@@ -53,6 +53,30 @@ def test_pause_leave_and_repeat_are_replies_that_leave_no_session(asked, key, re
     assert not reply.leave
 
 
+def test_a_used_up_repeat_says_so_and_does_nothing_else(asked):
+    none_left = replace(QUESTION, repeats_left=0)
+    replies, words = asked("r", question=none_left)
+    assert not replies
+    assert "No repeats are left in this run. Press 1 or 2." in words
+    (reply,), _ = asked("r", "2", question=none_left)
+    assert reply.answer == 2
+
+
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        (3, "The same vibration comes again. 2 more repeats in this run."),
+        (2, "The same vibration comes again. 1 more repeat in this run."),
+        (1, "The same vibration comes again. No more repeats in this run."),
+        (None, "A new trial comes."),
+    ],
+)
+def test_what_comes_after_a_repeat_is_said_as_the_sessions_rules_have_it(asked, left, said):
+    replies, words = asked("r", question=replace(QUESTION, repeats_left=left))
+    assert replies == [REPEAT]
+    assert said in words
+
+
 def test_a_question_has_one_reply_whatever_is_pressed_after_it(asked):
     replies, words = asked("1", "2", "p", "r", "1")
     assert len(replies) == 1
