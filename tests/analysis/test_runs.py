@@ -103,7 +103,8 @@ def test_catch_trials_move_no_staircase_and_leave_no_gap(rows, caught_rows, rule
 def test_a_void_catch_trial_is_none_of_the_staircases_spoiled_trials(caught_rows, rule):
     catch = next(row for row in caught_rows if row.phase is Phase.CATCH)
     void = replace(catch, attempt=0, answer=None, correct=None, status=TrialStatus.SPOILED)
-    assert recompute_runs([*caught_rows, void], rule) == recompute_runs(caught_rows, rule)
+    (run,) = recompute_runs(caught_rows, rule)
+    assert recompute_runs([*caught_rows, void], rule) == (replace(run, presentations=run.presentations + 1),)
 
 
 @pytest.mark.parametrize("phase", [Phase.CATCH, Phase.TEST])

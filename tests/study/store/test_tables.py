@@ -53,8 +53,10 @@ def test_a_row_is_plain_text():
     unanswered = replace(TRIAL, answer=None, correct=None, felt=None)
     first, second, third = rows_to_csv([TRIAL, unanswered], Trial).splitlines()
     assert first == ",".join(TRIALS_HEADER)
-    assert second == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok,135.0,"
-    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok,135.0,"
+    assert (
+        second == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,1,true,false,1.5,2.5,0.01,0.3,0,false,ok,135.0,,,"
+    )
+    assert third == "P01,P01_001,1,3,1,test,25.0,0.30000000000000004,1,,,false,1.5,2.5,0.01,0.3,0,,ok,135.0,,,"
 
 
 def test_tables_are_rewritten_at_will(tmp_path):
@@ -69,6 +71,7 @@ def test_thresholds_go_to_disk_and_back(tmp_path):
         | {"subject": "P01", "frequency_hz": 35.0, "threshold_n": 1.25, "censored": True, "complete": True}
         | {name: 3 for name in ("reversals", "trials", "cap_reversals", "trials_at_cap", "pushes_against_cap")}
         | {"session": "P01_001", "run": 1, "spoiled_trials": 0, "measured_reversals": 0}
+        | {"repeats_at_will": 3, "repeat_rate": 0.05, "asked_often": True}
     )
     write_thresholds(tmp_path / "thresholds.csv", [row])
     assert read_thresholds(tmp_path / "thresholds.csv") == (row,)
@@ -76,7 +79,7 @@ def test_thresholds_go_to_disk_and_back(tmp_path):
 
 def test_a_table_of_before_a_column_was_is_still_read():
     lines = rows_to_csv([TRIAL], Trial).splitlines()
-    older = "\n".join(line.removesuffix(",wanted_mps2").removesuffix(",") for line in lines)
+    older = "\n".join(line.removesuffix(",wanted_mps2,void_cause,repeat_cause").removesuffix(",,,") for line in lines)
     assert rows_from_csv(older, Trial) == (TRIAL,)
     foreign = older.replace("angle_deg", "remark").replace("135.0", "late")
     assert rows_from_csv(foreign, Trial) == (replace(TRIAL, angle_deg=None),)
@@ -102,8 +105,12 @@ def test_a_text_that_is_no_table_is_refused():
     ("old", "new", "problem"),
     [
         ("frequency_hz", "freq", "column 7 of the header is 'freq'; it must be 'frequency_hz' (of subject, session"),
-        (",status,angle_deg,wanted_mps2\n", "\n", "column 19 of the header is missing; it must be 'status'"),
-        (",135.0,\n", "\n", "line 2 has 19 fields, but the header names 21"),
+        (
+            ",status,angle_deg,wanted_mps2,void_cause,repeat_cause\n",
+            "\n",
+            "column 19 of the header is missing; it must be 'status'",
+        ),
+        (",135.0,,,\n", "\n", "line 2 has 19 fields, but the header names 23"),
         (",3,1,test", ",three,1,test", "line 2, column trial: 'three' is not a whole number"),
         ("25.0", "high", "line 2, column frequency_hz: 'high' is not a number"),
         ("25.0", "", "line 2, column frequency_hz: it is empty, but a value is needed"),
