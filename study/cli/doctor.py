@@ -54,13 +54,20 @@ def _say(examination: "Examination") -> None:
             typer.echo(title)
         for finding in findings:
             _say_one(finding)
-    wrong = sum(not finding.fine for finding in examination.findings)
-    checked = len(examination.findings)
-    typer.echo(f"All {checked} checks are fine." if not wrong else f"{wrong} of {checked} checks are not fine.")
+    typer.echo(_summary(examination.findings))
+
+
+def _summary(findings: "tuple[DeviceFinding, ...]") -> str:
+    not_fine, warnings = sum(not finding.fine for finding in findings), sum(finding.warning for finding in findings)
+    if not not_fine:
+        return f"All {len(findings)} checks are fine."
+    which = f" {warnings} of them {'is a warning' if warnings == 1 else 'are warnings'}." if warnings else ""
+    return f"{not_fine} of {len(findings)} checks are not fine.{which}"
 
 
 def _say_one(finding: "DeviceFinding") -> None:
-    typer.echo(f"  {'fine ' if finding.fine else 'WRONG'}  {finding.name:<{NAME_WIDTH}}  {finding.value}")
+    verdict = "fine" if finding.fine else "WRONG" if finding.wrong else "WARN"
+    typer.echo(f"  {verdict:<5}  {finding.name:<{NAME_WIDTH}}  {finding.value}")
     if finding.advice:
         typer.echo(f"         {'':<{NAME_WIDTH}}  {finding.advice}")
 
@@ -68,7 +75,7 @@ def _say_one(finding: "DeviceFinding") -> None:
 def _document(examination: "Examination") -> dict[str, Any]:
     timing = examination.timing
     document = {
-        "fine": not examination.exit_code,
+        "fine": all(finding.fine for finding in examination.findings),
         "installation": [asdict(finding) for finding in examination.installation],
         "device": asdict(examination.device),
         "timing": None,

@@ -13,6 +13,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.session.held_stimulus import HeldStimulus
 from study.session.limits import Limits
+from study.session.void_reasons import PROGRAM_STALLED
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,7 @@ class Fault(Enum):
 
     NONE = "none"
     NOT_A_NUMBER = "a command or a position was no plausible number"
-    STALLED = "the program gave no sign of life, so the force was faded out"
+    STALLED = PROGRAM_STALLED
     HELD_TOO_LONG = "the stimulus was held longer than the protocol allows"
     STOPPED = "the emergency stop was pressed"
     LOST = "the device stopped answering"

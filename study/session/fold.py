@@ -39,6 +39,7 @@ from study.session.sitting_state import (
 )
 from study.session.state import SessionState, begin_session, current_rule, due, felt, repeats_left
 from study.session.trial_row import trial_row
+from study.session.void_reasons import computer_too_busy
 
 __all__ = ["apply", "begin_session"]
 
@@ -201,8 +202,10 @@ def _spoil(state: SessionState, event: TrialSpoiled) -> SessionState:
     if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
         raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
     row = replace(state.trials[-1], missed_ticks=event.missed_ticks, status=TrialStatus.SPOILED, void_cause=event.cause)
+    busy_voids = state.sitting.busy_voids + computer_too_busy(event.reason)
+    counted = replace(state, sitting=replace(state.sitting, busy_voids=busy_voids))
     return replace(
-        _shaken(state, presented, None, event.vibrated_s),
+        _shaken(counted, presented, None, event.vibrated_s),
         presented=None,
         answered=None,
         attempt=state.attempt + 1,

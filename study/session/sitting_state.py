@@ -36,6 +36,8 @@ class SittingState:
     """Time of the last entry in the log, up to which everything here counts."""
     sat_s: float | None = None
     """Since the handle first moved in this sitting; None before."""
+    busy_voids: int = 0
+    """Trials of this sitting that were void because the computer was too busy."""
     answers_before: int = 0
     """Given in earlier sittings."""
     still_s: float | None = None
@@ -82,7 +84,9 @@ def demonstrated(sitting: SittingState, event: DemoFinished) -> SittingState:
 
 def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
     """A new sitting of the same session: whoever was refused is asked again, in case it was a slip of the finger."""
-    return replace(sitting, setup_done=False, device_checked=False, sat_s=None, refused="", answers_before=answers)
+    return replace(
+        sitting, setup_done=False, device_checked=False, sat_s=None, busy_voids=0, refused="", answers_before=answers
+    )
 
 
 def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> SittingState:

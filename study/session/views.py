@@ -132,6 +132,16 @@ class DeviceFinding:
     fine: bool
     advice: str = ""
     """What to do where it is not fine."""
+    warning: bool = False
+    """It is not fine, and hinders nothing that this device is used for."""
+
+    @property
+    def wrong(self) -> bool:
+        return not self.fine and not self.warning
+
+    @property
+    def verdict(self) -> str:
+        return "ok" if self.fine else "warn" if self.warning else "look"
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +153,13 @@ class DeviceReport:
     @property
     def fine(self) -> bool:
         return all(finding.fine for finding in self.findings)
+
+    @property
+    def conclusion(self) -> str:
+        """Empty where something is wrong."""
+        if any(finding.wrong for finding in self.findings):
+            return ""
+        return "The device is ready." if self.fine else "The device is ready; mind the warning above."
 
 
 @dataclass(frozen=True, slots=True)

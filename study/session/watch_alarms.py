@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.live import Live
 from study.session.log_time import minutes_between
+from study.session.void_reasons import computer_too_busy
 from study.session.watch_view import ON, Alarm, Exposure, Standing
 from study.session.watched import Watched
 
@@ -151,6 +152,15 @@ def _voids(now: Situation) -> Alarm | None:
     return Alarm("voids", many, now.watched.last_utc)
 
 
+def _busy(now: Situation) -> Alarm | None:
+    remarks = now.watched.remarks[-PRESENTATIONS:]
+    void = sum(map(computer_too_busy, remarks))
+    if not void:
+        return None
+    many = f"{void} of the last {len(remarks)} presentations {'was' if void == 1 else 'were'} void because of it"
+    return Alarm("busy", f"The computer is too busy: {many}. Close other programs.", now.watched.last_utc)
+
+
 def _last_void(now: Situation) -> str:
     remarks = zip(now.trials, now.watched.remarks, strict=True)
     return [remark for trial, remark in remarks if trial.status is TrialStatus.SPOILED][-1]
@@ -169,5 +179,5 @@ def _unanswered(now: Situation) -> Alarm | None:
 _ENDS = ("gone", "ended")
 _OVER: tuple[Callable[[Situation], Alarm | None], ...] = (_unreadable, _gone, _ended)
 _RUNNING: tuple[Callable[[Situation], Alarm | None], ...] = (
-    _device, _silent, _unreadable, _adverse, _handle, _clipped, _dose, _time, _lapses, _voids, _unanswered,
+    _device, _silent, _unreadable, _adverse, _handle, _clipped, _dose, _time, _lapses, _busy, _voids, _unanswered,
 )  # fmt: skip

@@ -23,6 +23,7 @@ from study.session.views import (
     Unanswered,
     Welcome,
 )
+from study.session.void_reasons import void_for_participant
 from study.tui import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.conversation import Conversation
@@ -90,7 +91,8 @@ class PlainDisplay:
 
     def await_return(self, reason: str) -> None:
         self._talk.forget()
-        self._talk.say("", f"The last trial is void: {reason}. Press Enter when you are ready for it again.")
+        self._talk.say("", f"The last trial does not count. {void_for_participant(reason)}")
+        self._talk.say("Press Enter when you are ready for it again.")
         self._talk.answer_or_leave()
 
     def goodbye(self, notice: Goodbye) -> None:

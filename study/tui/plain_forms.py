@@ -29,8 +29,8 @@ def device_checked(report: DeviceReport, talk: Conversation) -> bool:
     talk.say("", f"Device: {report.device}{' (simulated: nothing moves)' if report.simulated else ''}")
     for finding in report.findings:
         advice = f". {finding.advice}" if finding.advice and not finding.fine else ""
-        talk.say(f"{'ok' if finding.fine else 'look'}: {finding.name}, {finding.value}{advice}")
-    talk.say("The device is ready." if report.fine else "Something needs a look before you go on.")
+        talk.say(f"{finding.verdict}: {finding.name}, {finding.value}{advice}")
+    talk.say(report.conclusion or "Something needs a look before you go on.")
     while True:
         talk.prompt("Enter goes on, c checks again, q leaves: ")
         line = talk.answer_or_leave()

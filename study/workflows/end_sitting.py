@@ -3,10 +3,13 @@
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.counted import answers_are
+from study.session.void_reasons import TOO_BUSY
 from study.workflows.conduct_session import Conducted
 from study.workflows.session_results import write_results
 from study.workflows.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.written_analysis import WrittenAnalysis
+
+BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
 
 
 def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
@@ -24,7 +27,7 @@ def _not_finished(end: Conducted) -> StudyError:
     return kind(
         "The session is not finished",
         f"The sitting ended: {end.left}.",
-        f"Go on with: hapteq resume {end.folder.path}",
+        f"{BUSY_ADVICE if end.left.startswith(TOO_BUSY) else ''}Go on with: hapteq resume {end.folder.path}",
         saved=f"{answers_are(end.state.answers)} on disk.",
     )
 

@@ -5,15 +5,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from study.devices.clock import RealClock
-from study.devices.device import DeviceSettings
+from study.devices.clock import Clock, RealClock
+from study.devices.device import Device, DeviceSettings
 from study.devices.opening import open_device
 from study.errors import DeviceError, ExitCode
+from study.session.timing_verdict import judge_load
 from study.session.views import DeviceFinding, DeviceReport
 from study.store.protocol_files import read_study_protocol
 from study.workflows.check_device import check_device
 from study.workflows.check_installation import Terminal, check_installation
 from study.workflows.check_timing import Timing, check_timing
+from study.workflows.computer_load import load_per_processor
 from study.workflows.open_session import device_settings
 
 PROTOCOL = "direction_threshold"
@@ -37,10 +39,11 @@ class Examination:
 
     @property
     def exit_code(self) -> ExitCode:
-        """DEVICE where device or timing is not fine, whatever else is not."""
-        if not (self.device.fine and (self.timing is None or all(finding.fine for finding in self.timing.findings))):
+        """By the worst verdict: DEVICE where device or timing is wrong, whatever else is. A warning changes nothing."""
+        timing = self.timing.findings if self.timing is not None else ()
+        if any(finding.wrong for finding in (*self.device.findings, *timing)):
             return ExitCode.DEVICE
-        return ExitCode.DONE if all(finding.fine for finding in self.installation) else ExitCode.ERROR
+        return ExitCode.ERROR if any(finding.wrong for finding in self.installation) else ExitCode.DONE
 
 
 def examine_setup(
@@ -60,11 +63,17 @@ def _examine_device(
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
             report = check_device(device, clock, settings.place_m, settings.limits.total_cap_n)
-            timing = check_timing(device, clock, timing_s, on_progress) if timing_s > 0 else None
+            timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
             return report, timing
     except DeviceError as error:
         trouble = DeviceFinding("Device", f"{error.title}. {error.happened}", fine=False, advice=error.do_now)
         return replace(report, findings=(*report.findings, trouble)), None
+
+
+def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
+    load = judge_load(load_per_processor())
+    timing = check_timing(device, clock, seconds, on_progress)
+    return replace(timing, findings=(*timing.findings, load))
 
 
 def _settings(timing_s: float) -> DeviceSettings:

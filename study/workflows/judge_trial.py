@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from protocols.study_protocol import MeasurementSettings
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
+from study.session.void_reasons import TICKS_MISSED
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_wh
         return Judgement(health.fault.value, (), cause_of(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
         share = 100 * health.missed_ticks / max(health.ticks, 1)
-        return Judgement(f"{share:.1f} % of the 1 kHz ticks were missed", (), VoidCause.MISSED_TICKS)
+        return Judgement(f"{share:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
     observed = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),

@@ -1,4 +1,6 @@
-"""Before the instructions, in each sitting: consent, exclusion, the set-up, and a look at the device."""
+"""Before the instructions, in each sitting: consent, exclusion, the set-up, and a look at device and computer."""
+
+from dataclasses import replace
 
 from study.session.events import DeviceChecked, FormFilled
 from study.session.form_views import Form
@@ -6,7 +8,10 @@ from study.session.forms import judge_form
 from study.session.machine import CheckDevice, FillIn, Leave, next_preparation
 from study.session.requests import NoteAsked
 from study.session.state import SessionState
+from study.session.views import DeviceFinding
 from study.workflows.check_device import check_device
+from study.workflows.check_timing import check_computer
+from study.workflows.computer_load import load_per_processor
 from study.workflows.sitting import Sitting, record, write_notes
 
 
@@ -47,9 +52,18 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     """As often as somebody wants to check again. Going on in spite of a finding is their decision, and is logged."""
     sitting.attendant.begin("preparing")
-    report = check_device(sitting.device, sitting.clock, sitting.place_m, state.protocol.safety.total_cap_n)
+    device, clock = sitting.device, sitting.clock
+    report = check_device(device, clock, sitting.place_m, state.protocol.safety.total_cap_n)
+    # In virtual time nothing waits for a processor.
+    load = None if clock.virtual else load_per_processor()
+    computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
+    report = replace(report, findings=(*report.findings, *computer))
     go_on = sitting.display.device_checked(report)
-    findings = tuple(
-        f"{finding.name}: {finding.value}{'' if finding.fine else ' (not fine)'}" for finding in report.findings
-    )
+    findings = tuple(f"{finding.name}: {finding.value}{_said(finding)}" for finding in report.findings)
     return record(state, DeviceChecked(utc=sitting.clock.utc(), passed=go_on, findings=findings), sitting)
+
+
+def _said(finding: DeviceFinding) -> str:
+    if finding.fine:
+        return ""
+    return " (warning)" if finding.warning else " (not fine)"

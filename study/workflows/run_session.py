@@ -12,8 +12,10 @@ from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
 from study.session.progress import progress
+from study.session.requests import NoteAsked
 from study.session.state import SessionState, felt
 from study.session.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
+from study.session.void_reasons import busy_sentence, why_too_many
 from study.workflows.after_trial import AfterTrial
 from study.workflows.demonstrate import demonstrate
 from study.workflows.fold_session import fold_session
@@ -102,17 +104,18 @@ def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
 
 
 def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
-    voids = 0
+    voids: tuple[str, ...] = ()
     while True:
         state = write_notes(state, sitting)
         action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
         if isinstance(action, Finish):
+            state = _say_busy(state, sitting)
             closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
             return SessionEnd(record(state, closed, sitting), left="")
         after = _act(state, action, sitting)
-        voids = voids + 1 if after.void else 0
-        if too_many := _too_many(voids, after.void):
-            after = replace(after, leave=after.leave or too_many)
+        voids = (*voids, after.void) if after.void else ()
+        if len(voids) >= VOID_TRIALS_IN_A_ROW:
+            after = replace(after, leave=after.leave or why_too_many(voids))
         pause = _pause_wanted(after, sitting)
         if pause and not after.leave:
             broken = take_pause(after.state, pause, sitting)
@@ -146,9 +149,19 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
 
 
 def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
-    state = write_notes(after.state, sitting)
+    state = _say_busy(write_notes(after.state, sitting), sitting)
     left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
     return SessionEnd(record(state, left, sitting), after.leave, after.fault)
+
+
+def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
+    """At the end of a sitting, to the experimenter: on the screen and in the log."""
+    if not state.sitting.busy_voids:
+        return state
+    sentence = busy_sentence(state.sitting.busy_voids)
+    sitting.display.trouble(sentence)
+    sitting.attendant.note(NoteAsked("program", sentence))
+    return write_notes(state, sitting)
 
 
 def _pause_wanted(after: AfterTrial, sitting: Sitting) -> str:
@@ -172,10 +185,6 @@ def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
     settings, done = before.protocol.practice, practised(before.practice, correct)
     asked = min(settings.of_last, len(done.correct))
     return PracticeResult(practice_passed(settings, done), right_of_last(settings, done), asked)
-
-
-def _too_many(voids: int, reason: str) -> str:
-    return f"{voids} trials in a row were void, the last because {reason}" if voids >= VOID_TRIALS_IN_A_ROW else ""
 
 
 def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:

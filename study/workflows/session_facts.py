@@ -1,7 +1,7 @@
 """What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
 
-from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed
-from study.session.state import SessionState
+from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
+from study.session.void_reasons import computer_too_busy
 from study.workflows.fold_session import FoldedSession
 
 _HASH_DIGITS = 12
@@ -23,7 +23,7 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("finished" if state.closed else "last entry", when(_last_utc(folded))),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
-        ("answers", _answers(state)),
+        ("answers", _answers(folded)),
         *_forms(folded),
         ("seed", str(opened.seed)),
         ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
@@ -44,9 +44,15 @@ def _device(opened: SessionOpened) -> str:
     return f"{device.name}{moves}, {device.sample_rate_hz:g} Hz"
 
 
-def _answers(state: SessionState) -> str:
+def _answers(folded: FoldedSession) -> str:
+    state = folded.state
     void = len(state.trials) - state.answers - (state.presented is not None and state.answered is None)
-    return f"{state.answers}{f', and {void} void presentations' if void else ''}"
+    if not void:
+        return str(state.answers)
+    reasons = [event.reason for event in folded.contents.events if isinstance(event, TrialSpoiled)]
+    busy = sum(map(computer_too_busy, reasons))
+    because = f", {busy} of them because the computer was too busy" if busy else ""
+    return f"{state.answers}, and {void} void presentations{because}"
 
 
 def _last_utc(folded: FoldedSession) -> str:

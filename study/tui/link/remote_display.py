@@ -24,9 +24,11 @@ from study.session.views import (
     Welcome,
 )
 from study.session.views import Reply as Answer
+from study.session.void_reasons import why_screen_silent
 from study.tui.link.from_engine import Ask, Call, Close, Feedback, LookUpdate, Trouble
 from study.tui.link.screen_link import ScreenLink
 from study.tui.link.to_engine import Reply
+from study.workflows.computer_load import load_per_processor
 from study.workflows.display import SignOfLife
 
 GLANCE_S = 0.04
@@ -37,7 +39,6 @@ UNSHOWN_S = 1.0
 SILENT_AFTER_S = 0.5
 """A screen without a heartbeat for so long is suspended, dead or hung: nobody could stop what plays."""
 
-SILENT = Unanswered("the screen gave no sign of life", leave=False, cause=VoidCause.SCREEN_LATE)
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
 
@@ -45,10 +46,13 @@ TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=Void
 class RemoteDisplay:
     """Any method raises KeyboardInterrupt where the screen is gone."""
 
-    def __init__(self, link: ScreenLink, clock: Clock) -> None:
+    def __init__(self, link: ScreenLink, clock: Clock, load: Callable[[], float | None] = load_per_processor) -> None:
         self._link = link
         self._clock = clock
+        self._load = load
         self._number = 0
+        self._late_s = 0.0
+        """How late this program itself woke up at the most, since something was asked."""
 
     def fill_in(self, form: Form) -> FormReply:
         reply: FormReply = self._ask(Call.FILL_IN, form)
@@ -81,14 +85,14 @@ class RemoteDisplay:
                 cut: Unanswered | None = reply.value
                 return cut
             if self._silent():
-                return self._over(number, SILENT)
+                return self._over(number, silent(self._late_s, self._load()))
         self._link.send(Close(number))
         return None
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
         """Shown only where the handle is away from its place, or the wait is long: most trials begin with it there,
         held still for a moment."""
-        number, view = 0, look()
+        number, view, self._late_s = 0, look(), 0.0
         began_s = looked_s = self._clock.now_s()
         while not view.ready:
             away = math.hypot(*view.offset_mm) > view.radius_mm or self._clock.now_s() - began_s > UNSHOWN_S
@@ -101,7 +105,7 @@ class RemoteDisplay:
                 cut: Unanswered | None = reply.value
                 return cut
             if self._silent():
-                return self._over(number, SILENT)
+                return self._over(number, silent(self._late_s, self._load()))
             if self._clock.now_s() - looked_s >= LOOK_EVERY_S:
                 view, looked_s = look(), self._clock.now_s()
                 if number:
@@ -121,7 +125,7 @@ class RemoteDisplay:
                 answer: Answer = reply.value
                 return answer
             if self._silent():
-                return self._over(number, SILENT)
+                return self._over(number, silent(self._late_s, self._load()))
             if self._clock.now_s() > until_s:
                 return self._over(number, TOO_LATE)
 
@@ -171,12 +175,15 @@ class RemoteDisplay:
 
     def _show(self, call: Call, shown: Any) -> int:
         self._number += 1
+        self._late_s = 0.0
         self._link.send(Ask(self._number, call, shown))
         return self._number
 
     def _reply(self, number: int, patience_s: float = GLANCE_S) -> Reply | None:
         """The screen's reply to this; None where none came meanwhile, or one to something that is over."""
+        began_s = self._clock.now_s()
         reply = self._link.reply(patience_s)
+        self._late_s = max(self._late_s, self._clock.now_s() - began_s - patience_s)
         return reply if reply is not None and reply.number == number else None
 
     def _silent(self) -> bool:
@@ -187,3 +194,9 @@ class RemoteDisplay:
         if number:
             self._link.send(Close(number))
         return why
+
+
+def silent(engine_late_s: float, load_per_processor: float | None) -> Unanswered:
+    """What a screen without a heartbeat makes of a trial."""
+    reason = why_screen_silent(engine_late_s, load_per_processor)
+    return Unanswered(reason, leave=False, cause=VoidCause.SCREEN_LATE)

@@ -7,6 +7,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Footer
 
+from study.session.void_reasons import void_for_participant
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
@@ -29,7 +30,7 @@ class AwaitReturnScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         with Card("The last trial does not count"):
-            yield Said(f"It is void: {self._reason}.")
+            yield Said(void_for_participant(self._reason))
             yield Said("All answers before it are saved, and it will come again.", classes="gap")
             yield Said("Take hold of the handle and press Enter when you are ready.", classes="gap strong")
         yield Footer(show_command_palette=False)

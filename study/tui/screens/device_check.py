@@ -19,7 +19,7 @@ class DeviceCheckScreen(Screen[bool]):
     HELP = """\
 # Device check
 
-- Each line is one finding: **ok**, or **LOOK** with what to do about it.
+- Each line is one finding: **ok**, **warn** or **LOOK**, with what to do about it.
 - **c** checks again, after something was plugged in or mended.
 - **Enter** goes on where all is well; **g** goes on although something needs a look.
 - The findings are kept with the data.
@@ -51,8 +51,8 @@ class DeviceCheckScreen(Screen[bool]):
                 yield Said(_line(finding, names), classes="fine" if finding.fine else "look")
                 if finding.advice and not finding.fine:
                     yield Said(finding.advice, classes="advice")
-            if report.fine:
-                yield Said("The device is ready. Press Enter to go on.", classes="gap strong")
+            if report.conclusion:
+                yield Said(f"{report.conclusion} Press Enter to go on.", classes="gap strong")
             else:
                 yield Said(
                     "Something needs a look. Press c to check again, or g to go on all the same.", classes="gap strong"
@@ -60,7 +60,8 @@ class DeviceCheckScreen(Screen[bool]):
         yield Footer(show_command_palette=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        return {"go_on": self._report.fine, "go_on_anyway": not self._report.fine}.get(action, True)
+        usable = bool(self._report.conclusion)
+        return {"go_on": usable, "go_on_anyway": not usable}.get(action, True)
 
     def action_go_on(self) -> None:
         take_off(self, True)
@@ -73,4 +74,4 @@ class DeviceCheckScreen(Screen[bool]):
 
 
 def _line(finding: DeviceFinding, names: int) -> str:
-    return f"{'ok' if finding.fine else 'LOOK':<4}  {finding.name:<{names}}  {finding.value}"
+    return f"{'LOOK' if finding.wrong else finding.verdict:<4}  {finding.name:<{names}}  {finding.value}"

@@ -3,9 +3,19 @@
 import json
 from importlib.metadata import packages_distributions
 
+import numpy as np
 import pytest
 
+from study.cli import doctor
 from study.cli.main import main
+from study.devices.device import Fault, Health
+from study.errors import ExitCode
+from study.session.timing_verdict import judge_lateness, judge_load, lateness_of
+from study.session.views import DeviceFinding, DeviceReport
+from study.workflows.check_timing import Timing
+from study.workflows.examine_setup import Examination
+
+HEALTH = Health(Fault.NONE, 2000, 0, 0, 0, 0, 0, 0.0)
 
 needs_installation = pytest.mark.skipif(
     "hapteq" not in packages_distributions().get("hapteq_launcher", ()),
@@ -24,12 +34,13 @@ def run(capsys):
 
 
 @needs_installation
-def test_where_all_is_fine_it_says_so(run, tmp_path):
+def test_nothing_is_wrong_with_the_simulated_device_however_busy_this_computer_is(run, tmp_path):
     code, out = run("--timing", 0.3, "--data", tmp_path)
     assert code == 0, out
     lines = out.splitlines()
     assert [line for line in lines if not line.startswith(" ")][:3] == ["Installation", "Device", "Timing"]
-    assert lines[-1].startswith("All ")
+    warnings = sum(line.startswith("  WARN ") for line in lines)
+    assert lines[-1].startswith(f"{warnings} of " if warnings else "All ")
     assert "WRONG" not in out
 
 
@@ -37,9 +48,11 @@ def test_where_all_is_fine_it_says_so(run, tmp_path):
 def test_a_program_gets_one_document(run, tmp_path):
     code, out = run("--timing", 0.3, "--data", tmp_path, "--json")
     document = json.loads(out)
-    assert (code, document["fine"]) == (0, True)
+    findings = (*document["installation"], *document["device"]["findings"], *document["timing"]["findings"])
+    assert code == 0
+    assert document["fine"] is all(finding["fine"] for finding in findings)
     assert document["device"]["simulated"]
-    assert {"name", "value", "fine", "advice"} == set(document["installation"][0])
+    assert {"name", "value", "fine", "advice", "warning"} == set(document["installation"][0])
     timing = document["timing"]
     assert (timing["seconds"], timing["health"]["missed_ticks"], timing["health"]["fault"]) == (0.3, 0, "none")
     assert timing["health"]["peak_command_n"] == 0
@@ -73,3 +86,37 @@ def test_an_installation_that_is_not_fine_is_exit_code_1(run, tmp_path):
 
 def test_a_negative_time_is_wrong_use(run):
     assert run("--timing", -1)[0] == 2
+
+
+def examination(timing: Timing) -> Examination:
+    fine = DeviceFinding("hapteq", "0.1.0", fine=True)
+    return Examination((fine,), DeviceReport("a device", timing.findings[0].warning, (fine,)), timing)
+
+
+def measured(late_ms: float, load: float, simulated: bool) -> Timing:
+    lateness = lateness_of(np.full(2000, late_ms / 1000.0), 1000.0)
+    return Timing(2.0, HEALTH, lateness, (judge_lateness(lateness, simulated), judge_load(load)))
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "load", "simulated", "code", "verdicts", "summary"),
+    [
+        (0.2, 0.1, True, ExitCode.DONE, ("fine", "fine"), "All 4 checks are fine."),
+        (0.2, 0.1, False, ExitCode.DONE, ("fine", "fine"), "All 4 checks are fine."),
+        (67.0, 0.1, True, ExitCode.DONE, ("WARN", "fine"), "1 of 4 checks are not fine. 1 of them is a warning."),
+        (67.0, 2.0, True, ExitCode.DONE, ("WARN", "WARN"), "2 of 4 checks are not fine. 2 of them are warnings."),
+        (67.0, 0.1, False, ExitCode.DEVICE, ("WRONG", "fine"), "1 of 4 checks are not fine."),
+        (0.2, 2.0, False, ExitCode.DONE, ("fine", "WARN"), "1 of 4 checks are not fine. 1 of them is a warning."),
+    ],
+)
+def test_verdict_figures_summary_and_exit_code_agree(capsys, late_ms, load, simulated, code, verdicts, summary):
+    looked = examination(measured(late_ms, load, simulated))
+    doctor._say(looked)
+    lines = capsys.readouterr().out.splitlines()
+    timing = [
+        line.split() for line in lines[lines.index("Timing") + 1 : -1] if line.startswith("  ") and line[2] != " "
+    ]
+    assert tuple(words[0] for words in timing) == verdicts
+    assert (looked.exit_code, lines[-1]) == (code, summary)
+    assert not any(line.lstrip().startswith("fine") and "too late" in line for line in lines)
+    assert doctor._document(looked)["fine"] is (summary[:3] == "All")

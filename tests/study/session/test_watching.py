@@ -26,6 +26,7 @@ from study.session.events import (
 )
 from study.session.live import Live
 from study.session.machine import Finish, Rest, next_action
+from study.session.void_reasons import SCREEN_LATE
 from study.session.watched import Watched, begin_watching, follow
 from study.session.watching import Beside, watch_view
 
@@ -491,3 +492,16 @@ def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):
     assert [alarm.kind for alarm in view.alarms] == ["device"]
     noted = story.tell(NoteTaken(at(-3597.0), "participant", "numb", adverse=True)).view()
     assert "adverse" in [alarm.kind for alarm in noted.alarms]
+
+
+def test_a_busy_computer_is_an_alarm_from_the_first_void_trial_on(story):
+    story.answer(True).spoil("the handle was let go")
+    assert story.view().alarms == ()
+    (alarm,) = story.spoil(SCREEN_LATE).view().alarms
+    assert (alarm.kind, alarm.urgent) == ("busy", True)
+    assert alarm.sentence == (
+        "The computer is too busy: 1 of the last 3 presentations was void because of it. Close other programs."
+    )
+    for _ in range(10):
+        story.answer(True)
+    assert "busy" not in [alarm.kind for alarm in story.view().alarms]

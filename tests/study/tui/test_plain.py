@@ -14,6 +14,7 @@ from study.session.views import (
     Unanswered,
     Welcome,
 )
+from study.session.void_reasons import SCREEN_LATE
 from study.tui.answer_keys import AnswerKeys
 from study.tui.direction_picture import drawing, sentence
 from study.tui.trial_replies import REPEAT, TIME_OVER
@@ -114,7 +115,7 @@ def test_practice_on_a_simulation_is_called_practice(typed):
 def test_after_a_void_trial_nothing_is_played_until_somebody_is_there(typed):
     typed.type("")
     typed.display.await_return("the stimulus was held too long")
-    assert "The last trial is void: the stimulus was held too long." in typed.out.getvalue()
+    assert "The last trial does not count. It is void: the stimulus was held too long." in typed.out.getvalue()
     assert "Press Enter when you are ready" in " ".join(typed.out.getvalue().split())
 
 
@@ -211,3 +212,11 @@ def test_the_picture_shows_a_solid_and_a_dashed_segment_that_lean_opposite_ways(
     top = next(line for line in lines if line.strip())
     assert top[:16].strip() and top.index(top[:16].strip()[0]) < 8
     assert lines[-1].split() == ["1", "2"]
+
+
+def test_a_trial_that_a_busy_computer_spoiled_is_not_the_participants_fault(typed):
+    typed.type("")
+    typed.display.await_return(SCREEN_LATE)
+    said = typed.out.getvalue()
+    assert "The last trial does not count. The computer was too busy for a moment" in " ".join(said.split())
+    assert "This was not your fault, and the trial is repeated." in " ".join(said.split())

@@ -120,3 +120,12 @@ def test_the_device_check_can_be_left(typed):
     typed.type("q")
     with pytest.raises(KeyboardInterrupt):
         typed.display.device_checked(report(fine=True))
+
+
+def test_a_warning_is_said_and_hinders_nothing(typed):
+    typed.type("")
+    late = DeviceFinding("Lateness", "too late for a real device", fine=False, advice="Close others.", warning=True)
+    assert typed.display.device_checked(DeviceReport("omega.3", simulated=True, findings=(late,)))
+    lines = typed.out.getvalue().splitlines()
+    assert "warn: Lateness, too late for a real device. Close others." in lines
+    assert "The device is ready; mind the warning above." in lines

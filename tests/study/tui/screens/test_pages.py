@@ -103,6 +103,16 @@ def test_the_end_says_what_is_saved_and_why_it_ended(read):
 
 def test_a_void_trial_is_explained(read):
     assert "It is void: the handle was gone." in read(AwaitReturnScreen("the handle was gone"))[1]
+    busy = read(AwaitReturnScreen("12.0 % of the 1 kHz ticks were missed"))[1]
+    assert "The computer was too busy for a moment" in busy and "This was not your fault" in busy
+
+
+def test_a_device_check_with_a_warning_goes_on_by_enter_and_shows_what_to_do(read):
+    late = DeviceFinding("Lateness", "too late for a real device", fine=False, advice="Close others.", warning=True)
+    heard, words = read(DeviceCheckScreen(DeviceReport("d", True, (FINE, late))), "g", "enter")
+    assert heard == [True]
+    assert "warn Lateness too late for a real device" in words and "Close others." in words
+    assert "The device is ready; mind the warning above. Press Enter to go on." in words
 
 
 def test_a_device_that_is_fine_goes_on_by_enter(read):
