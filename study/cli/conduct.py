@@ -13,6 +13,7 @@ from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.errors import WrongUseError
 from study.store.archive import check_subject, find_session
+from study.store.privacy import left_open
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
@@ -54,6 +55,8 @@ def begin(
 
 def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS) -> None:
     folder = find_session(session, data)
+    if still_open := left_open(folder.path.parent):
+        typer.echo(f"Note: {still_open}", err=True)
     state = fold_session(folder).state
     opened = state.opened
     clock: Clock = RealClock() if opened.observer is None else VirtualClock.not_before(state.sitting.last.utc)

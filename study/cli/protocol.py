@@ -56,9 +56,10 @@ def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     from importlib.metadata import version
 
     from study.devices.clock import RealClock
+    from study.store.privacy import make_folder
     from study.store.protocol_files import lock_protocol, read_protocol
 
     file = read_protocol(name, data)
-    data.mkdir(parents=True, exist_ok=True)
+    make_folder(data, private=True)
     path = lock_protocol(file, data, RealClock().utc(), version("hapteq"))
     typer.echo(str(path))

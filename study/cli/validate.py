@@ -17,11 +17,15 @@ def validate(
 
     found = list(validate_files(files))
     if as_json:
-        rows = [{"file": str(v.path), "kind": v.kind, "problems": list(v.problems)} for v in found]
+        rows = [
+            {"file": str(v.path), "kind": v.kind, "problems": list(v.problems), "notes": list(v.notes)} for v in found
+        ]
         typer.echo(json.dumps(rows, indent=2))
     for validation in [] if as_json else found:
         typer.echo(f"{validation.path}: {validation.kind}: {'not valid' if validation.problems else 'valid'}")
         for problem in validation.problems:
             typer.echo(f"  {problem}")
+        for note in validation.notes:
+            typer.echo(f"  Note: {note}")
     if any(v.problems for v in found):
         raise typer.Exit(ExitCode.ERROR)

@@ -9,6 +9,7 @@ from study.errors import StudyError, WrongUseError
 from study.session.participant_codes import ALLOWED, is_code
 from study.store.atomic_write import sync_folder
 from study.store.event_log import LOG_NAME
+from study.store.privacy import PRIVATE_FOLDER, close_data_folder, make_folder
 
 FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
 TOMBSTONE_NAME = "withdrawn.json"
@@ -79,15 +80,16 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
     check_subject(subject)
     try:
         made = not data.exists()
-        data.mkdir(parents=True, exist_ok=True)
+        make_folder(data, private=True)
+        close_data_folder(data)
         for _ in range(1000):
             taken = [folder_number(f.name) for f in session_folders(data) if f.subject == subject]
             path = data / f"{subject}_{max(taken, default=0) + 1:03d}"
             try:
-                path.mkdir()
+                path.mkdir(mode=PRIVATE_FOLDER)
             except FileExistsError:
                 continue
-            (path / "recordings").mkdir()
+            (path / "recordings").mkdir(mode=PRIVATE_FOLDER)
             for folder in (path, data):
                 sync_folder(folder)
             if made:

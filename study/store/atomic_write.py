@@ -6,6 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from study.store.file_errors import AlreadyThereError, CannotWriteError
+from study.store.privacy import file_mode
 
 
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
@@ -14,7 +15,8 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> 
     try:
         if path.exists() and not overwrite:
             raise AlreadyThereError(path)
-        with part.open("xb") as file:
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+        with os.fdopen(os.open(part, flags, file_mode(path.parent)), "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

@@ -10,6 +10,7 @@ from pathlib import Path
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
 from study.store.atomic_write import sync_folder
+from study.store.privacy import PRIVATE_FILE
 from study.store.regular_file import DOCUMENT_BYTES, open_regular, read_regular
 
 LOG_NAME = "events.jsonl"
@@ -25,7 +26,7 @@ class EventLog:
     @classmethod
     def create(cls, path: Path) -> "EventLog":
         """Raises FileExistsError rather than touch an existing log."""
-        descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o644)
+        descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
         sync_folder(path.parent)
         _own(descriptor, path)
         return cls(path, descriptor)

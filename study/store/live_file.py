@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from study.session.fact_types import utc_time
 from study.session.live import Activity, Live
+from study.store.privacy import write_private
 from study.store.regular_file import read_regular
 
 LIVE_NAME = "live.json"
@@ -29,7 +30,7 @@ def write_live(folder: Path, live: Live) -> None:
     part = folder / f".{LIVE_NAME}.part"
     # No fsync: only the present counts, and a disk that waits would hold the session up.
     with suppress(OSError):
-        part.write_text(text + "\n", "utf-8")
+        write_private(part, f"{text}\n".encode())
         part.replace(folder / LIVE_NAME)
 
 

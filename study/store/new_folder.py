@@ -11,6 +11,7 @@ from pathlib import Path
 from study.errors import StudyError
 from study.store.atomic_write import sync_folder
 from study.store.file_errors import CannotWriteError
+from study.store.privacy import make_folder
 
 
 def require_new_folder(out: Path) -> None:
@@ -47,7 +48,7 @@ def new_folder(out: Path) -> Iterator[Path]:
     require_new_folder(out)
     part = out.absolute().with_name(f".{out.absolute().name}.{secrets.token_hex(4)}.part")
     try:
-        part.mkdir()
+        make_folder(part)
     except OSError as problem:
         raise CannotWriteError(out, problem) from problem
     try:

@@ -17,6 +17,7 @@ from typing import Any, get_args
 
 from study.errors import StudyError
 from study.session.requests import NoteAsked, PauseAsked, Request, StopAsked, Who
+from study.store.privacy import PRIVATE_FOLDER, write_private
 from study.store.real_folder import is_real_folder
 
 REQUESTS_NAME = "requests"
@@ -52,7 +53,7 @@ class RequestInbox:
         try:
             self._make_folder()
             # No fsync: a request is for now, and nobody wants it after a power cut.
-            part.write_text(json.dumps(document) + "\n", "utf-8")
+            write_private(part, f"{json.dumps(document)}\n".encode())
             part.replace(self._folder / name)
         except OSError as problem:
             raise StudyError(
@@ -98,7 +99,7 @@ class RequestInbox:
 
     def _make_folder(self) -> None:
         """Raises OSError; also where it is a link: what that leads to is not the session's, and would be removed."""
-        self._folder.mkdir(exist_ok=True)
+        self._folder.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
         if not is_real_folder(self._folder):
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
 

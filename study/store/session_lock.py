@@ -7,6 +7,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from study.errors import StudyError
+from study.store.privacy import PRIVATE_FILE
 
 LOCK_NAME = "session.lock"
 
@@ -14,7 +15,7 @@ LOCK_NAME = "session.lock"
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Hold the session's lock. Raises StudyError at once where somebody else does."""
-    lock = FileLock(folder / LOCK_NAME)
+    lock = FileLock(folder / LOCK_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=0)
     except Timeout as held:

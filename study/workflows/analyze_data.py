@@ -16,6 +16,7 @@ from study.devices.clock import RealClock
 from study.errors import StudyError
 from study.store.file_errors import CannotWriteError
 from study.store.json_document import write_json
+from study.store.privacy import close_to_others, make_folder
 from study.store.provenance import Provenance, gather_provenance
 from study.store.recording_file import read_recording
 from study.store.text_file import write_text
@@ -49,6 +50,7 @@ def analyze_data(
         parents=parents,
     )
     pictures = study_pictures(analysis, shapes)
+    _make_private(out, data)
     note_written(data, out)
     _write(out, analysis, pictures, shapes, provenance, collected)
     return WrittenAnalysis(
@@ -106,6 +108,18 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
     return rotation
 
 
+def _make_private(out: Path, data: Path) -> None:
+    """Beside the sessions; a folder elsewhere has the rights that its place gives it. Raises CannotWriteError."""
+    if not out.resolve().is_relative_to(data.resolve()):
+        return
+    try:
+        make_folder(out, private=True)
+    except OSError as problem:
+        raise CannotWriteError(out, problem) from problem
+    if out.resolve() != data.resolve():
+        close_to_others(out, inside=True)
+
+
 def _write(
     out: Path,
     analysis: StudyAnalysis,
@@ -116,7 +130,7 @@ def _write(
 ) -> None:
     figures = out / "figures"
     try:
-        figures.mkdir(parents=True, exist_ok=True)
+        make_folder(figures)
         for stale in written_by_analysis(out):
             if stale.parent == figures or stale.name == DETECTION_NAME:
                 stale.unlink()

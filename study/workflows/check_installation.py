@@ -17,6 +17,7 @@ from packaging.specifiers import SpecifierSet
 
 import study
 from study.session.views import DeviceFinding
+from study.store.privacy import warning
 
 HAPTEQ = "hapteq"
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
@@ -45,6 +46,7 @@ def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFin
         *(check_name(name, owners, home) for name in IMPORT_NAMES),
         *check_terminal(terminal),
         check_folder(data),
+        check_privacy(data),
     )
 
 
@@ -132,6 +134,16 @@ def check_folder(data: Path) -> DeviceFinding:
     fine = free_bytes >= ROOM_BYTES
     value = f"{data}: can be written, {free_bytes / 1e9:.1f} GB free"
     return DeviceFinding(name, value, fine, "" if fine else "Make room, or choose another folder with --data.")
+
+
+def check_privacy(data: Path) -> DeviceFinding:
+    """Whether others on this computer can read what is recorded."""
+    name = "Data rights"
+    if not data.exists():
+        return DeviceFinding(name, f"{data}: not there yet; it will be for this account alone", fine=True)
+    said = warning(data)
+    value = f"{data}: open to other accounts" if said else f"{data}: for this account alone"
+    return DeviceFinding(name, value, not said, said)
 
 
 def _always(requirement: Requirement) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 from analysis.figures.picture import Picture, picture_svg
 from study.store.atomic_write import write_atomically
 from study.store.file_errors import CannotWriteError
+from study.store.privacy import make_folder
 from study.store.text_file import write_text
 
 FIGURE_DPI = 150
@@ -15,7 +16,7 @@ FIGURE_DPI = 150
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
     """Into `folder`, which is made. Folded pictures are too many for slides: SVG only. Raises CannotWriteError."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
     for picture in pictures:

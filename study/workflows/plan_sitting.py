@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.store.archive import check_subject
+from study.store.privacy import left_open
 from study.store.protocol_files import read_study_protocol
 from study.workflows.equalize_stimuli import check_playable
 from study.workflows.open_session import SessionPlan, fresh_seed
@@ -34,8 +35,8 @@ def plan_sitting(
     )
     check_playable(plan.protocol, model)
     check_code(data, plan.subject, simulated=observer is not None)
-    notes = tuple(
+    unfinished_before = (
         f"{unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it."
         for unfinished in unfinished_sessions(data, plan.subject, source.protocol.name)
     )
-    return SittingPlan(plan, notes)
+    return SittingPlan(plan, (*unfinished_before, *filter(None, [left_open(data)])))

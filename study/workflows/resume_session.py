@@ -18,6 +18,7 @@ from study.session.stimulus import direction_vector
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend
 from study.store.live_file import remove_live
+from study.store.privacy import close_data_folder, close_to_others
 from study.store.provenance import versions
 from study.store.request_inbox import RequestInbox
 from study.store.session_lock import locked
@@ -29,6 +30,8 @@ from study.workflows.open_session import OpenedSession, device_facts
 @contextmanager
 def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
     """An existing session, mended and locked as long as the context lasts."""
+    close_data_folder(folder.path.parent)
+    close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
     with locked(folder.path):
         log = EventLog.reopen(folder.log)
         # Yesterday's stop must not end today's sitting; from now on somebody hears. Nor does yesterday's live state

@@ -2,11 +2,13 @@
 
 import json
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from study.errors import StudyError
+from study.store.archive import FOLDER
 from study.store.file_errors import UnusableFileError
+from study.store.privacy import warning
 from study.workflows.file_content import FileContent, open_content
 from study.workflows.recognisers import RECOGNISERS, Recogniser
 from study.workflows.session_recognisers import SESSION_RECOGNISERS
@@ -25,10 +27,19 @@ class Validation:
     """In words: "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""
     problems: tuple[str, ...]
     """One sentence each; empty = the file is sound."""
+    notes: tuple[str, ...] = ()
+    """Worth knowing of a sound file too: that others can read a session's folder."""
 
 
 def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
     """Never raises for what is in a file or for one that is not there."""
+    found = _validated(path, recognisers)
+    folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
+    said = (warning(folder) for folder in folders if folder.is_dir())
+    return replace(found, notes=tuple(filter(None, said)))
+
+
+def _validated(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     try:
         content = open_content(path)
         for recognise in recognisers:

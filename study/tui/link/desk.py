@@ -11,6 +11,7 @@ from study.devices.device import Device
 from study.errors import WrongUseError
 from study.session.archive_views import HomeView
 from study.store.archive import SessionFolder, find_session
+from study.store.privacy import left_open
 from study.tui.link.from_engine import (
     Diagnosis,
     Finished,
@@ -103,6 +104,8 @@ class Desk:
                 f"It goes on by itself with: hapteq resume {folder.path}",
                 saved="Nothing was changed.",
             )
+        if still_open := left_open(folder.path.parent):
+            self._link.send(Trouble(still_open))
         self._sit(lambda participant: conduct_resumed(folder, command.device, participant))
 
     def _sit(self, conduct: Callable[[Participant], Conducted]) -> None:

@@ -49,6 +49,7 @@ def test_a_file_appears_under_its_name_alone(tmp_path):
 
 
 def test_a_file_gets_the_usual_rights(tmp_path):
+    tmp_path.chmod(0o755)  # in a private folder, a file is private too: test_privacy.py
     write_atomically(tmp_path / "a.txt", b"one")
     (tmp_path / "b.txt").write_bytes(b"one")
     assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "b.txt").stat().st_mode

@@ -175,7 +175,7 @@ def test_a_full_disk_is_found(tmp_path, monkeypatch):
 def test_all_of_it_is_checked(tmp_path):
     names = [finding.name for finding in check_installation(tmp_path, GOOD)]
     assert names[0] == "hapteq"
-    assert names[-8:] == [
+    assert names[-9:] == [
         "import study", "import analysis", "import equalizer", "import protocols",
-        "Characters", "Terminal size", "Colours", "Data folder",
+        "Characters", "Terminal size", "Colours", "Data folder", "Data rights",
     ]  # fmt: skip
