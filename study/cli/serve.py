@@ -2,6 +2,7 @@
 
 import sys
 from importlib.util import find_spec
+from ipaddress import ip_address
 from typing import Annotated, Any
 
 import typer
@@ -12,7 +13,6 @@ from study.tui.answer_keys import parse_keys
 PASSES_OPTIONS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 """What serve does not know are options of `hapteq study`."""
 
-LOCAL = ("localhost", "127.0.0.1")
 EVERYWHERE = ("0.0.0.0", "::", "")
 """Addresses to listen on that no browser can open."""
 
@@ -23,8 +23,18 @@ def serve(
     host: Annotated[
         str, typer.Option(help="This machine's name or address as others reach it; localhost keeps it to itself.")
     ] = "localhost",
+    open_to_network: Annotated[
+        bool,
+        typer.Option(
+            "--open-to-network",
+            help="Needed for any --host but localhost. It opens the port to every machine that reaches this address: "
+            "one that has the page's address, token included, can take the study, drive the device within the caps, "
+            "and read participants' codes and results. Nothing is encrypted: what is typed and shown, and the token, "
+            "can be read on the way.",
+        ),
+    ] = False,
 ) -> None:
-    """Show the study in a browser; all options of `hapteq study` may follow."""
+    """Show the study in a browser; all options of `hapteq study` may follow. The address holds a secret token."""
     command = [sys.executable, "-P", "-m", "study", "study", *_study_options(context)]
     if host in EVERYWHERE:
         raise WrongUseError(
@@ -32,19 +42,30 @@ def serve(
             f"'{host}' means every address of this machine.",
             "Give the one by which the other machine reaches this one, such as --host 192.168.1.20.",
         )
+    if not open_to_network and not _is_this_machine(host):
+        raise WrongUseError(
+            "Other machines would reach this page",
+            f"--host {host} listens beyond this computer, and what is sent there is not encrypted.",
+            "Leave --host out to keep it here, or add --open-to-network if that is wanted (hapteq serve --help says "
+            "what it opens).",
+            saved="Nothing was started.",
+        )
     if find_spec("textual_serve") is None:
         raise StudyError(
             "The browser needs one more package",
             "textual-serve is not installed.",
             f"Install it: {sys.executable} -m pip install textual-serve",
         )
-    if host not in LOCAL:
-        typer.echo(
-            f"Anybody who reaches {host}:{port} can drive the device and see the participants' codes: there is no "
-            "password. Use a network that you trust.",
-            err=True,
-        )
     _serve(command, host, port)
+
+
+def _is_this_machine(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _serve(command: list[str], host: str, port: int) -> None:

@@ -1,13 +1,19 @@
 """The screen in a browser, by textual-serve: for one window at a time, and for no page but our own.
 
-A browser lets any page that it shows open a connection to this machine, so "only localhost" alone would let any
-website drive the device. The connection's origin tells whose page it is.
+A browser lets any page that it shows open a connection to this machine, and so can any account of it: "only
+localhost" alone would let any website, and any user, drive the device. The address holds a random token, without which
+nothing is answered; the connection's origin tells whose page it is; and headers keep other pages from framing it.
 """
 
 import asyncio
+import base64
+import hashlib
+import hmac
 import logging
+import re
+import secrets
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 
 from aiohttp import web
 from rich.console import Console
@@ -17,24 +23,31 @@ RELOAD_S = 10.0
 """A page that is loaded again waits so long for the sitting of the old one to end."""
 
 THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
+TOKEN_BYTES = 32
 
 
 class ScreenServer(Server):
     """Starts `command` for whoever opens the page. A closed page ends it, as a closed terminal would."""
 
     def __init__(self, command: Sequence[str], host: str, port: int, say: Callable[[str], None]) -> None:
-        super().__init__(shlex.join(command), host=host, port=port, title="hapteq study")
+        super().__init__(
+            shlex.join(command), host=host, port=port, title="hapteq study", public_url=_address(_shown(host), port)
+        )
         self.console = Console(stderr=True)
         self._say = say
         self._origins = origins(host, port)
+        self._token = secrets.token_urlsafe(TOKEN_BYTES)
+        self._headers = self._safe_headers()
         self._seat = asyncio.Lock()
 
     def initialize_logging(self) -> None:
-        """Each request in a line of its own would hide what must be read."""
+        """Each request in a line of its own would hide what must be read, and show the token."""
         logging.basicConfig(level=logging.WARNING, format="%(message)s")
+        logging.getLogger("aiohttp.access").disabled = True
 
     async def on_startup(self, app: web.Application) -> None:
-        self._say(f"The study is at {self.public_url} for one window at a time. Ctrl-C ends it.")
+        self._say(f"The study is at {self.public_url}/{self._token}/ for one window at a time. Ctrl-C ends it.")
+        self._say("Keep this address to yourself: whoever has it can take the study. It is a new one each time.")
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
         if request.headers.get("Origin") not in self._origins:
@@ -49,8 +62,72 @@ class ScreenServer(Server):
         finally:
             self._seat.release()
 
+    async def _make_app(self) -> web.Application:
+        """Page, connection, downloads and what the page loads, all below the token."""
+        app = web.Application(middlewares=[self._require_token])
+        app.on_response_prepare.append(self._add_headers)
+        app.add_subapp(f"/{self._token}", await super()._make_app())
+        return app
+
+    @web.middleware
+    async def _require_token(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        """Also of an address that leads nowhere, so that nothing is told apart without the token."""
+        given = request.path.split("/")[1]
+        if not hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode()):
+            raise web.HTTPNotFound(text="The study is at the address that hapteq serve said, to its last letter.")
+        if request.path == f"/{self._token}":
+            raise web.HTTPFound(f"/{self._token}/")
+        return await handler(request)
+
+    async def _add_headers(self, request: web.Request, response: web.StreamResponse) -> None:
+        response.headers.update(self._headers)
+
+    def _safe_headers(self) -> dict[str, str]:
+        """The page's own scripts are known by their hashes; nothing is loaded from elsewhere, fonts included."""
+        page = (self.templates_path / "app_index.html").read_text("utf-8")
+        scripts = " ".join(f"'sha256-{_sha256(script)}'" for script in _inline_scripts(page))
+        own = " ".join(sorted(origin for origin in self._origins if "[" not in origin))  # a policy knows no IPv6
+        policy = (
+            "default-src 'none'",
+            f"script-src 'self' {own} 'unsafe-hashes' {scripts}",
+            f"style-src 'self' {own} 'unsafe-inline'",  # the terminal in the page writes styles as it goes
+            f"img-src 'self' {own} data:",
+            f"font-src 'self' {own} data:",
+            f"connect-src 'self' {own} {own.replace('http:', 'ws:')}",
+            "base-uri 'none'",
+            "form-action 'none'",
+            "frame-ancestors 'none'",
+        )
+        return {
+            "Content-Security-Policy": "; ".join(policy),
+            "X-Frame-Options": "DENY",
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            "Cache-Control": "no-store",
+        }
+
 
 def origins(host: str, port: int) -> frozenset[str]:
     """What a browser calls our page."""
-    names = THIS_MACHINE if host in THIS_MACHINE else (host,)
-    return frozenset(f"http://{name}" if port == 80 else f"http://{name}:{port}" for name in names)
+    names = THIS_MACHINE if _shown(host) in THIS_MACHINE else (_shown(host),)
+    return frozenset(_address(name, port) for name in names)
+
+
+def _shown(host: str) -> str:
+    """As an address holds it."""
+    return f"[{host}]" if ":" in host else host
+
+
+def _address(name: str, port: int) -> str:
+    return f"http://{name}" if port == 80 else f"http://{name}:{port}"
+
+
+def _inline_scripts(page: str) -> Iterator[str]:
+    yield from re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    yield from dict.fromkeys(re.findall(r'\bon[a-z]+="([^"]*)"', page, re.IGNORECASE))
+
+
+def _sha256(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
