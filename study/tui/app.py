@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from textual import on
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
+from textual.events import Event
 from textual.screen import Screen
 
 from study.errors import ExitCode
@@ -22,6 +23,7 @@ from study.tui.departure import leave_with_the_terminal
 from study.tui.engine_line import EngineLine, EngineSaid
 from study.tui.everywhere import EVERYWHERE
 from study.tui.key_names import key_name
+from study.tui.keys_in_order import KeysInOrder
 from study.tui.link.from_engine import Failed, Finished
 from study.tui.link.to_engine import AskBeside, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
 from study.tui.load_screens import load_screens
@@ -29,8 +31,6 @@ from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.sitting_screens import SittingScreens
 from study.tui.themes import NEXT, register_themes
 from study.tui.watching import Watching
-
-OPENING = "Preparing the device: some ten seconds the first time."
 
 
 class HapteqApp(App[None]):
@@ -60,9 +60,13 @@ class HapteqApp(App[None]):
         self._sitting: SittingScreens | None = None
         self._letting_go: OutcomeScreen | None = None
         self._watching = Watching(self)
+        self._keys = KeysInOrder(self, super().on_event)
         if "TEXTUAL_ANIMATIONS" not in os.environ:
             self.animation_level = "none"
         register_themes(self)
+
+    async def on_event(self, event: Event) -> None:
+        await self._keys.take(event)
 
     def get_key_display(self, binding: Binding) -> str:
         return key_name(super().get_key_display(binding))
@@ -94,8 +98,8 @@ class HapteqApp(App[None]):
         self._direct = self._direct and first is self._start.first
         self.outcome = self._letting_go = None
         self._archive.clear()
-        self._sitting = SittingScreens(self, self._engine.send, self._start.keys)
-        await self._sitting.prepare(OPENING)
+        self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.forget_earlier)
+        await self._sitting.prepare()
         self._engine.send(first)
 
     async def on_engine_said(self, event: EngineSaid) -> None:
@@ -139,6 +143,7 @@ class HapteqApp(App[None]):
 
         panel = OutcomeScreen(outcome)
         self.push_screen(panel, decided)
+        self._keys.forget_earlier()
         return panel
 
     def _leave(self, code: ExitCode) -> None:
@@ -175,7 +180,7 @@ class HapteqApp(App[None]):
 
     def action_watch(self) -> None:
         if self._sitting is not None and self._sitting.path:
-            self._watching.open(self._sitting.path, lambda request: self._engine.send(Relay(request)))
+            self._watching.open_here(self._sitting.path, lambda request: self._engine.send(Relay(request)))
 
     def action_pause(self) -> None:
         if self._sitting is not None:
@@ -194,8 +199,7 @@ class HapteqApp(App[None]):
             self.notify("Noted: it is written at the next pause or trial.", markup=False)
 
     def on_pause_screen_note_written(self, event: Any) -> None:
-        note: NoteAsked = event.note
-        self._engine.send(Relay(note))
+        self._engine.send(Relay(event.note))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Of a session only while there is one."""
@@ -237,7 +241,7 @@ class HapteqApp(App[None]):
         await self._archive.diagnose(wanted)
 
     def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
-        self._watching.open(wanted.path, lambda request: self._engine.send(AskBeside(wanted.path, request)))
+        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskBeside(wanted.path, request)))
 
     def on_demo_screen_pause_wanted(self) -> None:
         self.action_pause()

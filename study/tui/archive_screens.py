@@ -117,6 +117,7 @@ class ArchiveScreens:
             self._app.pop_screen()
 
     async def _show_session(self, view: SessionView) -> None:
+        from study.tui.screens.confirm_view import confirm_view
         from study.tui.screens.session import SessionScreen
 
         if (
@@ -126,8 +127,13 @@ class ArchiveScreens:
         ):
             self._session.show(view)
             return
-        self._session, self._session_path = SessionScreen(view), view.line.path
-        await self._app.push_screen(self._session)
+        screen = SessionScreen(view)
+        self._session, self._session_path = screen, view.line.path
+        if view.line.standing == "running" and view.line.observer is None:
+            # Its staircases and its log tell a participant who looks on what was right and wrong.
+            confirm_view(self._app, view.line.name, lambda: self._app.push_screen(screen))
+            return
+        await self._app.push_screen(screen)
 
     async def _show_diagnosis(self, view: DiagnosisView) -> None:
         from study.tui.screens.diagnosis import DiagnosisScreen

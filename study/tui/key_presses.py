@@ -1,5 +1,6 @@
 """Which key events are presses of their own. A terminal tells no releases: a held key is a row of equal events."""
 
+import sys
 import time
 
 from textual.events import Key
@@ -27,7 +28,8 @@ class KeyPresses:
 
 
 def arrival_s(event: Key) -> float:
-    """When the key was read, on the clock of `time.monotonic`: Textual stamps it in the thread that reads keys."""
+    """When the key was read, on the clock of `time.monotonic`: Textual stamps it in the thread that reads keys. A key
+    that was read long before it is handled, because the program was held up, keeps its time: it was meant for then."""
     now_s = time.monotonic()
     # On Windows the stamp is another clock's.
-    return event.time if 0.0 <= now_s - event.time < 1.0 else now_s
+    return event.time if sys.platform != "win32" and event.time <= now_s else now_s

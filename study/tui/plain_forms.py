@@ -1,5 +1,6 @@
 """Line mode: forms and the device check, one question after the other."""
 
+from study.session.form_entry import CHECKED
 from study.session.form_views import Form, FormField, FormReply
 from study.session.views import DeviceReport
 from study.tui.conversation import Conversation, Line, printable, shown
@@ -12,16 +13,34 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
     talk.say("", form.title, *filter(None, (form.introduction, _version(form))))
     talk.say(f"{_count(len(form.fields))} Type the answer and Enter; {BACK} goes one question back, q leaves.")
     answers: dict[str, str] = {}
-    at = 0
-    while at < len(form.fields):
+    at, changed = 0, False
+    while True:
+        if at == len(form.fields):
+            if not changed or _changes_confirmed(form, answers, talk):
+                return FormReply(answers)
+            at, changed = 0, False
         field = form.fields[at]
         answer = _ask(field, f"{at + 1} of {len(form.fields)}", talk)
         if answer is None:
             at = max(0, at - 1)
             continue
+        changed = changed or (form.kind in CHECKED and answers.get(field.key, answer) != answer)
         answers[field.key] = answer
         at += 1
-    return FormReply(answers)
+
+
+def _changes_confirmed(form: Form, answers: dict[str, str], talk: Conversation) -> bool:
+    """False: they are asked again from the first."""
+    talk.forget()
+    told = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
+    talk.say("", f"You changed an answer. Your answers are now: {told}.")
+    while True:
+        talk.prompt(f"y if that is right, {BACK} to answer again: ")
+        line = talk.answer_or_leave()
+        if line.word in ("y", "yes", BACK):
+            return line.word != BACK
+        talk.forget()
+        talk.say(f"{shown(line)} is no answer.")
 
 
 def device_checked(report: DeviceReport, talk: Conversation) -> bool:
@@ -36,6 +55,7 @@ def device_checked(report: DeviceReport, talk: Conversation) -> bool:
         line = talk.answer_or_leave()
         if line.word in ("", "c"):
             return not line.word
+        talk.forget()
         talk.say(f"{shown(line)} is no answer.")
 
 
@@ -55,6 +75,7 @@ def _ask(field: FormField, place: str, talk: Conversation) -> str | None:
             raise KeyboardInterrupt
         if line.word == BACK:
             return None
+        talk.forget()  # typed ahead for the questions after this one
         talk.say(_refusal(field, line, numbered))
 
 

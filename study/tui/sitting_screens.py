@@ -19,18 +19,27 @@ from study.tui.screens.preparing import PreparingScreen
 if TYPE_CHECKING:
     from study.tui.screens.trial import TrialScreen
 
+OPENING = "Preparing the device: some ten seconds the first time."
 TROUBLE_FOR_S = 8.0
 
 
 class SittingScreens:
     """One for a sitting. Every reply carries the number of what it replies to, and each is sent once."""
 
-    def __init__(self, app: App[Any], send: Callable[[ToEngine], None], keys: AnswerKeys) -> None:
+    def __init__(
+        self,
+        app: App[Any],
+        send: Callable[[ToEngine], None],
+        keys: AnswerKeys,
+        forget_earlier: Callable[[], None],
+    ) -> None:
+        """forget_earlier: lets keys that were read before now answer nothing."""
         self.path = ""
         """Of the session, once it is opened."""
         self._app = app
         self._send = send
         self._keys = keys
+        self._forget_earlier = forget_earlier
         self._number = 0
         """Of what is asked now; 0 while nothing is."""
         self._shown: Screen[Any] | None = None
@@ -59,7 +68,7 @@ class SittingScreens:
         """The trial's screen says so; it disarms itself."""
         self._reply(reply)
 
-    async def prepare(self, sentence: str) -> None:
+    async def prepare(self, sentence: str = OPENING) -> None:
         """While nothing is asked, at the beginning and at the end."""
         self._number, self._shown, self._trial = 0, None, None
         if self._preparing is None:
@@ -85,6 +94,8 @@ class SittingScreens:
 
         self._shown = screen_for(ask, self._keys)
         await self._app.push_screen(self._shown, partial(self._dismissed, ask.number))
+        # Typed ahead, before anybody can have read what is asked here.
+        self._forget_earlier()
 
     async def _trial_screen(self) -> TrialScreen:
         from study.tui.screens.trial import TrialScreen

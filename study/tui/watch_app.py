@@ -7,10 +7,12 @@ from typing import ClassVar
 
 from textual.app import App
 from textual.binding import Binding, BindingType
+from textual.events import Event
 
 from study.session.requests import Request
 from study.tui.departure import leave_with_the_terminal
 from study.tui.key_names import key_name
+from study.tui.keys_in_order import KeysInOrder
 from study.tui.screens.watch import WatchScreen
 from study.tui.themes import DARK, NEXT, register_themes
 from study.tui.watch_source import WatchSource
@@ -25,8 +27,12 @@ class WatchApp(App[None]):
         super().__init__()
         self._source = source
         self._ask = ask
+        self._keys = KeysInOrder(self, super().on_event)
         self.animation_level = "none"
         register_themes(self, theme)
+
+    async def on_event(self, event: Event) -> None:
+        await self._keys.take(event)
 
     def get_key_display(self, binding: Binding) -> str:
         return key_name(super().get_key_display(binding))

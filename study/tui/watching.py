@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from textual.app import App
 
-from study.session.requests import Request
+from study.session.requests import NoteAsked, Request
 
 if TYPE_CHECKING:
     from study.tui.link.watch_feed import WatchFeed
@@ -24,11 +25,28 @@ class Watching:
         self._screen: WatchScreen | None = None
         self._starting = False
 
+    def open_here(self, path: str, ask: Callable[[Request], object]) -> None:
+        """At the participant's own screen: confirmed with the session's name, and noted in its log before it opens.
+        The key that opens it closes it."""
+        if self._screen is not None and self._app.screen is self._screen:
+            self.close()
+            return
+        from study.tui.screens.confirm_view import SHOWN_HERE, confirm_view
+
+        def go_on() -> None:
+            ask(NoteAsked("program", SHOWN_HERE))
+            self.open(path, ask)
+
+        confirm_view(self._app, Path(path).name, go_on)
+
+    def confirm(self, path: str, ask: Callable[[Request], object]) -> None:
+        """Of a session at another screen."""
+        from study.tui.screens.confirm_view import confirm_view
+
+        confirm_view(self._app, Path(path).name, lambda: self.open(path, ask))
+
     def open(self, path: str, ask: Callable[[Request], object]) -> None:
         """Returns at once: the feed is started in a thread, because starting a process takes its time."""
-        if self._screen is not None and self._app.screen is self._screen:
-            self.close()  # the key that opens it closes it
-            return
         if self._starting or (self._screen is not None and self._screen in self._app.screen_stack):
             return
         self._starting = True

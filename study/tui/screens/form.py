@@ -1,14 +1,27 @@
 """A form: consent, exclusion, the set-up, the debrief. It says what is missing, and judges nothing."""
 
+from dataclasses import dataclass
 from typing import ClassVar
 
-from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container
+from textual.errors import NoWidget
+from textual.events import Click, Event, Key, Paste
+from textual.message import Message
 from textual.screen import Screen
-from textual.widgets import Button, Footer, Input
+from textual.widgets import Button, Footer
 
+from study.session.form_entry import (
+    FormEntry,
+    blank_entry,
+    click_choice,
+    click_continue,
+    go_to,
+    paste,
+    press,
+    reply_of,
+)
 from study.session.form_views import Form, FormReply, missing
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
@@ -17,18 +30,24 @@ from study.tui.widgets.form_question import FormQuestion
 from study.tui.widgets.said import Said
 
 LONGEST_QUOTE = 48
-
-
-class Questions(Sheet, can_focus=False, inherit_bindings=False):
-    """Up and down go from question to question, not line by line."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("pageup", "page_up", "Page up", show=False),
-        Binding("pagedown", "page_down", "Page down", show=False),
-    ]
+KEYS = (
+    ("1", "choice", "1 2 …", "Choose"),
+    ("left", "choice", "← →", "Move"),
+    ("space", "choice", "Space", "Choose"),
+    ("enter", "choice", "Enter", "Choose, next"),
+    ("enter", "text", "Enter", "Next"),
+    ("enter", "continue", "Enter", "Continue"),
+    ("up", "", "↑", "Previous"),
+    ("down", "", "↓", "Next"),
+)
+"""Of the footer: the key, where it has this meaning (empty: everywhere), how it is shown, and the meaning."""
+FINISHED = "Go down to Continue and press Enter."
 
 
 class FormScreen(Screen[FormReply]):
+    """The picture of a `FormEntry`. No widget in it has the keyboard: keys, clicks and pastes come to the screen, one
+    after the other, and each is applied to the entry before the next is looked at."""
+
     HELP = """\
 # A form
 
@@ -45,63 +64,147 @@ class FormScreen(Screen[FormReply]):
     FormScreen #origin { color: $foreground 65%; margin-bottom: 1; }
     FormScreen #said { height: 1; padding: 0 1; text-align: center; text-style: bold; }
     FormScreen Button { margin: 0 0 1 2; }
+    FormScreen Button.-at { text-style: bold reverse; }
     """
-    AUTO_FOCUS = "ChoiceRow, Input"
+    AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "app.focus_previous", "Previous", key_display="↑"),
-        Binding("down", "app.focus_next", "Next", key_display="↓"),
+        *(Binding(key, f"press('{key}', '{place}')", words, key_display=shown) for key, place, shown, words in KEYS),
+        Binding("pageup", "scroll(-1)", "Page up", show=False),
+        Binding("pagedown", "scroll(1)", "Page down", show=False),
     ]
+
+    @dataclass
+    class Pointed(Message):
+        """Where the mouse was clicked, found out when it was."""
+
+        widget: ChoiceRow | FormQuestion | Button
+        choice: int | None = None
 
     def __init__(self, form: Form) -> None:
         super().__init__()
-        self._form = form
+        self._entry = blank_entry(form)
+        self._alive: list[bool | None] = []
 
     def compose(self) -> ComposeResult:
-        form = self._form
+        form = self._entry.form
         yield Said(id="top")
-        with Container(), Questions():
+        with Container(), Sheet(can_focus=False):
             yield Said(form.introduction, id="introduction")
             for number, field in enumerate(form.fields, start=1):
                 yield FormQuestion(number, field)
             yield Said(_origin(form), id="origin")
-            yield Button("Continue", variant="primary", compact=True)
+            button = Button("Continue", variant="primary", compact=True)
+            button.can_focus = False
+            yield button
         yield Said(id="said")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._count()
+        self._show(self._entry)
 
-    @on(ChoiceRow.Chosen)
-    @on(Input.Changed)
-    def _count(self) -> None:
-        """How much is answered, always in sight."""
-        open_ones = len(missing(self._form, self._reply()))
-        fields = len(self._form.fields)
-        told = f"{open_ones} of {fields} still open" if open_ones else "everything is answered"
-        self.query_one("#top", Said).update(f"{self._form.title}: {told}")
-        self.query_one("#said", Said).update("" if open_ones else "Go down to Continue and press Enter.")
+    @property
+    def entry(self) -> FormEntry:
+        return self._entry
 
-    @on(ChoiceRow.Left)
-    @on(Input.Submitted)
-    def _next(self) -> None:
-        self.focus_next()
+    @property
+    def stacked(self) -> bool:
+        """Whether the choices under the cursor lie below each other at this width."""
+        at = self._entry.at
+        return at < len(self._entry.form.fields) and self.query(FormQuestion)[at].stacked
 
-    @on(Button.Pressed)
-    def _finish(self) -> None:
-        reply = self._reply()
-        gaps = missing(self._form, reply)
-        if not gaps:
-            take_off(self, reply)
+    def on_key(self, event: Key) -> None:
+        if self._take(press(self._entry, event.key, event.character, self.stacked)):
+            event.stop()
+            event.prevent_default()
+
+    def on_paste(self, event: Paste) -> None:
+        event.stop()
+        self._take(paste(self._entry, event.text))
+
+    def action_press(self, key: str, place: str) -> None:
+        self._take(press(self._entry, key, key if len(key) == 1 else None, self.stacked))
+
+    def action_scroll(self, pages: int) -> None:
+        sheet = self.query_one(Sheet)
+        sheet.scroll_relative(y=pages * sheet.size.height, animate=False)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """The footer names no key that would change nothing here."""
+        if action != "press":
+            return True
+        key, place = parameters
+        field = self._entry.field
+        here = "continue" if field is None else "choice" if field.choices else "text"
+        keys = ("left", "right") if key == "left" else (str(key),)
+        stacked = self.is_mounted and self.stacked
+        pressed = [press(self._entry, name, name if len(name) == 1 else None, stacked) for name in keys]
+        return place in ("", here) and any(after not in (None, self._entry) for after in pressed)
+
+    def _forward_event(self, event: Event) -> None:
+        """A click comes to the same queue as the keys, with what it hit: nothing overtakes it on the way."""
+        if isinstance(event, Click) and not event.is_forwarded and (pointed := self._pointed(event)) is not None:
+            self.post_message(pointed)
+            return
+        super()._forward_event(event)
+
+    def _pointed(self, click: Click) -> Pointed | None:
+        try:
+            widget, region = self.get_widget_at(click.screen_x, click.screen_y)
+        except NoWidget:
+            return None
+        if isinstance(widget, ChoiceRow):
+            return self.Pointed(widget, widget.choice_at(click.screen_x - region.x, click.screen_y - region.y))
+        if isinstance(widget, Button):
+            return self.Pointed(widget)
+        question = next((node for node in widget.ancestors_with_self if isinstance(node, FormQuestion)), None)
+        return self.Pointed(question) if question is not None else None
+
+    def on_form_screen_pointed(self, pointed: Pointed) -> None:
+        if isinstance(pointed.widget, Button):
+            self._take(click_continue(self._entry))
             return
         questions = list(self.query(FormQuestion))
-        first = next(question for question in questions if question.field == gaps[0])
-        first.take_focus()
-        number = questions.index(first) + 1
-        more = f" {len(gaps) - 1} more are open." if len(gaps) > 2 else " 1 more is open." if len(gaps) == 2 else ""
-        self.query_one("#said", Said).update(f"Please answer {number}: {_quoted(gaps[0].label)}{more}")
+        at = next(i for i, question in enumerate(questions) if question in pointed.widget.ancestors_with_self)
+        to = go_to(self._entry, at) if pointed.choice is None else click_choice(self._entry, at, pointed.choice)
+        self._take(to)
 
-    def _reply(self) -> FormReply:
-        return FormReply({question.field.key: question.answer for question in self.query(FormQuestion)})
+    def _take(self, entry: FormEntry | None) -> bool:
+        """The only place where the entry changes. False: nothing was meant for it."""
+        if entry is None:
+            return False
+        before, self._entry = self._entry, entry
+        if entry.sent and not before.sent:
+            take_off(self, reply_of(entry))
+        elif entry != before:
+            self._show(entry)
+        return True
+
+    def _show(self, entry: FormEntry) -> None:
+        for index, question in enumerate(self.query(FormQuestion)):
+            question.show(entry.given[index], at=index == entry.at)
+        button = self.query_one(Button)
+        button.set_class(entry.field is None, "-at")
+        if entry.field is None:
+            button.scroll_visible(animate=False)
+        open_ones = len(missing(entry.form, reply_of(entry)))
+        told = f"{open_ones} of {len(entry.given)} still open" if open_ones else "everything is answered"
+        self.query_one("#top", Said).update(f"{entry.form.title}: {told}")
+        self.query_one("#said", Said).update(_said(entry, all_answered=not open_ones))
+        alive = [self.check_action("press", key[:2]) for key in KEYS]
+        if alive != self._alive:
+            self._alive = alive
+            self.refresh_bindings()
+
+
+def _said(entry: FormEntry, all_answered: bool) -> str:
+    if entry.open:
+        left = len(entry.open) - 1
+        more = "" if not left else " 1 more is open." if left == 1 else f" {left} more are open."
+        return f"Please answer {entry.open[0] + 1}: {_quoted(entry.form.fields[entry.open[0]].label)}{more}"
+    if entry.check:
+        changed = ", ".join(f"{index + 1} is “{entry.given[index].answer}”" for index in entry.check)
+        return f"Changed: {changed}. If that is right, go to Continue once more."
+    return FINISHED if all_answered else ""
 
 
 def _origin(form: Form) -> str:

@@ -11,6 +11,8 @@ from textual.message import Message
 from textual.reactive import reactive
 from textual.widget import Widget
 
+from study.session.form_entry import moved, named_choice
+
 GAP = 3
 
 
@@ -32,6 +34,8 @@ class ChoiceRow(Widget, can_focus=True):
 
     cursor: reactive[int | None] = reactive[int | None](None)
     chosen: reactive[int | None] = reactive[int | None](None)
+    at: reactive[bool] = reactive(False)
+    """Whether the cursor of a form is here, whose screen has the keyboard."""
 
     @dataclass
     class Chosen(Message):
@@ -59,19 +63,29 @@ class ChoiceRow(Widget, can_focus=True):
     def on_key(self, event: Key) -> None:
         if event.key in ("up", "down") and self._moved_within(1 if event.key == "down" else -1):
             event.stop()
-        elif event.character and (named := self._named(event.character)) is not None:
+        elif event.character and (named := named_choice(self._choices, event.character)) is not None:
             event.stop()
             self._choose(named)
 
     def on_click(self, event: Click) -> None:
-        places = self._places(self.size.width)
-        for index, (x, y) in enumerate(places):
-            if y == event.y and x <= event.x < x + len(self._label(index)):
-                self._choose(index)
+        index = self.choice_at(event.x, event.y)
+        if index is not None:
+            self._choose(index)
+
+    def choice_at(self, x: int, y: int) -> int | None:
+        """The choice that is drawn in a cell; None between them."""
+        for index, (left, row) in enumerate(self._places(self.size.width)):
+            if row == y and left <= x < left + len(self._label(index)):
+                return index
+        return None
+
+    @property
+    def stacked(self) -> bool:
+        """Whether the choices lie below each other at this width."""
+        return len({y for _, y in self._places(self.size.width)}) > 1
 
     def action_move(self, step: int) -> None:
-        last = len(self._choices) - 1
-        self.cursor = (0 if step > 0 else last) if self.cursor is None else min(max(self.cursor + step, 0), last)
+        self.cursor = moved(self.cursor, step, len(self._choices))
 
     def action_choose(self) -> None:
         if self.cursor is not None:
@@ -98,7 +112,7 @@ class ChoiceRow(Widget, can_focus=True):
         return text
 
     def _style(self, index: int) -> str:
-        if self.has_focus and index == self.cursor:
+        if (self.has_focus or self.at) and index == self.cursor:
             return str(self.get_component_rich_style("choice-row--cursor"))
         return "bold" if index == self.chosen else ""
 
@@ -115,22 +129,11 @@ class ChoiceRow(Widget, can_focus=True):
 
     def _moved_within(self, step: int) -> bool:
         """Up and down go through choices that lie below each other, and at their ends to the next question."""
-        if len({y for _, y in self._places(self.size.width)}) < 2:
+        there = moved(self.cursor, step, len(self._choices), stay=False) if self.stacked else None
+        if there is None:
             return False
-        at = -1 if self.cursor is None else self.cursor
-        if not 0 <= at + step < len(self._choices):
-            return False
-        self.action_move(step)
+        self.cursor = there
         return True
-
-    def _named(self, key: str) -> int | None:
-        """By its number, or by a first letter that no other has."""
-        if key.isdecimal():
-            if self._numbered:
-                return int(key) - 1 if 0 < int(key) <= len(self._choices) else None
-            return self._choices.index(key) if key in self._choices else None
-        same = [index for index, choice in enumerate(self._choices) if choice.casefold().startswith(key.casefold())]
-        return same[0] if len(same) == 1 else None
 
     def _choose(self, index: int) -> None:
         self.cursor = self.chosen = index

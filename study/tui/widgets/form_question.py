@@ -1,15 +1,14 @@
-"""One field of a form: what is asked, and where it is answered."""
+"""One field of a form: what is asked, and where the answer is seen. A picture: the form's screen has the keyboard."""
 
+from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Vertical
-from textual.events import DescendantFocus
-from textual.widgets import Input
+from textual.widgets import Static
 
+from study.session.form_entry import Given
 from study.session.form_views import FormField
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.said import Said
-
-MOST_CHARACTERS = 500
 
 
 class FormQuestion(Vertical):
@@ -17,8 +16,8 @@ class FormQuestion(Vertical):
     FormQuestion {
         height: auto; margin-bottom: 1; padding: 0 1 0 2; background: $surface;
     }
-    FormQuestion:focus-within { border-left: thick $primary; padding: 0 1; background: $panel; }
-    FormQuestion Input { background: $boost; }
+    FormQuestion.-at { border-left: thick $primary; padding: 0 1; background: $panel; }
+    FormQuestion .written { background: $boost; }
     """
 
     def __init__(self, number: int, field: FormField) -> None:
@@ -29,18 +28,37 @@ class FormQuestion(Vertical):
     def compose(self) -> ComposeResult:
         yield Said(f"{self._number}. {self.field.label}")
         if self.field.choices:
-            yield ChoiceRow(self.field.choices)
+            row = ChoiceRow(self.field.choices)
+            row.can_focus = False
+            yield row
         else:
-            hint = "type your answer" if self.field.needed else "type your answer, or leave it empty"
-            yield Input(placeholder=hint, max_length=MOST_CHARACTERS, compact=True, select_on_focus=False)
+            yield Static(classes="written")
 
     @property
-    def answer(self) -> str:
-        return self.query_one(ChoiceRow).answer if self.field.choices else self.query_one(Input).value.strip()
+    def stacked(self) -> bool:
+        return bool(self.field.choices) and self.query_one(ChoiceRow).stacked
 
-    def take_focus(self) -> None:
-        self.query_one(ChoiceRow if self.field.choices else Input).focus()
+    def show(self, given: Given, at: bool) -> None:
+        """at: the cursor of the form is here."""
+        if at and not self.has_class("-at"):
+            # The question itself must be seen too, not only where it is answered.
+            self.scroll_visible(animate=False)
+        self.set_class(at, "-at")
+        if self.field.choices:
+            row = self.query_one(ChoiceRow)
+            row.cursor, row.at = given.marked, at
+            row.chosen = self.field.choices.index(given.answer) if given.answer else None
+        else:
+            self.query_one(".written", Static).update(self._written(given, at))
 
-    def on_descendant_focus(self, event: DescendantFocus) -> None:
-        # The question itself must be seen too, not only where it is answered.
-        self.scroll_visible(animate=False)
+    def _written(self, given: Given, at: bool) -> Text:
+        if not given.answer:
+            hint = "type your answer" if self.field.needed else "type your answer, or leave it empty"
+            text = Text(hint, "dim")
+            if at:
+                text.stylize("reverse", 0, 1)
+            return text
+        text = Text(given.answer + (" " if at else ""))
+        if at:
+            text.stylize("reverse", given.caret, given.caret + 1)
+        return text

@@ -16,6 +16,7 @@ from study.tui.app_start import AppStart
 from study.tui.home_messages import BeginWanted
 from study.tui.link.from_engine import Failed, Finished
 from study.tui.link.to_engine import Begin, SessionOrder
+from study.tui.screens.confirm_view import SHOWN_HERE
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -212,8 +213,9 @@ def test_a_pause_a_note_and_the_watchers_view_in_one_terminal(sitting, log):
         await person.until("NoteScreen")
         await person.press(*"cough", "ctrl+s")
         await person.press("f2")
+        await person.until("ConfirmView")
+        await person.press(*"P01_001", "enter")
         await person.until("WatchScreen")
-        await person.pilot.pause(0.5)
         await person.press("q")
         await person.until("TrialScreen")
         await person.press("f7")
@@ -221,10 +223,33 @@ def test_a_pause_a_note_and_the_watchers_view_in_one_terminal(sitting, log):
         await person.press("enter")
         await person.until("TrialScreen")
         assert '"text":"cough"' in log.read_text()
+        assert SHOWN_HERE in log.read_text()
         await person.press("ctrl+c", "ctrl+c")
 
     sitting(story)
     assert "pause_taken" in log.read_text()
+
+
+@pytest.mark.parametrize("way", ["key", "command"])
+def test_a_participant_does_not_open_the_experimenters_view_by_accident(sitting, log, way):
+    async def story(person: Person) -> None:
+        await person.until("TrialScreen")
+        if way == "key":
+            await person.press("f2")
+        else:
+            commands = {
+                command.title: command.callback for command in person.app.get_system_commands(person.app.screen)
+            }
+            await commands["Watch this session"]()
+        await person.until("ConfirmView")
+        await person.press("1", "2", "enter", "enter", "f2", "y", "enter")
+        assert "That is not P01_001. Nothing is opened." in person.text()
+        await person.press("escape")
+        assert person.at in ("TrialScreen", "AwaitReturnScreen")
+        await person.press("ctrl+c", "ctrl+c")
+
+    sitting(story)
+    assert SHOWN_HERE not in log.read_text()
 
 
 def test_help_themes_and_commands_are_there_on_every_screen(tmp_path):

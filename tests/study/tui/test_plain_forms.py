@@ -1,9 +1,17 @@
+import io
+import os
+import pty
+import threading
+import time
 from dataclasses import replace
 
 import pytest
 
+from study.devices.clock import RealClock
 from study.session.form_views import Form, FormField, FormKind, missing
 from study.session.views import DeviceFinding, DeviceReport
+from study.tui.line_input import LineInput
+from study.tui.plain import PlainDisplay
 
 CONSENT = FormField("hands", "Are both hands well?", ("yes", "no"))
 SCALE = FormField("sure", "How sure were you?", ("0", "1", "2"))
@@ -129,3 +137,36 @@ def test_a_warning_is_said_and_hinders_nothing(typed):
     lines = typed.out.getvalue().splitlines()
     assert "warn: Lateness, too late for a real device. Close others." in lines
     assert "The device is ready; mind the warning above." in lines
+
+
+def test_a_changed_answer_to_an_exclusion_is_read_back_before_it_counts(typed):
+    typed.type("yes", "b", "no", "no", "x", "b", "yes", "no", "y")
+    exclusion = replace(form(CONSENT, replace(CONSENT, key="arm")), kind=FormKind.EXCLUSION)
+    assert typed.display.fill_in(exclusion).answers == {"hands": "yes", "arm": "no"}
+    assert "You changed an answer. Your answers are now: 1 no, 2 no." in typed.said
+    assert "You changed an answer. Your answers are now: 1 yes, 2 no." in typed.said
+
+
+def test_lines_typed_ahead_of_a_refusal_answer_no_other_question():
+    """They were typed for the questions that follow, not for the one that is asked again."""
+    screen, keyboard = pty.openpty()
+    out, replies = io.StringIO(), []
+    display = PlainDisplay(LineInput(keyboard), out, RealClock())
+    three = form(*(replace(CONSENT, key=key) for key in "abc"))
+    person = threading.Thread(target=lambda: replies.append(display.fill_in(three)), daemon=True)
+    person.start()
+    wait_for(lambda: out.getvalue().endswith("Number or word: "))
+    os.write(screen, b"1\nmaybe\n1\n1\n")
+    wait_for(lambda: "is none of the answers" in out.getvalue())
+    wait_for(lambda: out.getvalue().endswith("Number or word: "))
+    assert not replies
+    os.write(screen, b"2\n1\n")
+    person.join(20.0)
+    assert [reply.answers for reply in replies] == [{"a": "yes", "b": "no", "c": "yes"}]
+
+
+def wait_for(there):
+    until_s = time.monotonic() + 20.0
+    while not there():
+        assert time.monotonic() < until_s
+        time.sleep(0.01)

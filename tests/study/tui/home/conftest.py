@@ -10,12 +10,14 @@ from pathlib import Path
 import pytest
 from textual.app import App
 from textual.binding import Binding
+from textual.events import Event
 from textual.message import Message
 from textual.pilot import Pilot
 from textual.screen import Screen
 
 from study.session.archive_views import DiagnosisView, HomeView, ProtocolLine, SessionLine, SessionView, Staircase
 from study.tui import home_messages
+from study.tui.keys_in_order import KeysInOrder
 from study.tui.screens.help import HelpScreen
 from study.tui.themes import register_themes
 
@@ -36,6 +38,10 @@ class Bare(App[None]):
         self.opened: list[str] = []
         self.animation_level = "none"
         register_themes(self, theme)
+        self._keys = KeysInOrder(self, super().on_event)
+
+    async def on_event(self, event: Event) -> None:
+        await self._keys.take(event)
 
     def on_mount(self) -> None:
         self.push_screen(self.first)

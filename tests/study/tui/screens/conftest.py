@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from textual.app import App
 from textual.binding import Binding
+from textual.events import Key
 from textual.pilot import Pilot
 from textual.screen import Screen
 
@@ -63,6 +64,12 @@ class Stage:
     async def press(self, *keys: str) -> None:
         await self.pilot.press(*keys)
         await self.pilot.pause()
+
+    def burst(self, *keys: str) -> None:
+        """All at once, as a terminal hands them over: nothing is waited for in between."""
+        for key in keys:
+            character = key if len(key) == 1 else " " if key == "space" else None
+            self.app._driver.send_message(Key(key, character))
 
     async def until(self, there: Callable[[], bool], patience_s: float = 20.0) -> None:
         """What takes time takes longer on a busy machine; what never comes fails with what is on the screen."""

@@ -1,5 +1,10 @@
-import pytest
+import asyncio
+import random
 
+import pytest
+from textual import events
+
+from study.session.form_entry import blank_entry, press, reply_of
 from study.session.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
 
@@ -114,3 +119,122 @@ def test_the_mouse_chooses_too(on_stage):
         assert "2 ● no" in stage.words
 
     on_stage(FormScreen(THREE), story)
+
+
+EXCLUSION = Form(FormKind.EXCLUSION, "Before anything moves", "", THREE.fields)
+WALK = ["1", "2", "3", "enter", "enter", "tab", "shift+tab", "up", "down", "left", "right", "space", "y", "n"]
+TEXT_KEYS = ["x", "backspace", "delete", "home", "end", "left", "q", "?", "p"]
+BURSTS = 10
+"""Of each form in the default run; the slow test takes a hundred times as many."""
+
+
+def test_keys_that_arrive_at_once_answer_the_questions_that_they_were_typed_for(on_stage):
+    """From the issue: sent in one burst, both "yes" of the exclusion form were lost."""
+
+    async def story(stage):
+        stage.burst("1", "enter", "2", "enter", "1", "enter", "enter")
+        await stage.until(lambda: stage.heard)
+
+    assert on_stage(FormScreen(EXCLUSION), story) == [FormReply({"s1": "yes", "s2": "no", "s3": "yes"})]
+
+
+@pytest.mark.parametrize("form", [EXCLUSION, MIXED], ids=["choices", "mixed"])
+@pytest.mark.parametrize("seed", range(2))
+def test_any_burst_fills_in_what_the_same_keys_fill_in_one_by_one(on_stage, form, seed):
+    follow_bursts(on_stage, form, seed, BURSTS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", [EXCLUSION, MIXED], ids=["choices", "mixed"])
+@pytest.mark.parametrize("seed", range(10, 20))
+def test_a_thousand_bursts_fill_in_what_their_keys_fill_in_one_by_one(on_stage, form, seed):
+    follow_bursts(on_stage, form, seed, 10 * BURSTS)
+
+
+def follow_bursts(on_stage, form, seed, bursts):
+    """Random keys in bursts, with pauses of any length, against the entry that takes each key by itself."""
+    draw = random.Random(seed)
+    screen = FormScreen(form)
+
+    async def story(stage):
+        rows = list(screen.query("FormQuestion"))
+        stacked = [row.stacked for row in rows] + [False]
+        wanted = blank_entry(form)
+        for _ in range(bursts):
+            keys = draw.choices(WALK + (TEXT_KEYS if form is MIXED else []), k=draw.randint(2, 15))
+            if wanted.at == len(form.fields):
+                keys[0] = "up"  # so that it goes on for long
+            for key in keys:
+                character = key if len(key) == 1 else " " if key == "space" else None
+                wanted = press(wanted, key, character, stacked[wanted.at]) or wanted
+                if wanted.sent:
+                    break
+            stage.burst(*keys)
+            for _ in range(draw.choice([0, 0, 1, 3, 30])):
+                await asyncio.sleep(0)
+            if wanted.sent:
+                break
+        if wanted.sent:
+            await stage.until(lambda: any(isinstance(heard, FormReply) for heard in stage.heard))
+            reply = next(heard for heard in stage.heard if isinstance(heard, FormReply))
+            assert reply == reply_of(wanted), f"seed {seed}"
+            return
+        await stage.pilot.pause()
+        assert screen.entry == wanted, f"seed {seed}"
+        shown = [row.query_one("ChoiceRow").answer for row in rows if row.field.choices]
+        assert shown == [given.answer for given, row in zip(wanted.given, rows, strict=True) if row.field.choices]
+        assert [row.has_class("-at") for row in rows] == [i == wanted.at for i in range(len(rows))]
+
+    on_stage(screen, story)
+
+
+def test_a_click_in_a_burst_of_keys_keeps_its_place(on_stage):
+    screen = FormScreen(THREE)
+
+    async def story(stage):
+        lines = stage.text.splitlines()
+        rows = [i for i, line in enumerate(lines) if "○ no" in line]
+        x, y = lines[rows[2]].index("○ no"), rows[2]
+        stage.burst("1")
+        for kind in (events.MouseDown, events.MouseUp):
+            stage.app._driver.send_message(kind(None, x, y, 0, 0, 1, False, False, False, x, y))
+        stage.burst("up", "1")
+        await stage.pilot.pause()
+        assert reply_of(screen.entry).answers == {"s1": "yes", "s2": "yes", "s3": "no"}
+
+    on_stage(screen, story)
+
+
+def test_pasted_text_chooses_nothing_and_sends_nothing(on_stage):
+    screen = FormScreen(MIXED)
+
+    async def story(stage):
+        stage.app.post_message(events.Paste("1\n2\n\n"))
+        await stage.pilot.pause()
+        assert screen.entry == blank_entry(MIXED)
+        await stage.press("1", "enter", "1", "enter")
+        stage.app.post_message(events.Paste("by\nfeel"))
+        await stage.pilot.pause()
+        assert "by feel" in stage.words and screen.entry.at == 2
+
+    assert on_stage(screen, story) == []
+
+
+def test_a_changed_answer_to_an_exclusion_is_shown_before_it_is_sent(on_stage):
+    async def story(stage):
+        await stage.press("1", "2", "enter", "2", "enter", "2", "enter", "enter")
+        assert not stage.heard
+        assert "Changed: 1 is “no”. If that is right, go to Continue once more." in stage.words
+        await stage.press("down", "down", "down", "enter")
+
+    assert on_stage(FormScreen(EXCLUSION), story) == [FormReply({"s1": "no", "s2": "no", "s3": "no"})]
+
+
+def test_a_question_mark_is_written_in_free_text_and_is_help_elsewhere(on_stage):
+    screen = FormScreen(MIXED)
+
+    async def story(stage):
+        await stage.press("question_mark", "1", "enter", "1", "enter", "question_mark")
+
+    assert on_stage(screen, story) == ["help"]
+    assert screen.entry.given[2].answer == "?"

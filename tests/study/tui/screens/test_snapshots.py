@@ -21,6 +21,7 @@ from study.session.views import (
     Welcome,
 )
 from study.tui.screens.await_return import AwaitReturnScreen
+from study.tui.screens.confirm_view import ConfirmView
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen
@@ -95,6 +96,7 @@ SCREENS = {
     "goodbye": lambda: GoodbyeScreen(Goodbye(False, 37, "the participant left")),
     "note": lambda: NoteScreen(adverse=True),
     "confirm_withdrawal": lambda: ConfirmWithdrawal(),
+    "confirm_view": lambda: ConfirmView("P01_001"),
 }  # fmt: skip
 
 

@@ -1,0 +1,81 @@
+"""Before the experimenter's view opens where a participant may look on: nobody opens it by one wrong key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from textual import on
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import ModalScreen
+from textual.widgets import Footer, Input
+
+from study.tui.screens.help import HelpScreen
+from study.tui.take_off import take_off
+from study.tui.widgets.card import Card
+from study.tui.widgets.said import Said
+
+SHOWN_HERE = "The participant's screen showed the experimenter's view: levels, and which answers were right or wrong."
+"""The note in the log of a session whose own screen showed it."""
+
+
+class ConfirmView(ModalScreen[bool]):
+    """True where the session's name was typed."""
+
+    HELP = """\
+# The experimenter's view
+
+- It shows the levels and which answers were right or wrong. A participant who has seen that is no naive observer.
+- Turn the screen away, type the session's name, and press **Enter**. **Esc** goes back.
+- Opened at the participant's own screen, it is noted in the session's log.
+- A second terminal does without: `hapteq watch SESSION`.
+"""
+    DEFAULT_CSS = """
+    ConfirmView { align: center middle; }
+    ConfirmView Card { border: round $warning; }
+    ConfirmView Input { margin-top: 1; }
+    ConfirmView #said { height: 1; color: $text-error; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", "Back", key_display="Esc"),
+        Binding("f1", "help", "Help"),
+    ]
+
+    def __init__(self, session: str) -> None:
+        super().__init__()
+        self._session = session
+
+    def compose(self) -> ComposeResult:
+        with Card("For the experimenter"):
+            yield Said("This view shows the levels and which answers were right or wrong.")
+            yield Said(
+                "Participants: press Esc. Experimenter: turn the screen away from the participant.", classes="gap"
+            )
+            yield Said(f"To open it, type {self._session} and press Enter.", classes="gap strong")
+            yield Input(compact=True)
+            yield Said(id="said")
+        yield Footer(show_command_palette=False)
+
+    @on(Input.Submitted)
+    def _judge(self, typed: Input.Submitted) -> None:
+        if typed.value.strip() == self._session:
+            take_off(self, True)
+        else:
+            self.query_one("#said", Said).update(f"That is not {self._session}. Nothing is opened.")
+
+    def action_help(self) -> None:
+        self.app.push_screen(HelpScreen(self.HELP))
+
+    def action_leave(self) -> None:
+        take_off(self, False)
+
+
+def confirm_view(app: App[Any], session: str, go_on: Callable[[], object]) -> None:
+    """go_on: called once, when the session's name was typed."""
+
+    def decided(confirmed: bool | None) -> None:
+        if confirmed:
+            go_on()
+
+    app.push_screen(ConfirmView(session), decided)
