@@ -32,6 +32,7 @@ from study.session.sitting_events import (
     DemoFinished,
     DemoPlayed,
     DeviceChecked,
+    DoseElsewhere,
     FormFilled,
     NoteTaken,
     PauseTaken,
@@ -66,7 +67,7 @@ __all__ = [
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 SESSION_VERSION: Literal[1] = 1
 
-FIELDS_SINCE: dict[str, object] = {"monotonic_s": None, "rules": 1, "cause": None}
+FIELDS_SINCE: dict[str, object] = {"monotonic_s": None, "dose_elsewhere": None, "rules": 1, "cause": None}
 """Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
 
@@ -101,6 +102,7 @@ class SessionOpened:
     equalized: EqualizedFacts | None = None
     """Null: the commanded force is what was wanted."""
     monotonic_s: Seconds | None = None
+    dose_elsewhere: DoseElsewhere | None = None
     rules: Literal[1, 2] = 1
     """Of void trials, refusals and places, see `study.session.rules`. A session keeps those that it began with."""
     event: Literal["session_opened"] = "session_opened"
@@ -200,6 +202,7 @@ class SessionResumed:
     versions: dict[str, str]
     mended: str = ""
     """A torn last line that a crash left behind, kept here for the record."""
+    dose_elsewhere: DoseElsewhere | None = None
     monotonic_s: Seconds | None = None
     event: Literal["session_resumed"] = "session_resumed"
 

@@ -7,6 +7,7 @@ from protocols.practice import PracticeState, practice_over, practised
 from protocols.staircase import begin, finished, step
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Phase, TrialStatus, VoidCause
+from study.session.daily_dose import with_dose_elsewhere
 from study.session.draw_check import LogContradiction, check_draw, place_of
 from study.session.events import (
     AnswerGiven,
@@ -73,7 +74,8 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
             return _around(state, event)
         case SessionResumed():
-            return replace(state, sitting=sit_down_again(state.sitting, state.answers))
+            again = sit_down_again(state.sitting, state.answers)
+            return replace(state, sitting=with_dose_elsewhere(again, event.dose_elsewhere))
         case SessionClosed():
             return _close(state)
         case SessionOpened():

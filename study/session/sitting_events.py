@@ -5,9 +5,23 @@ from typing import Literal
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from study.session.fact_types import AngleDeg, ForceN, FrequencyHz, Index, Seconds, UtcTime
+from study.session.fact_types import AngleDeg, ForceN, FrequencyHz, Index, Magnitude, Seconds, UtcTime
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, config=FACT)
+class DoseElsewhere:
+    """What the same hand got since its last night's rest in other sessions of the participant, see `Dose`."""
+
+    sessions: tuple[str, ...]
+    squared_s: Magnitude
+    vibrated_s: Seconds
+    unmeasured_s: Seconds
+    still_s: Seconds
+    """Since it last moved in any of them."""
+    unread: tuple[str, ...] = ()
+    """Sessions that cannot be read: nothing of them is counted."""
 
 
 @dataclass(frozen=True, config=FACT)

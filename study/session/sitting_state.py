@@ -44,6 +44,10 @@ class SittingState:
     """Since the handle last moved, in any sitting; None before."""
     dose: Dose = NO_DOSE
     """Since the last long rest: see NIGHT_H."""
+    elsewhere: Dose = NO_DOSE
+    """In other sessions of the participant since then, as known when this sitting began."""
+    not_counted: tuple[str, ...] = ()
+    """Sessions of the participant that could not be read then."""
     night: Night | None = None
     """The last long rest."""
     clock_steps: tuple[ClockStep, ...] = ()
@@ -128,14 +132,14 @@ def _sum_s(steps: tuple[ClockStep, ...]) -> float:
 def moved(sitting: SittingState) -> SittingState:
     """The handle moves now."""
     if sitting.still_s is not None and sitting.still_s >= NIGHT_S:
-        sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE)
+        sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE, elsewhere=NO_DOSE)
     return replace(sitting, sat_s=sitting.sat_s or 0.0, still_s=0.0)
 
 
 def dose_now(sitting: SittingState) -> Dose:
     """What counts today: nothing after a night's rest."""
     rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
-    return NO_DOSE if rested else sitting.dose
+    return NO_DOSE if rested else total(sitting.dose, sitting.elsewhere)
 
 
 def exposed(

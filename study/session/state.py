@@ -9,6 +9,7 @@ from protocols.staircase import StaircaseState, begin
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial, VoidCause
+from study.session.daily_dose import with_dose_elsewhere
 from study.session.draw_check import LogContradiction
 from study.session.due_trial import Place, Present, due_trial
 from study.session.events import AnswerGiven, SessionOpened, TrialPresented
@@ -65,7 +66,7 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
         trials=(),
         rest_due_s=0.0,
         closed=False,
-        sitting=SittingState(last=Moment(opened.utc, opened.monotonic_s)),
+        sitting=with_dose_elsewhere(SittingState(last=Moment(opened.utc, opened.monotonic_s)), opened.dose_elsewhere),
     )
     return replace(state, staircase=begin(current_rule(state)))
 

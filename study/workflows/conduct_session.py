@@ -24,7 +24,7 @@ from study.workflows.open_session import (
 from study.workflows.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.resume_session import resumed_session
 from study.workflows.run_session import run_session
-from study.workflows.sitting import Sitting, tell_clock_steps
+from study.workflows.sitting import Sitting, tell, tell_clock_steps
 
 
 def _nobody_listens(folder: SessionFolder, device: Device) -> None:
@@ -104,5 +104,7 @@ def _run(
         place_m=place_m,
     )
     tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
+    for name in opened.state.sitting.not_counted:
+        tell(f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting)
     end = run_session(opened.state, sitting)
     return Conducted(folder, end.state, end.left, end.fault, end.withdrawn)

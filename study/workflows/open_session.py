@@ -20,6 +20,7 @@ from study.store.event_log import EventLog
 from study.store.provenance import versions
 from study.store.session_lock import locked
 from study.workflows.equalize_stimuli import Equalized, keep_model
+from study.workflows.other_sessions import dose_before
 from study.workflows.participant_number import participant_number
 
 
@@ -71,8 +72,9 @@ def opened_session(
     if number is None:
         number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
     folder = new_session_folder(plan.data, plan.subject)
+    utc = clock.utc()
     opened = SessionOpened(
-        utc=clock.utc(),
+        utc=utc,
         format=SESSION_FORMAT,
         version=SESSION_VERSION,
         session=folder.name,
@@ -88,6 +90,7 @@ def opened_session(
         versions=versions(),
         equalized=equalized.facts,
         monotonic_s=clock.now_s(),
+        dose_elsewhere=dose_before(folder, plan.observer, device.simulated, utc),
         rules=LATEST,
     )
     with locked(folder.path):

@@ -25,6 +25,7 @@ from study.store.session_lock import locked
 from study.store.trial_recordings import find_trial_recording, recording_name
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import OpenedSession, device_facts
+from study.workflows.other_sessions import dose_before
 
 
 @contextmanager
@@ -42,11 +43,13 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
             folded = fold_session(folder)
             _check_resumable(folded.state, device, folder)
             mend(folder.log, folded.contents)
+            utc, observer = clock.utc(), folded.state.opened.observer
             resumed = SessionResumed(
-                utc=clock.utc(),
+                utc=utc,
                 device=device_facts(device),
                 versions=versions(),
                 mended=folded.contents.torn,
+                dose_elsewhere=dose_before(folder, observer, device.simulated, utc),
                 monotonic_s=clock.now_s(),
             )
             log.append(resumed)

@@ -12,7 +12,6 @@ from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
 from study.session.progress import progress
-from study.session.requests import NoteAsked
 from study.session.state import SessionState, felt
 from study.session.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
 from study.session.void_reasons import busy_sentence, why_too_many
@@ -21,7 +20,7 @@ from study.workflows.demonstrate import demonstrate
 from study.workflows.fold_session import fold_session
 from study.workflows.prepare_sitting import fill_in, prepare_sitting
 from study.workflows.present_trial import present_trial
-from study.workflows.sitting import Sitting, record, write_notes
+from study.workflows.sitting import Sitting, record, tell, write_notes
 from study.workflows.take_pause import take_pause
 
 VOID_TRIALS_IN_A_ROW = 3
@@ -158,9 +157,7 @@ def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
     """At the end of a sitting, to the experimenter: on the screen and in the log."""
     if not state.sitting.busy_voids:
         return state
-    sentence = busy_sentence(state.sitting.busy_voids)
-    sitting.display.trouble(sentence)
-    sitting.attendant.note(NoteAsked("program", sentence))
+    tell(busy_sentence(state.sitting.busy_voids), sitting)
     return write_notes(state, sitting)
 
 

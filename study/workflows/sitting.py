@@ -40,10 +40,14 @@ def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
 
 
 def tell_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
-    """On the screen now, and in the log with the next notes."""
     for step in steps:
-        sitting.display.trouble(step.sentence)
-        sitting.attendant.note(NoteAsked("program", step.sentence))
+        tell(step.sentence, sitting)
+
+
+def tell(sentence: str, sitting: Sitting) -> None:
+    """The experimenter: on the screen now, and in the log with the next notes."""
+    sitting.display.trouble(sentence)
+    sitting.attendant.note(NoteAsked("program", sentence))
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:

@@ -6,7 +6,8 @@ import pytest
 
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
-from study.session.events import NoteTaken
+from study.session.events import NoteTaken, SessionResumed
+from study.session.sitting_state import dose_now
 from study.session.views import Unanswered
 from study.store.event_log import read_log
 from study.workflows.conduct_session import Participant, conduct_new, conduct_resumed
@@ -106,3 +107,31 @@ def test_a_simulated_session_that_goes_on_does_so_after_its_own_last_entry(sitte
     clock = VirtualClock.not_before("2099-01-01T00:00:00.000+00:00")
     assert clock.utc() == "2099-01-01T00:00:00.000+00:00"
     assert VirtualClock.not_before("2001-01-01T00:00:00.000+00:00").utc() > "2026"
+
+
+def test_a_second_session_on_the_same_day_goes_on_with_the_dose_of_the_first(sitter):
+    first = conduct_new(sitter.plan(observer=None), "simulated", sitter.participant())
+    second = conduct_new(sitter.plan(observer=None), "simulated", sitter.participant(2, leave))
+    opened = read_log(second.folder.log).events[0]
+    assert opened.dose_elsewhere.sessions == (first.folder.name,)
+    assert opened.dose_elsewhere.vibrated_s == first.state.sitting.dose.vibrated_s > 0
+    assert dose_now(second.state.sitting).vibrated_s > first.state.sitting.dose.vibrated_s
+    other = conduct_new(sitter.plan("P02", observer=None), "simulated", sitter.participant(2, leave))
+    assert read_log(other.folder.log).events[0].dose_elsewhere is None
+    again = sitter.resumed(second.folder)
+    resumed = [event for event in read_log(again.folder.log).events if isinstance(event, SessionResumed)]
+    assert [event.dose_elsewhere.sessions for event in resumed] == [(first.folder.name,)]
+
+
+def test_a_session_that_cannot_be_read_is_named_where_its_dose_is_missing(sitter, at):
+    first = sitter.whole()
+    first.folder.log.write_bytes(b"no event\n" + first.folder.log.read_bytes())
+    seat = at(NOON, leave_at=2)
+    second = conduct_new(sitter.plan(observer=None), "simulated", seat)
+    said = f"{first.folder.name} cannot be read: what the hand got in it is not in the vibration dose of today."
+    assert seat.display.told == [said]
+    assert said in notes(second.folder)
+
+
+def leave() -> Unanswered:
+    return Unanswered("the participant left", leave=True)
