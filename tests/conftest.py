@@ -103,6 +103,12 @@ def small_file(tmp_path, small_text) -> Path:
 
 
 @pytest.fixture(scope="session")
+def session_logs() -> ModuleType:
+    """`tests/session_logs.py`, logs as a crash, an older version or a forger leaves them."""
+    return _module_at(Path(__file__).parent / "session_logs.py")
+
+
+@pytest.fixture(scope="session")
 def plants() -> ModuleType:
     """`tests/plants.py`, synthetic devices with a known truth."""
     return _module_at(Path(__file__).parent / "plants.py")

@@ -4,24 +4,28 @@ import contextlib
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
+from study.session.log_chain import Chain, ChainBrokenError, read_chained, write_chained
 from study.store.atomic_write import sync_folder
 from study.store.privacy import PRIVATE_FILE
 from study.store.regular_file import DOCUMENT_BYTES, open_regular, read_regular
 
 LOG_NAME = "events.jsonl"
+NO_LINES = Chain()
 
 
 class EventLog:
     """An open log. One writer at a time: hold the session's lock while one of these is open."""
 
-    def __init__(self, path: Path, descriptor: int) -> None:
+    def __init__(self, path: Path, descriptor: int, chain: Chain | None = NO_LINES) -> None:
+        """chain: of the lines that are there; None reads them before the first line is added."""
         self._path = path
         self._descriptor = descriptor
+        self._chain = chain
 
     @classmethod
     def create(cls, path: Path) -> "EventLog":
@@ -45,13 +49,16 @@ class EventLog:
                 saved="Nothing was changed.",
             ) from problem
         _own(descriptor, path)
-        return cls(path, descriptor)
+        return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
         """On return the line is on the disk. Raises StudyError, leaving the log as it was, where it is not."""
         before = os.fstat(self._descriptor).st_size
+        if self._chain is None:
+            self._chain = read_log(self._path).chain
+        after, line = write_chained(self._chain, event_line(event).removesuffix(b"\n"))
         try:
-            _write_all(self._descriptor, event_line(event))
+            _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
         except BaseException as problem:
             # Also on Ctrl-C: half a line would spoil the one that comes after it.
@@ -60,6 +67,7 @@ class EventLog:
             if isinstance(problem, OSError):
                 raise _not_saved(self._path, event, problem) from problem
             raise
+        self._chain = after
 
     def close(self) -> None:
         os.close(self._descriptor)
@@ -71,6 +79,9 @@ class LogContents:
     torn: str
     """A last line that a crash left incomplete; empty where there is none."""
     torn_bytes: int
+    chain: Chain
+    whole: bytes = field(repr=False)
+    """All whole lines, as they lie on the disk."""
 
 
 def read_log(path: Path) -> LogContents:
@@ -84,8 +95,12 @@ def read_log(path: Path) -> LogContents:
             "Check the folder's name and permissions.",
         ) from problem
     *lines, tail = data.split(b"\n")
-    events = tuple(_event(path, number, line) for number, line in enumerate(lines, start=1))
-    return LogContents(events, torn=tail.decode("utf-8", errors="replace"), torn_bytes=len(tail))
+    chain, events = Chain(), []
+    for line in lines:
+        chain, event = _next(path, chain, line)
+        events.append(event)
+    whole = data[: len(data) - len(tail)]
+    return LogContents(tuple(events), tail.decode("utf-8", errors="replace"), len(tail), chain, whole)
 
 
 def read_opening(path: Path) -> Event | None:
@@ -94,15 +109,16 @@ def read_opening(path: Path) -> Event | None:
         return None
     with open_regular(path) as file:
         line = file.readline(DOCUMENT_BYTES)
-    return _event(path, 1, line) if line.endswith(b"\n") else None
+    return _next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
 
 
 def readable_events(path: Path) -> tuple[Event, ...]:
     """The events before the first damage, for whoever wants to look at a log that cannot be used. Raises nothing."""
-    events: list[Event] = []
+    chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
-            events.append(parse_event(line))
+            chain, event = read_chained(chain, line)
+            events.append(parse_event(event))
     except (OSError, ValueError):
         pass  # here the damage begins; whoever reads this knows of it
     return tuple(events)
@@ -153,10 +169,13 @@ def nobody_writes(path: Path) -> Iterator[None]:
         log.close()
 
 
-def _event(path: Path, number: int, line: bytes) -> Event:
+def _next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
+    """The event of the line that follows, without its line end. Raises StudyError."""
     try:
-        return parse_event(line)
+        after, event = read_chained(chain, line)
+        return after, parse_event(event)
     except ValueError as problem:
+        number = chain.lines + 1
         if number == 1 and _is_newer(line):
             raise StudyError(
                 "This session was written by a newer hapteq",
@@ -164,11 +183,16 @@ def _event(path: Path, number: int, line: bytes) -> Event:
                 "Use the hapteq that began it, or a newer one.",
                 saved="Nothing was changed.",
             ) from problem
+        wrong, whole = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
+        if isinstance(problem, ChainBrokenError):
+            wrong = f"{problem}"
+            if number > 1 and not chain.since:  # what came before has its first checksum here
+                wrong, whole = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
         raise StudyError(
             "The session log is damaged",
-            f"Line {number} of {path.name} in {path.parent.name} is not an event that this version knows.",
+            f"Line {number} of {path.name} in {path.parent.name} {wrong}.",
             "Keep the folder as it is and restore the file from a copy; nothing was changed.",
-            saved=f"The {number - 1} lines before it are whole.",
+            saved=whole,
         ) from problem
 
 

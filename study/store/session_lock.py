@@ -25,6 +25,13 @@ def locked(folder: Path) -> Iterator[None]:
             "Close it there first.",
             saved="Nothing was changed.",
         ) from held
+    except OSError as problem:
+        raise StudyError(
+            "The session's folder cannot be written to",
+            f"{folder.name}: {problem.strerror or problem}.",
+            "Check the permissions of the folder.",
+            saved="Nothing was changed.",
+        ) from problem
     try:
         yield
     finally:

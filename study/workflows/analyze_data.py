@@ -56,7 +56,7 @@ def analyze_data(
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
         table=tuple(text_table(analysis)),
-        warnings=(*collected.left_out, *analysis.warnings),
+        warnings=(*collected.finished, *collected.left_out, *analysis.warnings),
         report=out / "report.html",
     )
 

@@ -11,7 +11,8 @@ from study.errors import StudyError, WrongUseError
 from study.session.state import SessionState
 from study.store.archive import SessionFolder, session_folders
 from study.store.event_log import LOG_NAME
-from study.workflows.fold_session import fold_session
+from study.workflows.fold_session import FoldedSession, fold_session
+from study.workflows.session_results import finish_tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,8 @@ class Collected:
     """Names of the simulated participants; empty for people."""
     left_out: tuple[str, ...]
     """What did not enter, and why, in sentences."""
+    finished: tuple[str, ...]
+    """What was written now, because the program was killed before it was done, in sentences."""
 
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
@@ -36,7 +39,8 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
     those who felt nothing. Raises StudyError where there is nothing to analyse.
     """
     folders = _folders(data)
-    folded, left_out = _fold_all(folders)
+    whole, left_out = _fold_all(folders)
+    folded = [(folder, session.state) for folder, session in whole]
     chosen_hash = _choose_protocol(folded, protocol_name, data)
     chosen = [(folder, state) for folder, state in folded if state.opened.protocol_hash == chosen_hash]
     left_out += [
@@ -63,6 +67,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         devices=tuple(dict.fromkeys(state.opened.device.name for _, state in entering)),
         observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
         left_out=tuple(left_out),
+        finished=_finish(whole),
     )
 
 
@@ -79,20 +84,36 @@ def _folders(data: Path) -> tuple[SessionFolder, ...]:
     return folders
 
 
-def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, SessionState]], list[str]]:
-    folded: list[tuple[SessionFolder, SessionState]] = []
+def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
+    folded: list[tuple[SessionFolder, FoldedSession]] = []
     left_out: list[str] = []
     for folder in folders:
         if folder.withdrawn:
             left_out.append(f"{folder.name} was withdrawn by the participant.")
             continue
         try:
-            folded.append((folder, fold_session(folder).state))
+            folded.append((folder, fold_session(folder)))
         except StudyError as problem:
             left_out.append(f"{folder.name} cannot be used. {problem.happened}")
     if not folded:
         raise StudyError("There is nothing to analyse", " ".join(left_out), "Record new sessions.")
     return folded, left_out
+
+
+def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
+    """Nothing here keeps an analysis from going on: the log alone is analysed."""
+    said = []
+    for folder, session in folded:
+        try:
+            written = finish_tables(folder, session)
+        except StudyError as problem:
+            said.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
+            continue
+        if written:
+            said.append(
+                f"{folder.name}: written now from its log, because missing or out of date: {', '.join(written)}."
+            )
+    return tuple(said)
 
 
 def _choose_protocol(

@@ -1,4 +1,7 @@
-"""Read a session: fold its log, checking every logged level against the rules. Changes nothing."""
+"""Read a session: fold its log, checking every line against its checksum and every level against the rules.
+
+Changes nothing. Everything that reads a session begins here, so that damage is seen by all of it.
+"""
 
 from dataclasses import dataclass
 
@@ -12,12 +15,22 @@ from study.session.fold import apply, begin_session
 from study.session.state import SessionState
 from study.store.archive import SessionFolder, SessionWithdrawnError
 from study.store.event_log import LogContents, read_log
+from study.store.log_seal import check_seals
+from study.store.session_summary import SUMMARY_NAME, read_summary, said_to_have
 
 
 @dataclass(frozen=True, slots=True)
 class FoldedSession:
     state: SessionState
     contents: LogContents
+    sealed_lines: int
+    """How many lines a seal covers; 0 where there is none."""
+
+    @property
+    def seal_due(self) -> bool:
+        """Closed, and the program died before the seal was written. A log without checksums is never sealed: what a
+        seal would say of it is not known to be what was written."""
+        return self.state.closed and bool(self.contents.chain.since) and not self.sealed_lines
 
 
 def fold_session(folder: SessionFolder) -> FoldedSession:
@@ -53,7 +66,24 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             "If the log was edited, restore it from a copy; if not, use the hapteq that began it (first line).",
             saved="Nothing was changed; every answer is still in the log.",
         ) from problem
-    return FoldedSession(state, contents)
+    sealed_lines = check_seals(folder.path, contents)
+    if not state.closed:
+        _check_end(state, folder)
+    return FoldedSession(state, contents, sealed_lines)
+
+
+def _check_end(state: SessionState, folder: SessionFolder) -> None:
+    """A log whose end was lost looks like that of an interrupted session; its results remember more."""
+    closed, presentations = said_to_have(read_summary(folder.path))
+    if closed or presentations > len(state.trials):
+        what = "a finished session" if closed else f"{presentations} presentations"
+        raise StudyError(
+            "The end of this session's log is missing",
+            f"{SUMMARY_NAME} of {folder.name} was made from {what}; the log ends before that, after "
+            f"{len(state.trials)} presentations.",
+            "Restore events.jsonl from a copy.",
+            saved="Nothing was changed.",
+        )
 
 
 def protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:

@@ -20,14 +20,21 @@ from equalizer.signals.units import ALLOWED
 from equalizer.tracking.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.schema import protocol_schema
 from protocols.trial import Trial
-from study.session.events import EVENTS
 from study.session.live import Live
-from study.store import identified_model_file, live_file, mechanical_model_file, recording_layout, repeats_file
+from study.store import (
+    identified_model_file,
+    live_file,
+    log_seal,
+    mechanical_model_file,
+    recording_layout,
+    repeats_file,
+)
 from study.store.csv_rows import columns, in_words
 from study.store.layout import Entry
 from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.store.text_file import write_text
 from study.workflows.importing_docs import importing_markdown
+from study.workflows.session_log_docs import event_schema, session_log_markdown
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +67,12 @@ def request_schema() -> dict[str, Any]:
 
 SCHEMAS: tuple[Schema, ...] = (
     Schema("study_protocol.json", "study protocols, read from TOML", lambda: protocol_schema("study")),
-    Schema("session_event.json", "one line of `events.jsonl`", EVENTS.json_schema),
+    Schema("session_event.json", "one line of `events.jsonl`", event_schema),
+    Schema(
+        "seal.json",
+        "`seal.json`, beside the log of a closed session",
+        lambda: document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
+    ),
     Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: protocol_schema("recording")),
     Schema(
         "diagnosis.json",
@@ -117,6 +129,7 @@ def formats_markdown() -> str:
         "translational and rotational models. Further names may appear in a diagnosis.",
         _effects(),
         *_tables(),
+        *session_log_markdown(),
         "## JSON documents and protocols",
         "\n".join(f"* [`{schema.file}`](schemas/{schema.file}): {schema.describes}" for schema in SCHEMAS),
     ]

@@ -16,7 +16,7 @@ from study.store.provenance import sha256_of
 from study.workflows.conduct_session import conduct_new, conduct_resumed
 from study.workflows.fold_session import fold_session
 from study.workflows.open_session import SessionPlan
-from study.workflows.session_results import write_tables
+from study.workflows.session_results import finish_tables, write_tables
 from study.workflows.simulated_participant import seated
 
 DEVICE = "simulated"
@@ -101,10 +101,11 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
             model=rehearsal.model,
         )
         conducted = conduct_new(plan, DEVICE, seated(observer, seed, VirtualClock()))
-    elif (state := fold_session(begun).state).closed:
+    elif (folded := fold_session(begun)).state.closed:
+        finish_tables(begun, folded)
         return
     else:
-        clock = VirtualClock.not_before(state.sitting.last.utc)
+        clock = VirtualClock.not_before(folded.state.sitting.last.utc)
         conducted = conduct_resumed(begun, DEVICE, seated(observer, seed, clock))
     write_tables(conducted.folder)
     if conducted.left:

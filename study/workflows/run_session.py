@@ -15,6 +15,7 @@ from study.session.progress import progress
 from study.session.state import SessionState, felt
 from study.session.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
 from study.session.void_reasons import busy_sentence, why_too_many
+from study.store.log_seal import seal_log
 from study.workflows.after_trial import AfterTrial
 from study.workflows.demonstrate import demonstrate
 from study.workflows.fold_session import fold_session
@@ -60,7 +61,10 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     with contextlib.suppress(KeyboardInterrupt):
         sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers, reason=end.left))
     # As long as the log is open, who notes something is told that the session writes it.
-    return replace(end, state=write_notes(end.state, sitting))
+    end = replace(end, state=write_notes(end.state, sitting))
+    if end.state.closed:
+        seal_log(sitting.folder.log)
+    return end
 
 
 def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
@@ -110,7 +114,9 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
         if isinstance(action, Finish):
             state = _say_busy(state, sitting)
             closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
-            return SessionEnd(record(state, closed, sitting), left="")
+            state = record(state, closed, sitting)
+            seal_log(sitting.folder.log)
+            return SessionEnd(state, left="")
         after = _act(state, action, sitting)
         voids = (*voids, after.void) if after.void else ()
         if len(voids) >= VOID_TRIALS_IN_A_ROW:

@@ -25,6 +25,7 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("runs", f"{state.run} of {len(state.runs)}"),
         ("answers", _answers(folded)),
         *_forms(folded),
+        ("log", _log(folded)),
         ("seed", str(opened.seed)),
         ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
     ]
@@ -58,6 +59,13 @@ def _answers(folded: FoldedSession) -> str:
 def _last_utc(folded: FoldedSession) -> str:
     closed = next((event.utc for event in folded.contents.events if isinstance(event, SessionClosed)), "")
     return closed or folded.contents.events[-1].utc
+
+
+def _log(folded: FoldedSession) -> str:
+    """What speaks for it being as it was written."""
+    lines = f"{folded.contents.chain.lines} lines"
+    sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
+    return f"{lines}, {folded.contents.chain.in_words()}{sealed}"
 
 
 def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:

@@ -1,7 +1,7 @@
 """One line per session. Reads only.
 
-A list has to be there at once: a finished session is told by its last line and counted without being folded; whoever
-opens it gets the whole truth. Others are few, and folded.
+A list has to be there at once: the log of a finished session whose checksums and seal hold is what the program wrote,
+and is counted without being parsed. Every other log is folded.
 """
 
 from dataclasses import replace
@@ -17,13 +17,14 @@ from study.session.events import SessionOpened
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import read_opening
+from study.store.log_seal import is_sealed, seal_paths
 from study.store.log_writer import somebody_writes
 from study.store.regular_file import read_regular
+from study.store.session_summary import SUMMARY_NAME
 from study.store.withdrawal_files import how_to_finish, read_intent, read_tombstone
 from study.workflows.fold_session import fold_session
 
-CLOSED = b'"event":"session_closed"}\n'
-MEASURED = b'"event":"trial_measured"}\n'
+MEASURED = b',"event":"trial_measured",'
 
 
 def session_line(folder: SessionFolder) -> SessionLine:
@@ -31,8 +32,7 @@ def session_line(folder: SessionFolder) -> SessionLine:
     try:
         if folder.withdrawn:
             return _withdrawn(folder)
-        stat = folder.log.stat()
-        line = _line(folder, stat.st_mtime_ns, stat.st_size)
+        line = _line(folder, _stamp(folder))
     except FileNotFoundError:
         return unreadable(folder, "It has no log: the program died while it was made.")
     except StudyError as problem:
@@ -90,13 +90,21 @@ def _withdrawn(folder: SessionFolder) -> SessionLine:
     )
 
 
+def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
+    """Of all files that decide how a session stands: times and sizes. Raises OSError where there is no log."""
+    beside = (path for path in (*seal_paths(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
+    stats = ((path.name, path.stat()) for path in (folder.log, *beside))
+    return tuple((name, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for name, stat in stats)
+
+
 @lru_cache(maxsize=4096)
-def _line(folder: SessionFolder, changed_ns: int, size: int) -> SessionLine:
-    """Depends on the log's content alone, for which its time and size stand. Raises StudyError, OSError."""
+def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
+    """Depends on the content of these files alone, for which their stamp stands. Raises StudyError, OSError."""
     content = read_regular(folder.log)
-    opened = read_opening(folder.log) if CLOSED in content and _looks_whole(content) else None
-    planned = _planned(opened.protocol_text) if isinstance(opened, SessionOpened) else None
-    if planned is None or not isinstance(opened, SessionOpened) or opened.session != folder.name:
+    opened = read_opening(folder.log)
+    ours = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
+    planned = _planned(opened.protocol_text) if ours and isinstance(opened, SessionOpened) else None
+    if planned is None or not isinstance(opened, SessionOpened):
         return line_of(fold_session(folder).state, folder)
     protocol, run_count = planned
     return SessionLine(
@@ -111,11 +119,6 @@ def _line(folder: SessionFolder, changed_ns: int, size: int) -> SessionLine:
         runs=run_count,
         standing="finished",
     )
-
-
-def _looks_whole(content: bytes) -> bool:
-    """Whether every line could be an event of ours; whoever cannot be sure folds."""
-    return all(line.startswith(b'{"') and line.endswith(b'"}') for line in content.split(b"\n")[:-1])
 
 
 @lru_cache(maxsize=64)

@@ -3,35 +3,31 @@
 from dataclasses import MISSING, fields
 from pathlib import Path
 
-from analysis.detection import detection_thresholds
-from analysis.thresholds import Threshold, thresholds
 from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
-from protocols.trial import Trial
 from study.errors import StudyError
 from study.session.events import SESSION_FORMAT, TrialMeasured
 from study.session.live import Live
 from study.store.archive import SessionFolder
-from study.store.csv_rows import as_written_in
 from study.store.event_log import LOG_NAME
 from study.store.file_errors import UnusableFileError
 from study.store.json_document import read_json
 from study.store.live_file import LIVE_FORMAT
+from study.store.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
 from study.store.provenance import sha256_of
 from study.store.request_inbox import REQUEST_FORMAT
-from study.store.text_file import read_text
-from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds
-from study.store.trials_file import TRIALS_NAME, read_trials
+from study.store.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
 from study.store.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
 from study.workflows.file_content import FileContent
 from study.workflows.fold_session import FoldedSession, fold_session
-from study.workflows.session_results import SUMMARY_FORMAT, SUMMARY_VERSION
+from study.workflows.session_results import result_problems
 
 KIND = "session"
 
 DOCUMENTS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
     "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
+    SEAL_FORMAT: ("seal of a session log", ("session", "lines", "bytes", "head", "sha256")),
     LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live) if field.default is MISSING)),
     REQUEST_FORMAT: ("request to a running session", ("request", "who")),
     WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
@@ -65,6 +61,8 @@ def recognise_document(content: FileContent) -> str | None:
     if content.json_format == WITHDRAWAL_FORMAT:
         finish = "the erasing is not finished; `hapteq withdraw` goes on with it"
         raise UnusableFileError(content.path, kind, (finish,))
+    if content.json_format == SEAL_FORMAT:
+        read_seal(content.path)
     document = read_json(content.path, content.json_format, SUMMARY_VERSION)
     missing = [key for key in needed if key not in document]
     if missing:
@@ -87,8 +85,7 @@ def _checked(folder: SessionFolder, path: Path) -> str:
     folded = _folded(folder, path)
     problems = [
         *_recording_problems(folder, folded),
-        *_table_problems(folder, folded),
-        *_threshold_problems(folder, folded),
+        *_result_problems(folder, folded),
     ]
     if problems:
         raise UnusableFileError(path, KIND, tuple(problems))
@@ -114,42 +111,20 @@ def _recording_problems(folder: SessionFolder, folded: FoldedSession) -> list[st
         if not isinstance(event, TrialMeasured) or event.recording is None:
             continue
         path = folder.path / event.recording
-        if not path.exists():
+        if not path.is_file():
             problems.append(f"{event.recording} is missing")
         elif sha256_of(path) != event.sha256:
             problems.append(f"{event.recording} is not the file that was written (its SHA-256 differs from the log)")
     return problems
 
 
-def _table_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
-    table = folder.path / TRIALS_NAME
-    if not table.exists():
-        return []
-    try:
-        if read_trials(table) == as_written_in(read_text(table), folded.state.trials, Trial):
-            return []
-    except UnusableFileError as error:
-        return [f"{TRIALS_NAME}: {problem}" for problem in error.problems]
-    return [f"{TRIALS_NAME} does not agree with the log; hapteq analyze and hapteq resume read the log alone"]
-
-
-def _threshold_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
-    trials, protocol = folded.state.trials, folded.state.protocol
-    return [
-        *_computed_problems(folder.path / THRESHOLDS_NAME, thresholds(trials, protocol.staircase)),
-        *_computed_problems(folder.path / DETECTION_NAME, detection_thresholds(trials, protocol)),
-    ]
-
-
-def _computed_problems(table: Path, computed: tuple[Threshold, ...]) -> list[str]:
-    if not table.exists():
-        return []
-    try:
-        if read_thresholds(table) == as_written_in(read_text(table), computed, Threshold):
-            return []
-    except UnusableFileError as error:
-        return [f"{table.name}: {problem}" for problem in error.problems]
-    return [f"{table.name} does not agree with the log; hapteq analyze computes it anew"]
+def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    """What is missing is due and not wrong; what differs from the log was changed, or belongs to an earlier time."""
+    said = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
+    for result in result_problems(folder, folded.state):
+        if not result.missing:
+            said += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
+    return said
 
 
 def _described(folded: FoldedSession) -> str:
@@ -157,7 +132,9 @@ def _described(folded: FoldedSession) -> str:
     who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end = "finished" if state.closed else "not finished"
     steps = "".join(f". Before {step.utc}: {step.sentence}" for step in state.sitting.clock_steps).rstrip(".")
-    return f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}{steps}"
+    sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
+    kind = f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"
+    return f"{kind}; log {folded.contents.chain.in_words()}{sealed}{steps}"
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

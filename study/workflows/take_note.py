@@ -6,6 +6,7 @@ from study.session.events import NoteTaken
 from study.session.requests import NoteAsked
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend
+from study.store.log_seal import seal_log
 from study.store.log_writer import somebody_writes
 from study.store.session_lock import locked
 from study.workflows.ask_session import ask_session
@@ -24,11 +25,14 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     with locked(folder.path):
         log = EventLog.reopen(folder.log)
         try:
-            contents = fold_session(folder).contents
+            folded = fold_session(folder)
+            contents = folded.contents
             if contents.torn:
                 mend(folder.log, contents)
                 log.append(_of_the_program(f"a torn last line was cut off: {contents.torn}", clock))
             log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
+            if folded.state.closed:
+                seal_log(folder.log)
         finally:
             log.close()
     return True

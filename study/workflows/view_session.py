@@ -18,6 +18,7 @@ from study.workflows.analysis_files import ANALYSIS_NAME
 from study.workflows.fold_session import FoldedSession, fold_session
 from study.workflows.session_facts import session_facts, when
 from study.workflows.session_line import line_of, session_line, with_writer
+from study.workflows.session_results import due_results
 
 if TYPE_CHECKING:
     from analysis.study_analysis import StudyAnalysis
@@ -39,22 +40,29 @@ def _whole(folder: SessionFolder, folded: FoldedSession) -> SessionView:
     state = folded.state
     analysis, problem = _analysis(state)
     clock = (f"Before {when(step.utc)}: {step.sentence}" for step in state.sitting.clock_steps)
-    torn = "A crash tore the last line of the log; it is taken off when the session is resumed."
     return SessionView(
         line=with_writer(line_of(state, folder), folder),
         facts=session_facts(folded),
         thresholds=_threshold_rows(state, analysis),
-        warnings=(
-            *((torn,) if folded.contents.torn_bytes else ()),
-            *clock,
-            *problem,
-            *(analysis.warnings if analysis else ()),
-        ),
+        warnings=(*_log_remarks(folder, folded), *clock, *problem, *(analysis.warnings if analysis else ())),
         staircases=_staircases(state, analysis),
         events=log_in_words(folded.contents.events),
         report=_report(folder),
         figures=_figures(folder),
     )
+
+
+def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+    due = ", ".join(due_results(folder, folded))
+    said = (
+        (
+            folded.contents.torn_bytes,
+            "A crash tore the last line of the log; it is taken off when the session is resumed.",
+        ),
+        (due, f"Missing or not as the log gives it: {due}. hapteq resume writes it."),
+        (not folded.contents.chain.since, "The log carries no checksums: it was written before there were any."),
+    )
+    return tuple(text for holds, text in said if holds)
 
 
 def _damaged(folder: SessionFolder, problem: StudyError) -> SessionView:

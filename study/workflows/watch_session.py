@@ -7,6 +7,7 @@ from study.errors import StudyError
 from study.session.draw_check import LogContradiction
 from study.session.events import SessionOpened, parse_event
 from study.session.live import Live
+from study.session.log_chain import Chain, ChainBrokenError, read_chained
 from study.session.log_time import minutes_between
 from study.session.requests import Request
 from study.session.watch_alarms import SILENT_AFTER_S
@@ -16,6 +17,7 @@ from study.session.watched import follow as after
 from study.session.watching import Beside, watch_view
 from study.store.archive import SessionFolder
 from study.store.live_file import read_live
+from study.store.log_seal import read_seal, seal_paths
 from study.store.log_writer import somebody_writes
 from study.store.regular_file import TABLE_BYTES, open_regular
 from study.store.request_inbox import RequestInbox
@@ -42,6 +44,7 @@ class Follower:
         self._watched: Watched | None = None
         self._read_bytes = 0
         self._last_line = b""
+        self._chain = Chain()
         self._problem = ""
         self._missing = False
         self._view: WatchView | None = None
@@ -59,6 +62,7 @@ class Follower:
         return self._view
 
     def _take_in_what_is_new(self) -> None:
+        sealed_bytes = self._sealed_bytes()  # before the log is read: it is written after the lines that it covers
         try:
             with open_regular(self._folder.log) as file:
                 self._begin_again_if_rewritten(file)
@@ -77,20 +81,34 @@ class Follower:
                 return
             self._read_bytes += len(line)
             self._last_line = line
+        if sealed_bytes is None:
+            self._problem = "its seal cannot be read."
+        elif sealed_bytes > self._read_bytes:
+            self._problem = "its end is missing."
+
+    def _sealed_bytes(self) -> int | None:
+        """None where a seal cannot be read."""
+        try:
+            return max((read_seal(path).bytes for path in seal_paths(self._folder.path).values()), default=0)
+        except StudyError:
+            return None
 
     def _begin_again_if_rewritten(self, file: io.BufferedReader) -> None:
         """A line that could not be synced is cut off again by its writer, after it was seen here."""
         file.seek(self._read_bytes - len(self._last_line))
         if file.read(len(self._last_line)) != self._last_line:
-            self._watched, self._read_bytes, self._last_line = None, 0, b""
+            self._watched, self._read_bytes, self._last_line, self._chain = None, 0, b"", Chain()
 
     def _take_in(self, line: bytes) -> str:
         """Returns the problem with this line; empty where there is none."""
         try:
-            event = parse_event(line)
-        except ValueError:
+            chain, content = read_chained(self._chain, line.removesuffix(b"\n"))
+            event = parse_event(content)
+        except ValueError as problem:
             if self._watched is None:
                 raise _not_ours(_FIRST.format(self._folder.name)) from None
+            if isinstance(problem, ChainBrokenError):
+                return f"line {self._chain.lines + 1} of it {problem}."
             return "a line of it is no event that this version knows."
         if self._watched is None:
             if not isinstance(event, SessionOpened):
@@ -99,12 +117,14 @@ class Follower:
                 self._watched = begin_watching(event, protocol_of(event, self._folder))
             except LogContradiction:
                 raise _not_ours(_FIRST.format(self._folder.name)) from None
+            self._chain = chain
             return ""
         try:
             self._watched = after(self._watched, event)
         except LogContradiction:
             # Not in the problem's own words: they may tell what the open trial plays.
             return "it contradicts the rules."
+        self._chain = chain
         return ""
 
     def _somebody_writes(self, live: Live | None, now_utc: str) -> bool | None:

@@ -308,11 +308,10 @@ def test_a_copied_session_is_left_out_and_the_rest_is_analysed(run, data):
     assert "25 Hz" in out
 
 
-def test_a_simulated_participant_does_not_take_a_persons_code(run, small_file, tmp_path):
+def test_a_simulated_participant_does_not_take_a_persons_code(run, small_file, tmp_path, session_logs):
     data = tmp_path / "d"
     assert run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)[0] == 0
-    log = data / "P01_001" / "events.jsonl"
-    log.write_text(log.read_text().replace('"observer":"ideal"', '"observer":null', 1))
+    session_logs.as_older(data / "P01_001", lambda text: text.replace(b'"observer":"ideal"', b'"observer":null', 1))
     code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)
     assert code == 2
     assert "P01 is the code of a person" in err

@@ -112,12 +112,12 @@ def test_a_repeat_that_was_asked_for_is_drawn_anew_in_the_same_sitting(sitter):
     assert sum(t.status is TrialStatus.SPOILED for t in done.state.trials) == 1
 
 
-def test_a_crash_between_answer_and_measurement_loses_nothing(sitter):
+def test_a_crash_between_answer_and_measurement_loses_nothing(sitter, session_logs):
     """The log is cut right after an answer, as a SIGKILL there would leave it; the recording reached the disk."""
     done = sitter.whole()
     lines = done.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
-    done.folder.log.write_bytes(b"".join(lines[: cut + 1]))
+    session_logs.cut(done.folder.path, cut + 1)
     resumed = sitter.resumed(done.folder)
     assert decisions(resumed.state) == decisions(done.state)
     last = resumed.state.trials[-1]
@@ -125,11 +125,11 @@ def test_a_crash_between_answer_and_measurement_loses_nothing(sitter):
     assert last.delivered_mps2 == pytest.approx(done.state.trials[-1].delivered_mps2, rel=1e-5)
 
 
-def test_the_answer_counts_even_when_its_recording_was_lost(sitter):
+def test_the_answer_counts_even_when_its_recording_was_lost(sitter, session_logs):
     done = sitter.whole()
     lines = done.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
-    done.folder.log.write_bytes(b"".join(lines[: cut + 1]))
+    session_logs.cut(done.folder.path, cut + 1)
     trial = done.state.trials[-1]
     (done.folder.recordings / f"run-{trial.run:02d}_trial-{trial.trial:03d}_attempt-0.h5").unlink()
     resumed = sitter.resumed(done.folder)
@@ -148,10 +148,10 @@ def test_a_torn_last_line_is_mended_and_remembered(sitter):
     assert b'"mended":"{\\"utc\\": \\"2026\\", \\"run\\": 0, \\"tri"' in text
 
 
-def test_a_level_changed_in_the_log_is_found_out(sitter):
+def test_a_level_changed_in_the_log_is_found_out(sitter, session_logs):
     left = sitter.interrupted(after=6)
-    changed = left.folder.log.read_bytes().replace(b'"level_n":1.0,', b'"level_n":0.9,', 1)
-    left.folder.log.write_bytes(changed)
+    session_logs.as_older(left.folder.path, lambda text: text.replace(b'"level_n":1.0,', b'"level_n":0.9,', 1))
+    changed = left.folder.log.read_bytes()
     with pytest.raises(StudyError) as error:
         sitter.resumed(left.folder)
     assert error.value.title == "The session log contradicts the rules"
@@ -159,10 +159,9 @@ def test_a_level_changed_in_the_log_is_found_out(sitter):
     assert left.folder.log.read_bytes() == changed
 
 
-def test_a_protocol_changed_in_the_log_is_found_out(sitter):
+def test_a_protocol_changed_in_the_log_is_found_out(sitter, session_logs):
     left = sitter.interrupted(after=2)
-    changed = left.folder.log.read_bytes().replace(b"start_n = 1.0", b"start_n = 0.5", 1)
-    left.folder.log.write_bytes(changed)
+    session_logs.as_older(left.folder.path, lambda text: text.replace(b"start_n = 1.0", b"start_n = 0.5", 1))
     with pytest.raises(StudyError, match="protocol text of P01_001 does not match the hash"):
         sitter.resumed(left.folder)
 

@@ -30,11 +30,10 @@ def data(taken, tmp_path) -> Path:
 
 
 @pytest.fixture
-def unfinished(data) -> Path:
+def unfinished(data, session_logs) -> Path:
     """The same, cut off in the middle."""
-    log = data / "P01_001" / "events.jsonl"
-    lines = log.read_bytes().splitlines(keepends=True)
-    log.write_bytes(b"".join(lines[: len(lines) // 2]))
+    lines = (data / "P01_001" / "events.jsonl").read_bytes().splitlines()
+    session_logs.cut(data / "P01_001", len(lines) // 2)
     return data
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from study.store.archive import SessionFolder
 from study.store.event_log import EventLog
+from study.workflows.session_line import session_line
 from study.workflows.session_results import write_results
 from study.workflows.view_session import session_view
 from study.workflows.withdraw_participant import plan_withdrawal, withdraw
@@ -68,23 +69,18 @@ def test_a_report_is_there_once_it_is_written(session):
     assert session_view(session).report == str(session / "analysis" / "report.html")
 
 
-def cut(session: Path, lines: int) -> None:
-    log = session / "events.jsonl"
-    log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:lines]))
-
-
-def test_a_session_without_a_complete_run_has_no_thresholds_but_its_staircase(session):
-    cut(session, 12)
+def test_a_session_without_a_complete_run_has_no_thresholds_but_its_staircase(session, session_logs):
+    session_logs.cut(session, 12)
     view = session_view(session)
     assert view.thresholds == ()
     assert view.line.standing == "unfinished"
     assert view.staircases[0].title.endswith("not complete")
 
 
-def test_the_open_trial_of_a_running_session_keeps_its_direction(session):
+def test_the_open_trial_of_a_running_session_keeps_its_direction(session, session_logs):
     lines = (session / "events.jsonl").read_bytes().splitlines()
     last = max(n for n, line in enumerate(lines) if b'"trial_presented"' in line)
-    cut(session, last + 1)
+    session_logs.cut(session, last + 1)
     log = EventLog.reopen(session / "events.jsonl")
     try:
         view = session_view(session)
@@ -112,13 +108,22 @@ def test_of_a_damaged_log_the_whole_lines_are_shown_and_the_damage_is_named(sess
     assert view.staircases == ()
 
 
-def test_a_log_that_contradicts_its_rules_looks_whole_in_the_list_and_is_not(session):
-    log = session / "events.jsonl"
-    log.write_bytes(log.read_bytes().replace(b'"answer":1', b'"answer":2', 1))
+def test_a_log_that_contradicts_its_rules_cannot_be_read_in_the_list_either(session, session_logs):
+    session_logs.as_older(session, lambda text: text.replace(b'"answer":1', b'"answer":2', 1))
     view = session_view(session)
     assert view.line.standing == "unreadable"
     assert "contradicts the rules" in view.warnings[0]
-    assert view.line.protocol == "small"
+    assert "trial" in session_line(SessionFolder(session)).remark
+
+
+def test_a_log_of_an_older_version_says_that_it_has_no_checksums(session, session_logs):
+    lines = len((session / "events.jsonl").read_bytes().splitlines())
+    assert dict(session_view(session).facts)["log"] == f"{lines} lines, with checksums, sealed to line {lines}"
+    session_logs.as_older(session)
+    view = session_view(session)
+    assert view.line.standing == "finished"
+    assert "carries no checksums" in view.warnings[0]
+    assert "without checksums" in dict(view.facts)["log"]
 
 
 def test_a_withdrawn_session_is_its_name_and_a_sentence(session):

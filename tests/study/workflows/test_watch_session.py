@@ -108,20 +108,34 @@ def test_following_changes_nothing_in_the_folder(whole):
     assert {path: path.read_bytes() for path in whole.path.rglob("*") if path.is_file()} == before
 
 
-def test_a_contradiction_is_an_alarm_that_tells_nothing_of_the_draw(growing):
-    lines = growing.data.splitlines(keepends=True)
-    wrong = lines[1].replace(b'"level_n":1.0', b'"level_n":2.0')
-    growing.path.write_bytes(lines[0] + wrong)
+def test_a_contradiction_is_an_alarm_that_tells_nothing_of_the_draw(growing, session_logs):
+    growing.grow_to(len(b"".join(growing.data.splitlines(keepends=True)[:2])))
+    session_logs.as_older(growing.path.parent, lambda text: text.replace(b'"level_n":1.0', b'"level_n":2.0'))
     view = follow(growing.path.parent).look(now())
     assert view.alarms[0].sentence == "The log cannot be followed: it contradicts the rules."
     assert view.open_trial is None
 
 
-def test_a_damaged_line_is_an_alarm(growing):
-    lines = growing.data.splitlines(keepends=True)
-    growing.path.write_bytes(lines[0] + b"{nothing}\n")
+def test_a_damaged_line_is_an_alarm(growing, session_logs):
+    growing.grow_to(len(b"".join(growing.data.splitlines(keepends=True)[:2])))
+    session_logs.as_older(growing.path.parent, lambda text: text.replace(b'"level_n"', b'"level_m"'))
     view = follow(growing.path.parent).look(now())
     assert "a line of it is no event that this version knows" in view.alarms[0].sentence
+
+
+def test_a_line_that_was_changed_is_an_alarm(growing):
+    whole = growing.data.splitlines(keepends=True)[:2]
+    growing.path.write_bytes(b"".join(whole).replace(b'"level_n":1.0', b'"level_n":2.0'))
+    view = follow(growing.path.parent).look(now())
+    assert view.alarms[0].sentence == "The log cannot be followed: line 2 of it does not match its checksum."
+    assert view.open_trial is None
+
+
+def test_the_cut_end_of_a_finished_log_is_an_alarm(whole):
+    assert follow(whole.path).look(now()).alarms == ()
+    text = whole.log.read_bytes()
+    whole.log.write_bytes(b"".join(text.splitlines(keepends=True)[:-1]))
+    assert follow(whole.path).look(now()).alarms[0].sentence == "The log cannot be followed: its end is missing."
 
 
 def test_a_first_line_of_another_kind_cannot_be_followed(growing):

@@ -1,0 +1,69 @@
+"""The chained checksum of a log: each line carries a hash of its own bytes and of all lines before it.
+
+A line without one (of an older version) enters the hash too, so that a log that goes on under this version has what
+came before covered by its first checksum. There is no key in it: it shows damage, and edits by those who do not
+compute it again; it does not prove who wrote a log.
+"""
+
+import hashlib
+from dataclasses import dataclass
+
+DIGITS = 32
+"""Of SHA-256, in hexadecimal: 128 bits."""
+SEED = "0" * DIGITS
+"""Stands before the first line."""
+
+_FIELD, _END = b',"chain":"', b'"}'
+_LENGTH = len(_FIELD) + DIGITS + len(_END)
+_HEXADECIMAL = frozenset(b"0123456789abcdef")
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """How far a log has been read or written."""
+
+    head: str = SEED
+    lines: int = 0
+    since: int = 0
+    """Number of the first line that carries a checksum, from 1; 0 while none does."""
+
+    def in_words(self) -> str:
+        if not self.since:
+            return "without checksums (an older version wrote it)"
+        return "with checksums" if self.since == 1 else f"with checksums from line {self.since} on"
+
+
+class ChainBrokenError(ValueError):
+    """A line does not match its checksum, or lacks one."""
+
+
+def write_chained(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
+    """event: a JSON object without a line end. Returns the line with its checksum, line end included."""
+    after = _after(chain, event, carried=True)
+    return after, event[:-1] + _FIELD + after.head.encode() + _END + b"\n"
+
+
+def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
+    """line: without its end. Returns the event's own bytes. Raises ChainBrokenError."""
+    event, head = _split(line)
+    after = _after(chain, event, carried=head is not None)
+    if head is None and chain.since:
+        raise ChainBrokenError("has no checksum, although lines before it have")
+    if head is not None and head != after.head:
+        raise ChainBrokenError("does not match its checksum")
+    return after, event
+
+
+def _after(chain: Chain, event: bytes, carried: bool) -> Chain:
+    lines = chain.lines + 1
+    head = hashlib.sha256(chain.head.encode() + b"\n" + event).hexdigest()[:DIGITS]
+    return Chain(head, lines, chain.since or (lines if carried else 0))
+
+
+def _split(line: bytes) -> tuple[bytes, str | None]:
+    """On the raw bytes: nothing is parsed and written again."""
+    digits = line[-len(_END) - DIGITS : -len(_END)]
+    ends_so = line[-_LENGTH:].startswith(_FIELD) and line.endswith(_END)
+    if not ends_so or len(line) <= _LENGTH or not _HEXADECIMAL.issuperset(digits):
+        return line, None
+    return line[:-_LENGTH] + b"}", digits.decode()
