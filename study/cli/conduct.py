@@ -19,7 +19,7 @@ from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
 from study.workflows.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.display import PersonsHand
-from study.workflows.end_sitting import end_sitting
+from study.workflows.end_sitting import end_sitting, finish_closed
 from study.workflows.fold_session import fold_session
 from study.workflows.plan_sitting import plan_sitting
 from study.workflows.requests_port import QueuedRequests
@@ -57,8 +57,11 @@ def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys
     folder = find_session(session, data)
     if still_open := left_open(folder.path.parent):
         typer.echo(f"Note: {still_open}", err=True)
-    state = fold_session(folder).state
-    opened = state.opened
+    folded = fold_session(folder)
+    state, opened = folded.state, folded.state.opened
+    if state.closed:
+        show(finish_closed(folder, folded), as_json)
+        return
     clock: Clock = RealClock() if opened.observer is None else VirtualClock.not_before(state.sitting.last.utc)
     _say_wait(opened.observer)
     with _participant(opened.observer, opened.seed, keys, clock) as participant:

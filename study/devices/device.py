@@ -130,6 +130,10 @@ class Device(Protocol):
         """The fault that ended the present stimulus, if any. Cheap: may be asked at every key press."""
         ...
 
+    def health(self) -> Health:
+        """What the safety layer counted since `hold`, so far. Cheap, as `fault` is."""
+        ...
+
     def release(self) -> Played:
         """Fade out, wait until the device is still, and say what happened. To be called after a fault as well.
 

@@ -8,11 +8,12 @@ import atexit
 import contextlib
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 
 from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, VirtualClock
-from study.devices.device import DeviceInfo, DeviceSettings, Fault, Look, Played
+from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
 from study.devices.governor import SETTLE_S, Governor
 from study.devices.played import played_loop, played_once
 from study.devices.realtime_drive import RealtimeDrive
@@ -68,6 +69,9 @@ class SafeDevice:
         self._drive.check()
         fault = self._governor.fault
         return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
+
+    def health(self) -> Health:
+        return replace(self._governor.health(), fault=self.fault())
 
     def release(self) -> Played:
         stimulus = self._held

@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from protocols.trial import Phase, VoidCause
+from study.session.answer_health import AnswerHealth
 from study.session.fact_types import (
     AngleDeg,
     Count,
@@ -141,6 +142,8 @@ class AnswerGiven:
     answer: Literal[1, 2]
     response_time_s: Seconds
     monotonic_s: Seconds | None = None
+    health: AnswerHealth | None = None
+    """Null in logs of older versions."""
     event: Literal["answer_given"] = "answer_given"
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from protocols.trial import Phase, VoidCause
-from study.devices.device import Fault, Played
+from study.devices.device import Fault, Health, Played
 from study.session.due_trial import Present
 from study.session.held_stimulus import HeldStimulus
 from study.session.level_scale import amplitude
@@ -26,6 +26,8 @@ class Asked:
     """Of a stimulus that is over before the question; None where it is still held, or was never begun."""
     holding: bool
     """It must still be released."""
+    health: Health | None = None
+    """What the device had counted when the answer came; None where nothing was played to the end of the question."""
 
 
 def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
@@ -37,7 +39,8 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
     sitting.device.keep_alive()
-    return Asked(reply, started_s, sitting.device.fault() is Fault.NONE, played=None, holding=True)
+    health = sitting.device.health()
+    return Asked(reply, started_s, health.fault is Fault.NONE, played=None, holding=True, health=health)
 
 
 def _in_one_of_two_intervals(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
@@ -57,8 +60,9 @@ def _in_one_of_two_intervals(state: SessionState, present: Present, question: Qu
             return Asked(cut, sitting.clock.now_s(), False, played, holding=False)
     started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
-    whole = played is not None and played.health.fault is Fault.NONE
-    return Asked(reply, started_s, whole, played, holding=False)
+    health = played.health if played is not None else None
+    whole = health is not None and health.fault is Fault.NONE
+    return Asked(reply, started_s, whole, played, holding=False, health=health)
 
 
 def _reply_to(question: Question, sitting: Sitting) -> Reply:

@@ -1,11 +1,17 @@
 """After a sitting, with the device closed: the results of a finished session, or why there are none."""
 
+from dataclasses import replace
+
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.counted import answers_are
 from study.session.void_reasons import TOO_BUSY
+from study.store.archive import SessionFolder
+from study.store.session_lock import locked
 from study.workflows.conduct_session import Conducted
-from study.workflows.session_results import write_results
+from study.workflows.fold_session import FoldedSession
+from study.workflows.resume_session import already_finished
+from study.workflows.session_results import REPORT_NAME, due_results, write_results
 from study.workflows.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.written_analysis import WrittenAnalysis
 
@@ -20,6 +26,19 @@ def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
     if end.left:
         raise _not_finished(end)
     return write_results(end.folder)
+
+
+def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalysis:
+    """What a kill after the last run left undone: seal, tables, summary and report. Raises StudyError where nothing is
+    due, or it cannot be written."""
+    report = () if (folder.path / REPORT_NAME).exists() else (REPORT_NAME,)
+    due = (*due_results(folder, folded), *report)
+    if not due:
+        raise already_finished(folded.state, folder)
+    with locked(folder.path):
+        written = write_results(folder)
+    said = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
+    return replace(written, warnings=(said, *written.warnings))
 
 
 def _not_finished(end: Conducted) -> StudyError:

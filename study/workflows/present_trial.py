@@ -16,7 +16,7 @@ from study.workflows.judge_trial import cause_of, judge
 from study.workflows.question import question_of
 from study.workflows.release import released
 from study.workflows.sitting import Sitting, record
-from study.workflows.trial_facts import Outcome, measured, presented, spoiled
+from study.workflows.trial_facts import Outcome, known_then, measured, presented, spoiled
 
 
 def present_trial(state: SessionState, present: Present, sitting: Sitting) -> AfterTrial:
@@ -35,6 +35,7 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
         attempt=present.attempt,
         answer=1 if asked.reply.answer == 1 else 2,
         response_time_s=max(0.0, asked.reply.at_s - asked.started_s),
+        health=known_then(asked.health, asked.felt_whole) if asked.health is not None else None,
     )
     state = record(state, answer, sitting)
     played = asked.played if asked.played is not None else released(sitting)

@@ -24,8 +24,10 @@ from study.store.request_inbox import RequestInbox
 from study.store.session_lock import locked
 from study.store.trial_recordings import find_trial_recording, recording_name
 from study.workflows.fold_session import fold_session
+from study.workflows.judge_trial import Judgement, judge
 from study.workflows.open_session import OpenedSession, device_facts
 from study.workflows.other_sessions import dose_before
+from study.workflows.trial_facts import known_again
 
 
 @contextmanager
@@ -63,12 +65,7 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
 
 def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:
     if state.closed:
-        raise StudyError(
-            "This session is finished",
-            f"{folder.name} has all its runs.",
-            f"Look at its results: hapteq analyze {folder.path}",
-            saved=f"{answers_are(state.answers)} on disk.",
-        )
+        raise already_finished(state, folder)
     if device.simulated != state.opened.device.simulated:
         raise StudyError(
             "This session was begun on another kind of device",
@@ -77,6 +74,15 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
             "Resume it with the device it was begun on.",
             saved="Nothing was changed.",
         )
+
+
+def already_finished(state: SessionState, folder: SessionFolder) -> StudyError:
+    return StudyError(
+        "This session is finished",
+        f"{folder.name} has all its runs.",
+        f"Look at its results: hapteq analyze {folder.path}",
+        saved=f"{answers_are(state.answers)} on disk.",
+    )
 
 
 def _close_open_trial(
@@ -97,31 +103,70 @@ def _close_open_trial(
             cause=VoidCause.LEFT if interrupted else VoidCause.PROGRAM_ENDED,
         )
     else:
-        event = _measured_late(state, presented, folder, clock)
+        event = _judged_late(state, presented, folder, clock)
     log.append(event)
     return apply(state, event)
 
 
-def _measured_late(
+def _judged_late(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
-) -> TrialMeasured:
-    """The program died between answer and measurement: the recording may still have reached the disk."""
-    name = recording_name(presented.run, presented.trial, presented.attempt)
+) -> TrialMeasured | TrialSpoiled:
+    """The program died between answer and measurement: the recording may still have reached the disk.
+
+    A recording is written only of a trial that was judged to count. Without one, the trial is judged by what was
+    logged with its answer. Where that is unknown too (older logs) the answer counts, unmeasured: the person gave it,
+    the staircase of an earlier sitting may have moved by it, and to drop answers by what cannot be known would choose
+    among them after they were seen.
+    """
     try:
-        found = find_trial_recording(folder, name)
-    except StudyError:  # the answer is safe in the log; a damaged recording stays for whoever wants to look
-        found = None
-    if found is None:
-        return TrialMeasured(
+        late = _from_recording(state, presented, folder, clock)
+    except (StudyError, ValueError):  # the answer is safe in the log; a damaged recording stays for a later look
+        late = None
+    return late if late is not None else _without_recording(state, presented, clock)
+
+
+def _without_recording(state: SessionState, presented: TrialPresented, clock: Clock) -> TrialMeasured | TrialSpoiled:
+    logged = state.answered.health if state.answered is not None else None
+    health = known_again(logged) if logged is not None else None
+    verdict = Judgement("", ())
+    if health is not None and logged is not None:
+        verdict = judge(health, True, state.protocol.measurement, logged.felt_whole)
+    missed_ticks = health.missed_ticks if health is not None else None
+    vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
+    if verdict.spoiled:
+        return TrialSpoiled(
             utc=clock.utc(),
             run=presented.run,
             trial=presented.trial,
             attempt=presented.attempt,
-            status="unmeasured",
-            flags=("its recording was lost when the program ended",),
+            reason=verdict.spoiled,
+            missed_ticks=missed_ticks,
+            vibrated_s=vibrated_s,
             monotonic_s=clock.now_s(),
+            cause=verdict.cause,
         )
+    return TrialMeasured(
+        utc=clock.utc(),
+        run=presented.run,
+        trial=presented.trial,
+        attempt=presented.attempt,
+        status="unmeasured",
+        flags=("its recording was lost when the program ended", *verdict.flags),
+        missed_ticks=missed_ticks,
+        vibrated_s=vibrated_s,
+        monotonic_s=clock.now_s(),
+    )
+
+
+def _from_recording(
+    state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
+) -> TrialMeasured | None:
+    """None where there is none. Raises StudyError, ValueError where it cannot be used."""
+    found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
+    if found is None:
+        return None
     saved, recording = found
+    logged = state.answered.health if state.answered is not None else None
     direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
     vector = direction_vector(state.protocol.directions, direction)
     values = delivered(recording, vector, presented.frequency_hz)
@@ -138,5 +183,6 @@ def _measured_late(
         off_axis_mps2=values.off_axis_mps2 if values else None,
         displacement_mm=values.displacement_mm if values else None,
         missed_ticks=recording.meta.get("missed_ticks"),
+        vibrated_s=logged.ticks / state.opened.device.sample_rate_hz if logged is not None else None,
         monotonic_s=clock.now_s(),
     )

@@ -7,7 +7,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from protocols.trial import VoidCause
-from study.devices.device import Health, Played
+from study.devices.device import Fault, Health, Played
+from study.session.answer_health import AnswerHealth
 from study.session.delivered import Delivered
 from study.session.due_trial import Present
 from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
@@ -42,6 +43,35 @@ def presented(present: Present, sitting: Sitting) -> TrialPresented:
         angle_deg=present.angle_deg,
         polarity=1 if present.polarity > 0 else -1,
         wanted_mps2=present.wanted_mps2,
+    )
+
+
+def known_then(health: Health, felt_whole: bool) -> AnswerHealth:
+    """Logged with the answer."""
+    return AnswerHealth(
+        fault=health.fault.name,
+        felt_whole=felt_whole,
+        ticks=health.ticks,
+        missed_ticks=health.missed_ticks,
+        stimulus_clipped=health.stimulus_clipped,
+        total_clipped=health.total_clipped,
+        slew_limited=health.slew_limited,
+        sensor_clipped=health.sensor_clipped,
+        peak_command_n=health.peak_command_n,
+    )
+
+
+def known_again(logged: AnswerHealth) -> Health:
+    """From the log. A fault that this version does not know is still one."""
+    return Health(
+        fault=Fault.__members__.get(logged.fault, Fault.NOT_A_NUMBER),
+        ticks=logged.ticks,
+        missed_ticks=logged.missed_ticks,
+        stimulus_clipped=logged.stimulus_clipped,
+        total_clipped=logged.total_clipped,
+        slew_limited=logged.slew_limited,
+        sensor_clipped=logged.sensor_clipped,
+        peak_command_n=logged.peak_command_n,
     )
 
 

@@ -42,7 +42,7 @@ from study.tui.link.to_engine import (
 from study.workflows.ask_session import ask_session
 from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.display import PersonsHand
-from study.workflows.end_sitting import end_sitting
+from study.workflows.end_sitting import end_sitting, finish_closed
 from study.workflows.fold_session import fold_session
 from study.workflows.list_protocols import protocol_line
 from study.workflows.list_sessions import home_view
@@ -96,7 +96,8 @@ class Desk:
 
     def _resume(self, command: Resume) -> None:
         folder = find_session(command.session, Path(command.data))
-        observer = fold_session(folder).state.opened.observer
+        folded = fold_session(folder)
+        observer = folded.state.opened.observer
         if observer is not None:
             raise WrongUseError(
                 "This session belongs to a simulated participant",
@@ -106,6 +107,11 @@ class Desk:
             )
         if still_open := left_open(folder.path.parent):
             self._link.send(Trouble(still_open))
+        if folded.state.closed:
+            self._link.send(Preparing("Making the tables and the report."))
+            written = finish_closed(folder, folded)
+            self._link.send(Finished(str(folder.path), folded.state.answers, _results(written)))
+            return
         self._sit(lambda participant: conduct_resumed(folder, command.device, participant))
 
     def _sit(self, conduct: Callable[[Participant], Conducted]) -> None:

@@ -25,7 +25,7 @@ def decisions(folder):
 
 
 @pytest.mark.timeout(200)
-def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitter):
+def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitter, session_logs):
     done = []
     rehearse_study(rehearsal, workers=2, on_finished=done.append)
     assert done == [1, 2, 3]
@@ -36,6 +36,7 @@ def test_a_rehearsal_that_was_cut_off_goes_on_and_ends_the_same(rehearsal, sitte
     # As a kill leaves it: the second participant is half way, with a torn line.
     log = folders[1].log.read_bytes()
     folders[1].log.write_bytes(log[: len(log) // 2])
+    session_logs.unsealed(folders[1].path)
     untouched = folders[0].log.read_bytes()
     rehearse_study(rehearsal, workers=1, on_finished=done.append)
     assert done == [1, 2, 3, 1, 2, 3]
