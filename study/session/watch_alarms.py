@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.live import Live
-from study.session.log_time import minutes_between
+from study.session.log_time import Moment, minutes_between, passed_s
 from study.session.void_reasons import computer_too_busy
 from study.session.watch_view import ON, Alarm, Exposure, Standing
 from study.session.watched import Watched
@@ -43,6 +43,18 @@ class Situation:
     def fresh(self) -> bool:
         """Whether the live state is of now."""
         return self.live is not None and self.seconds_since(self.live.utc) <= SILENT_AFTER_S
+
+    @property
+    def open_s(self) -> float:
+        """How long a trial waits for its answer; by the session's monotonic clock where its live state tells it."""
+        state = self.watched.state
+        if state.presented is None or state.answered is not None:
+            return 0.0
+        begun = Moment(state.presented.utc, state.presented.monotonic_s)
+        stamped = self.live is not None and self.live.monotonic_s is not None and begun.monotonic_s is not None
+        if self.live is not None and stamped:
+            return passed_s(begun, Moment(self.live.utc, self.live.monotonic_s))
+        return passed_s(begun, Moment(self.now_utc))
 
     def seconds_since(self, utc: str) -> float:
         return 60.0 * minutes_between(utc, self.now_utc)
@@ -170,7 +182,7 @@ def _unanswered(now: Situation) -> Alarm | None:
     state = now.watched.state
     if now.standing != "running" or state.presented is None or state.answered is not None:
         return None
-    if now.seconds_since(state.presented.utc) <= UNANSWERED_S:
+    if now.open_s <= UNANSWERED_S:
         return None
     minute = "Nothing was answered for more than a minute: is the participant all right?"
     return Alarm("unanswered", minute, state.presented.utc, urgent=False)

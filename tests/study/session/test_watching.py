@@ -505,3 +505,17 @@ def test_a_busy_computer_is_an_alarm_from_the_first_void_trial_on(story):
     for _ in range(10):
         story.answer(True)
     assert "busy" not in [alarm.kind for alarm in story.view().alarms]
+
+
+def test_how_long_a_trial_waits_follows_no_clock_that_was_set(story):
+    story.open_trial()
+    presented = replace(story.watched.state.presented, monotonic_s=100.0)
+    story.watched = replace(story.watched, state=replace(story.watched.state, presented=presented))
+    waits = story.live(monotonic_s=104.0)
+    for hours in (-5.0, 0.0, 5.0):
+        now = at(story.seconds + 3600.0 * hours)
+        view = watch_view(story.watched, Beside(replace(waits, utc=now), None), now)
+        assert (view.open_trial.presented_s, view.activity_s) == (4.0, 4.0)
+        assert "unanswered" not in [alarm.kind for alarm in view.alarms]
+    late = watch_view(story.watched, Beside(replace(waits, monotonic_s=161.0), None), at(story.seconds))
+    assert "unanswered" in [alarm.kind for alarm in late.alarms]
