@@ -13,6 +13,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.alignment import Logger, aligned
 from study.importing.arrays import Arrays, read_arrays
+from study.importing.budget import Budget
 from study.importing.import_map import ChannelMap, ComputedMap, ImportMap
 from study.importing.map_errors import ImportProblemError, ImportRefusedError
 from study.importing.map_files import PartFiles, part_files
@@ -47,9 +48,10 @@ def build_recording(
         planned = part_files(wanted, files)
         steps = len(planned) * (len(wanted.channel) + len(wanted.computed))
         parts = []
+        budget = Budget()
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
-            parts.append(_part(wanted, part, said, counter))
+            parts.append(_part(wanted, part, said, counter, budget))
         recording = _joined(wanted, parts, units)
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
@@ -70,13 +72,13 @@ class _Counter:
         self.on_progress(min(1.0, self.done / self.steps))
 
 
-def _part(wanted: ImportMap, files: PartFiles, said: Said, counter: _Counter) -> _Part:
+def _part(wanted: ImportMap, files: PartFiles, said: Said, counter: _Counter, budget: Budget) -> _Part:
     read: dict[Path, Arrays] = {}
     loggers = []
     for clock in wanted.clock:
         path = files.by_clock[clock.name]
         read[path] = read.get(path) or read_arrays(path, wanted.csv)
-        names = of_file(read[path], {**wanted.let, **files.part.let}, files.part.prefix)
+        names = of_file(read[path], {**wanted.let, **files.part.let}, files.part.prefix, budget)
         loggers.append(Logger(clock, names, time_base(clock, names)))
 
     def say(sentence: str) -> None:

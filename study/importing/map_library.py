@@ -9,6 +9,7 @@ from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
 from study.importing.arrays import read_arrays
+from study.importing.budget import Budget
 from study.importing.expression import names_in
 from study.importing.import_map import ImportMap
 from study.importing.map_errors import ImportProblemError, suggestion
@@ -105,8 +106,9 @@ def _fits(found: FoundMap) -> bool:
     try:
         part = part_files(wanted, found.files)[0]
         definitions = {**wanted.let, **part.part.let}
+        budget = Budget()
         spaces = {
-            clock: of_file(read_arrays(path, wanted.csv), definitions, part.part.prefix)
+            clock: of_file(read_arrays(path, wanted.csv), definitions, part.part.prefix, budget)
             for clock, path in part.by_clock.items()
         }
         first = wanted.clock[0].name

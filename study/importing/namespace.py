@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from study.importing.arrays import Arrays
+from study.importing.budget import Budget
 from study.importing.expression import evaluate
 from study.importing.functions import Clock, Value
 from study.importing.header_units import unit_in
@@ -32,6 +33,8 @@ class Namespace:
     definitions: Mapping[str, str]
     where: str
     """The file, for messages."""
+    budget: Budget
+    """What all expressions of the import may cost together."""
     _open: set[str] = field(default_factory=set)
     """Definitions that are being evaluated: one that needs itself is refused."""
 
@@ -39,7 +42,7 @@ class Namespace:
         """Of an array by its name, whatever characters that has, or of an expression. Raises ImportProblemError."""
         if text in self.arrays:
             return self._numbers(text)
-        return evaluate(text, lambda name: self.lookup(name, clock), clock)
+        return evaluate(text, lambda name: self.lookup(name, clock), clock, self.budget)
 
     def number(self, text: str) -> float:
         """Raises ImportProblemError where it is more than one number, or none."""
@@ -74,7 +77,8 @@ class Namespace:
             raise ImportProblemError(f"the definition of '{name}' needs itself")
         self._open.add(name)
         try:
-            return self.value_of(self.definitions[name], clock)
+            with self.budget.deeper(name, 2):
+                return self.value_of(self.definitions[name], clock)
         finally:
             self._open.discard(name)
 
@@ -83,18 +87,21 @@ class Namespace:
         if array.dtype.kind not in "fiub":
             what = "complex numbers" if array.dtype.kind == "c" else "text or objects"
             raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers")
-        return np.asarray(array, dtype=np.float64)
+        self.budget.spend(array.size, name)
+        with np.errstate(all="ignore"):
+            return np.asarray(array, dtype=np.float64)
 
 
-def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str = "") -> Namespace:
+def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
     """Names that begin with the prefix are known without it too, and `fx [N]` as `fx`. Raises ImportProblemError where
     none begins so."""
     short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
     plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not short:
-        listed = Namespace(arrays.by_name, {}, arrays.name).listed()
+        listed = Namespace(arrays.by_name, {}, arrays.name, budget).listed()
         raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {listed}")
-    return Namespace({**plain, **arrays.by_name, **short}, definitions, arrays.name)
+    budget.allow_for(sum(array.size for array in arrays.by_name.values()))
+    return Namespace({**plain, **arrays.by_name, **short}, definitions, arrays.name, budget)
 
 
 def _shape(array: npt.NDArray[Any]) -> str:

@@ -162,7 +162,7 @@ def _moved(channel: ChannelMap, method: Method, samples: Samples, grid: Grid, sa
 def _computed(name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace) -> FloatArray:
     own = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
-        value = Namespace(own, file.definitions, file.where).value_of(text, _GridClock(grid))
+        value = Namespace(own, file.definitions, file.where, file.budget).value_of(text, _GridClock(grid))
     except ImportProblemError as error:
         raise ImportProblemError(f"computed channel '{name}': {error}") from error
     if value.ndim == 0:

@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from study.importing.budget import Budget
 from study.importing.expression import evaluate, names_in
 from study.importing.functions import FUNCTIONS
 from study.importing.map_errors import ImportProblemError
+from study.importing.namespace import Namespace
 
 U = np.array([1.0, 2.0, 4.0, 8.0])
 
@@ -25,7 +27,7 @@ def lookup(name):
 
 
 def value(text):
-    return evaluate(text, lookup, Millisecond())
+    return evaluate(text, lookup, Millisecond(), Budget())
 
 
 @pytest.mark.parametrize(
@@ -82,7 +84,7 @@ def test_arithmetic_over_arrays(text, expected):
         ("u[0.5]", "an index is not a whole number"),
         ("u[u]", "an index is not a whole number"),
         ("array(u)", "takes one name in quotes"),
-        ("repeat(u, 1000000000)", "more than 200000000 numbers"),
+        ("repeat(u, 1000000000)", "more than 20000000 numbers"),
         ("onset(u * 0, 1)", "nothing leaves the mean of the first ten samples by more than 1"),
         ("diff(table)", "it needs an array of one dimension, not of shape (2, 3)"),
         ("-" * 300 + "u", "nested too deeply"),
@@ -112,3 +114,71 @@ def test_the_names_that_an_expression_needs_are_known():
 
 def test_every_function_says_how_it_is_used():
     assert all(function.usage.startswith(f"{name}(") and function.meaning for name, function in FUNCTIONS.items())
+
+
+LONG = np.arange(100_000.0)
+
+
+def of_definitions(text, definitions):
+    return Namespace({"u": LONG, "empty": LONG[:0]}, definitions, "a.npz", Budget()).value_of(text, Millisecond())
+
+
+def chained(count, text):
+    """a1 in terms of u, a2 in terms of a1, and so on."""
+    return {f"a{k}": text.replace("?", f"a{k - 1}" if k > 1 else "u") for k in range(1, count + 1)}
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(
+    ("text", "definitions", "sentence"),
+    [
+        ("a40", chained(40, "? + ?"), "takes too long"),
+        ("a40", {**chained(40, "? + ?"), "a1": "1 + 1"}, "takes too long"),
+        ("a40", {**chained(40, "max(?) * ?"), "a1": "1 + 1"}, "takes too long"),
+        ("a40", chained(40, "repeat(?, 2)"), "would give more than 20000000 numbers"),
+        ("a3000", chained(3000, "? + 1"), "nested too deeply"),
+        ("a3000", chained(3000, "?"), "nested too deeply"),
+        ("u[0/0]", {}, "an index is not a whole number"),
+        ("u[1/0]", {}, "an index is not a whole number"),
+        ("u[1e30]", {}, "the index is outside the shape (100000,)"),
+        ("u[::0]", {}, "a step of 0 leads nowhere"),
+        ("repeat(u, empty)", {}, "repeat(x, times) fails"),
+        ("repeat(empty, 1/0)", {}, "repeat(x, times) fails"),
+        ("repeat(u, 0/0)", {}, "repeat(x, times) fails"),
+        ("'u' * 3", {}, "the text 'u' stands where numbers are needed"),
+        ("not " * 499 + "u", {}, "this is not understood: not not"),
+        ("(" * 900 + "u" + ")" * 900, {}, "is not an expression"),
+        ("u" + "[0:9]" * 300, {}, "nested too deeply"),
+        ("u" + "+u" * 300, {}, "nested too deeply"),
+        ("a1", {"a1": "a2", "a2": "a1 + u"}, "the definition of 'a1' needs itself"),
+    ],
+)
+def test_what_costs_too_much_ends_with_a_named_error(text, definitions, sentence):
+    with pytest.raises(ImportProblemError) as refused:
+        of_definitions(text, definitions)
+    assert sentence in str(refused.value)
+
+
+@pytest.mark.timeout(60)
+def test_an_outer_product_is_refused_before_it_is_made():
+    space = Namespace({"c": np.zeros((40000, 1)), "r": np.zeros((1, 40000))}, {}, "a.npz", Budget())
+    for text in ("c * r", "c < r", "clip(c, r, 1)", "c + r + r"):
+        with pytest.raises(ImportProblemError, match="would give more than 20000000 numbers"):
+            space.value_of(text, Millisecond())
+
+
+def test_arrays_that_wait_for_another_count_too():
+    """Ten of these are held while the innermost is computed."""
+    text = "(-u + " * 10 + "u" + ")" * 10
+    small = Budget()
+    np.testing.assert_array_equal(Namespace({"u": LONG}, {}, "a.npz", small).value_of(text, Millisecond()), -9.0 * LONG)
+    long = np.zeros(3_000_000)
+    with pytest.raises(ImportProblemError, match="would give more than 20000000 numbers"):
+        Namespace({"u": long}, {}, "a.npz", Budget()).value_of(text, Millisecond())
+
+
+def test_a_larger_file_may_cost_more():
+    budget = Budget()
+    budget.allow_for(3_000_000)
+    text = "(-u + " * 10 + "u" + ")" * 10
+    Namespace({"u": np.zeros(3_000_000)}, {}, "a.npz", budget).value_of(text, Millisecond())
