@@ -51,9 +51,8 @@ def load_protocol(text: str, source: str) -> Protocol:
 
 def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
     """Check plain values, as TOML or JSON gives them. Numbers must be numbers: no text, no truth value."""
-    dates = tuple(_dates(values, ""))
-    if dates:
-        raise ProtocolError(source, dates)
+    if strange := tuple(_no_protocol_values(values, "")):
+        raise ProtocolError(source, strange)
     kind = values.get("kind")
     if not isinstance(kind, str) or kind not in ADAPTERS:
         wrong = "is missing" if kind is None else f'is "{kind}"' if isinstance(kind, str) else f"is {shown(kind)}"
@@ -67,14 +66,22 @@ def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
     return protocol
 
 
-def _dates(value: Any, path: str) -> list[Problem]:
-    """TOML knows dates, protocols do not."""
+def _no_protocol_values(value: Any, path: str) -> list[Problem]:
+    """TOML knows dates, protocols do not; and its parser reads whole numbers of any length."""
     match value:
         case dict():
-            return [found for key, inner in value.items() for found in _dates(inner, f"{path}.{key}" if path else key)]
+            return [
+                found
+                for key, inner in value.items()
+                for found in _no_protocol_values(inner, f"{path}.{key}" if path else key)
+            ]
         case list():
-            return [found for i, inner in enumerate(value, start=1) for found in _dates(inner, f"{path}[{i}]")]
+            return [
+                found for i, inner in enumerate(value, start=1) for found in _no_protocol_values(inner, f"{path}[{i}]")
+            ]
         case datetime.date() | datetime.time():
             return [Problem(path, f"is {value}, a date or time", "text in quotes or a number")]
+        case int() if abs(value) >= 2**64:
+            return [Problem(path, "is a whole number of more than 64 bits", "a number of ordinary size")]
         case _:
             return []

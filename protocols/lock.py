@@ -59,7 +59,7 @@ def lock_from_json(text: str) -> ProtocolLock:
     """Raises LockError that says what is wrong with the document."""
     try:
         document: Any = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise LockError(f"a lock is a JSON document, but this is none: {error}") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise LockError(f'a lock says "format": "{FORMAT}", and this document does not')

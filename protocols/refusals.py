@@ -7,6 +7,9 @@ from typing import Any
 from protocols.problem import InconsistentError, Problem
 from protocols.schema import UNITS, Node, Place, allowed, keys_of, node_at, resolved
 
+_LONGEST_WORD = 60
+"""Letters that are compared with known words; a million of them would take minutes."""
+
 
 def problems_in(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
     """Every problem once. root: schema of the protocol's kind; errors: those of pydantic's ValidationError."""
@@ -40,7 +43,7 @@ def nearest_key(key: str, known: Sequence[str]) -> str | None:
     for candidate in known:
         if candidate.endswith(suffixes) and candidate.rsplit("_", 1)[0] in (key, key.rsplit("_", 1)[0]):
             return candidate
-    close = get_close_matches(key.lower(), known, n=1)
+    close = get_close_matches(key[:_LONGEST_WORD].lower(), known, n=1)
     return close[0] if close else None
 
 
@@ -113,7 +116,7 @@ def _wrong_kind_of_entry(root: Node, place: Place, error: Any) -> Problem:
     tag, choices = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
     given = error["input"].get(tag)
     problem = "is missing" if given is None else f'is "{given}"'
-    if isinstance(given, str) and (close := get_close_matches(given, choices, n=1)):
+    if isinstance(given, str) and (close := get_close_matches(given[:_LONGEST_WORD], choices, n=1)):
         problem += f'; did you mean "{close[0]}"'
     return Problem(f"{key_path(root, place)}.{tag}", problem, " or ".join(f'"{choice}"' for choice in choices))
 

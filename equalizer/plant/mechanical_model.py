@@ -120,7 +120,7 @@ class MechanicalModel:
 
 def nearest(word: str, allowed: tuple[str, ...]) -> str:
     """A suggestion to append to an error, or nothing."""
-    close = get_close_matches(word, allowed, n=1)
+    close = get_close_matches(word[:60], allowed, n=1)  # longer ones would take minutes
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 

@@ -30,7 +30,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     """Raises MechanicalModelError with every problem found, in words."""
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise MechanicalModelError((f"this is not TOML: {error}",)) from error
     problems: list[str] = _unknown_keys(document, _TABLES, "")
     model = _table(document, "model", problems)
@@ -43,7 +43,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     effects = _effects(document.get("effect", []), problems)
     rotational = model.get("rotational", document.get("rotational", False))
     if not isinstance(rotational, bool):
-        problems.append(f"rotational is {rotational!r}; it must be true or false")
+        problems.append(f"rotational is {_said(rotational)}; it must be true or false")
     if problems:
         raise MechanicalModelError(tuple(problems))
     return MechanicalModel(
@@ -103,7 +103,7 @@ def _table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[
 def _word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
     word = table.get(name)
     if not isinstance(word, str) or not word:
-        problems.append(f"model.{name} {'is missing' if word is None else f'is {word!r}'}; it must be a text")
+        problems.append(f"model.{name} {'is missing' if word is None else f'is {_said(word)}'}; it must be a text")
     return word
 
 
@@ -116,7 +116,7 @@ def _matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatAr
     elif len({len(row) for row in rows}) != 1:
         problems.append(f"model.{name} has rows of different lengths: {', '.join(str(len(row)) for row in rows)}")
     elif wrong := [value for row in rows for value in row if not _is_number(value)]:
-        problems.append(f"model.{name} holds {wrong[0]!r}, which is not a number")
+        problems.append(f"model.{name} holds {_said(wrong[0])}, which is not a number")
     else:
         return np.array(rows, dtype=np.float64)
     return np.empty((0, 0))
@@ -129,7 +129,7 @@ def _numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], proble
     known = {key: value for key, value in table.items() if key in allowed}
     for key, value in known.items():
         if not _is_number(value):
-            problems.append(f"{name}.{key} is {value!r}; it must be a number")
+            problems.append(f"{name}.{key} is {_said(value)}; it must be a number")
     return kind(**{key: float(value) for key, value in known.items() if _is_number(value)})
 
 
@@ -140,14 +140,18 @@ def _effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
     found = []
     for number, entry in enumerate(entries, start=1):
         numbers = {key: value for key, value in entry.items() if key not in ("kind", "axis")}
-        wrong = [f"{key} = {value!r}" for key, value in numbers.items() if not _is_number(value)]
+        wrong = [f"{key} = {_said(value)}" for key, value in numbers.items() if not _is_number(value)]
         if wrong:
             problems.append(f"effect {number} holds {', '.join(wrong)}; parameters are numbers")
-        if not isinstance(entry.get("kind"), str):
+        kind = entry.get("kind")
+        if not isinstance(kind, str):
             problems.append(f"effect {number} has no kind")
+            continue
         if not isinstance(entry.get("axis", ""), str):
-            problems.append(f"effect {number}: axis is {entry['axis']!r}; it must be a text, or left out for all axes")
-        found.append(ModelEffect(str(entry.get("kind")), entry.get("axis") or None, numbers))
+            problems.append(
+                f"effect {number}: axis is {_said(entry['axis'])}; it must be a text, or left out for all axes"
+            )
+        found.append(ModelEffect(kind, entry.get("axis") or None, numbers))
     return () if problems else tuple(_as_floats(effect) for effect in found)
 
 
@@ -156,7 +160,16 @@ def _as_floats(effect: ModelEffect) -> ModelEffect:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """TOML's whole numbers have 64 bits; its parser also reads longer ones, which no float can hold."""
+    return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**64)
+
+
+def _said(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python writes no number of more than 4300 digits
+        return "a value that cannot be shown"
+    return text if len(text) <= 80 else f"{text[:80]}…"
 
 
 def _section(heading: str, table: Mapping[str, Any]) -> list[str]:

@@ -1,9 +1,5 @@
 """What a foreign file holds: arrays by name, whatever its kind."""
 
-import csv
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +11,9 @@ import numpy.typing as npt
 from study.importing.csv_arrays import read_csv_arrays
 from study.importing.import_map import CsvMap
 from study.importing.map_errors import ImportRefusedError
-from study.importing.stored_arrays import read_hdf5_arrays, read_mat_arrays, read_npz_arrays
-from study.store.file_errors import CannotReadError
+from study.importing.mat_arrays import read_mat5_arrays
+from study.importing.stored_arrays import read_hdf5_arrays, read_npz_arrays
+from study.store.file_errors import DAMAGED, CannotReadError, UnusableFileError
 from study.store.hdf5_file import is_hdf5
 from study.store.regular_file import open_regular
 
@@ -24,11 +21,7 @@ Array = npt.NDArray[Any]
 KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
 TABLES = (".csv", ".txt", ".tsv", ".dat")
 
-_DAMAGED = (
-    OSError, ValueError, TypeError, KeyError, IndexError, RuntimeError, EOFError, MemoryError, OverflowError, csv.Error,
-    zipfile.BadZipFile, zlib.error, struct.error,
-)  # fmt: skip
-"""What numpy, scipy, h5py and pandas raise for files that are damaged or not what their name says."""
+_CHECK = "Check the file; nothing else can be read from it."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,10 +44,10 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
         raise CannotReadError(path, problem) from problem
     try:
         found = _read(path, table)
-    except _DAMAGED as problem:
-        raise ImportRefusedError(
-            path.name, str(problem), "Check the file; nothing else can be read from it."
-        ) from problem
+    except UnusableFileError as refused:
+        raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
+    except DAMAGED as problem:
+        raise ImportRefusedError(path.name, str(problem) or type(problem).__name__, _CHECK) from problem
     if not found:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
     return Arrays(path, {name: np.squeeze(array) for name, array in found.items()})
@@ -65,7 +58,7 @@ def _read(path: Path, table: CsvMap) -> dict[str, Array]:
         case ".npz" | ".npy":
             return read_npz_arrays(path)
         case ".mat":
-            return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat_arrays(path)
+            return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
         case ".h5" | ".hdf5":
             return read_hdf5_arrays(path, transposed=False)
         case suffix if suffix in TABLES:

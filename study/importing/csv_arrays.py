@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ import pandas as pd
 from study.importing.import_map import CsvMap
 from study.store.text_file import read_text
 
+MOST_ROWS = 20_000_000
+"""Five hours at 1 kHz."""
+MOST_COLUMNS = 10_000
 _DELIMITERS = (",", ";", "\t", "|")
 _COMMENTS = ("#", "%")
 _EMPTY = ("", "nan", "na", "n/a", "null", "-", "none")
@@ -34,7 +38,9 @@ def read_csv_arrays(path: Path, settings: CsvMap) -> dict[str, npt.NDArray[Any]]
         header = said
     if not body:
         raise ValueError("it has a header, but no rows below it")
-    if doubled := sorted({name for name in header if header.count(name) > 1}):
+    if len(header) > MOST_COLUMNS:
+        raise ValueError(f"it has {len(header)} columns; up to {MOST_COLUMNS} are read")
+    if doubled := sorted(name for name, count in Counter(header).items() if count > 1):
         raise ValueError(f"its header names '{doubled[0]}' twice; give the columns names of their own in [csv] names")
     _require_equal_rows(body, header, delimiter)
     text = "\n".join(line for _, line in body)
@@ -52,6 +58,8 @@ def _lines(text: str, settings: CsvMap) -> tuple[list[tuple[int, str]], str]:
     kept: list[tuple[int, str]] = []
     above = ""
     for number, line in enumerate(text.splitlines(), start=1):
+        if len(kept) > MOST_ROWS:
+            raise ValueError(f"it has more than {MOST_ROWS} rows; save it as .npz or .h5")
         if number <= settings.skip_lines or not line.strip():
             continue
         if not line.lstrip().startswith(_COMMENTS):

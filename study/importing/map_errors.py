@@ -2,8 +2,12 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from itertools import islice
 
 from study.errors import StudyError, WrongUseError
+
+_LONGEST_WORD = 60
+_MOST_NAMES = 500
 
 NOTHING_WRITTEN = "Nothing was written."
 
@@ -40,6 +44,9 @@ class MapNeededError(WrongUseError):
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """ "; did you mean 'x'", where something is close."""
-    names = list(known)
-    close = get_close_matches(word, names, n=1) or [name for name in names if name.lower() == word.lower()][:1]
+    names = list(islice(known, _MOST_NAMES))  # of a million it would take minutes
+    close = (
+        get_close_matches(word[:_LONGEST_WORD], names, n=1)
+        or [name for name in names if name.lower() == word.lower()][:1]
+    )
     return f"; did you mean '{close[0]}'" if close else ""

@@ -14,10 +14,9 @@ from study.importing.expression import names_in
 from study.importing.import_map import ImportMap
 from study.importing.map_errors import ImportProblemError, suggestion
 from study.importing.map_files import part_files
-from study.importing.map_toml import is_map, parse_map
+from study.importing.map_toml import KIND, is_map, parse_map
 from study.importing.namespace import of_file
-from study.store.regular_file import DOCUMENT_BYTES
-from study.store.text_file import read_text
+from study.store.toml_text import read_toml_text
 
 NO_DATA = (".toml", ".md")
 """Kinds of files that lie beside data."""
@@ -66,7 +65,7 @@ def read_map(name: str) -> MapFile:
             f"{', '.join(shipped_maps())}.",
             "Give the name of one of them, or the path of a map of yours.",
         )
-    text = read_text(path, DOCUMENT_BYTES)
+    text = read_toml_text(path, KIND)
     return MapFile(path.stem, parse_map(text, path), text, path)
 
 
@@ -84,7 +83,7 @@ def find_map(folder: Path) -> tuple[FoundMap, ...]:
 
 def _is_map_file(path: Path) -> bool:
     try:
-        return is_map(tomllib.loads(read_text(path, DOCUMENT_BYTES)))
+        return is_map(tomllib.loads(read_toml_text(path, KIND)))
     except (StudyError, ValueError, RecursionError):
         return False
 

@@ -30,6 +30,8 @@ def parse_map(text: str, source: Path) -> ImportMap:
         found = _ADAPTER.validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
         raise UnusableFileError(source, KIND, tuple(_problems(error.errors()))) from error
+    except (ValueError, RecursionError) as error:  # a number of more digits than Python writes
+        raise UnusableFileError(source, KIND, (f"it cannot be read: {error}",)) from error
     if problems := (*_contradictions(found), *_segment_contradictions(found), *_meta(found)):
         raise UnusableFileError(source, KIND, problems)
     return found

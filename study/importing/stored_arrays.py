@@ -1,66 +1,91 @@
-"""Arrays out of NPZ, MAT and HDF5 files, under the names that they have there."""
+"""Arrays out of NPZ, NPY and HDF5 files, under the names that they have there.
 
+Sizes are compared with the file before memory is taken, and nothing in a file is run: arrays of Python objects, which
+would have to be unpickled, are left out.
+"""
+
+import math
+import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-import h5py
 import numpy as np
 import numpy.typing as npt
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
+
+from study.store.declared_size import SizeLimit
+from study.store.hdf5_contents import datasets_in
+from study.store.hdf5_file import opened_any_hdf5
+from study.store.regular_file import open_regular
 
 Array = npt.NDArray[Any]
+_PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_NO_NUMBERS = np.array(None, dtype=object)
+"""In place of texts and objects: an import has no use for them but to say that they are there."""
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:
-    """Arrays of Python objects are left out: reading them would run code out of the file. A single `.npy` is `data`."""
-    with path.open("rb") as file:
-        loaded = np.load(file, allow_pickle=False)
-        return {"data": loaded} if isinstance(loaded, np.ndarray) else _members(loaded)
+    """A single `.npy` is `data`. Raises ValueError and what else damaged files raise."""
+    with open_regular(path) as file:
+        limit = SizeLimit(path.stat().st_size)
+        if file.peek(6)[:6] == b"\x93NUMPY":
+            found = _npy(file, path.stat().st_size, limit, "data")
+            return {} if found is None else {"data": found}
+        with zipfile.ZipFile(file) as archive:
+            return _members(archive, limit)
 
 
-def _members(archive: Any) -> dict[str, Array]:
+def _members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
     found: dict[str, Array] = {}
-    for name in archive.files:
-        try:
-            found[name] = archive[name]
-        except ValueError as problem:
-            if "allow_pickle" not in str(problem):
-                raise
+    for member in archive.infolist():
+        if not member.filename.endswith(".npy"):
+            continue
+        name = member.filename.removesuffix(".npy")
+        if member.compress_type not in _PLAIN:
+            raise ValueError(f"{name} is packed in a way that numpy does not use; save it with numpy.savez")
+        with archive.open(member) as content:
+            array = _npy(content, member.file_size, limit, name)
+        if array is not None:
+            found[name] = array
     return found
 
 
-def read_mat_arrays(path: Path) -> dict[str, Array]:
-    """Fields of structures are named with a dot, as in `data.u`."""
-    try:
-        loaded = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except MatReadError as problem:
-        raise ValueError(f"it is not a MAT file that can be read ({problem})") from problem
-    found: dict[str, Array] = {}
-    for name, value in loaded.items():
-        if not name.startswith("__"):
-            _add(found, name, value)
-    return found
+def _npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
+    """size: of what it is in, unpacked. None for Python objects."""
+    shape, fortran_order, dtype = _header(file)
+    if dtype.hasobject:
+        return None
+    wanted = math.prod(shape) * dtype.itemsize
+    if not 0 <= wanted <= size:
+        raise ValueError(f"{name} is said to have the shape {shape}, {wanted} bytes, but holds {size}")
+    limit.take(name, wanted)
+    content = file.read(wanted)
+    if len(content) != wanted:
+        raise ValueError(f"{name} is cut off after {len(content)} of {wanted} bytes")
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran_order else "C")
+
+
+def _header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    version = np.lib.format.read_magic(file)
+    if version == (1, 0):
+        return np.lib.format.read_array_header_1_0(file)
+    if version == (2, 0):
+        return np.lib.format.read_array_header_2_0(file)
+    raise ValueError(f"it is of version {version[0]}.{version[1]} of the format, and 1.0 and 2.0 are known here")
 
 
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
-    """Datasets are named by their path, as in `run1/force`. transposed: dimensions in Matlab's order are turned."""
+    """Datasets are named by their path, as in `run1/force`. transposed: dimensions in Matlab's order are turned.
+    Raises UnusableFileError."""
     found: dict[str, Array] = {}
-
-    def visit(name: str, entry: Any) -> None:
-        if isinstance(entry, h5py.Dataset) and entry.dtype.kind in "fiubSUO" and not name.startswith("#"):
-            values = np.asarray(entry[()])
-            named = name.replace("/", ".") if transposed else name
-            found[named] = values.T if transposed else values
-
-    with h5py.File(path, "r") as file:
-        file.visititems(visit)
+    with opened_any_hdf5(path, "HDF5 file") as file:
+        for name, entry in datasets_in(file):
+            if name.startswith("#") or entry.shape is None:
+                continue
+            if entry.dtype.kind in "fiub":
+                values = np.asarray(entry[()])
+            elif entry.dtype.kind in "SUO":
+                values = _NO_NUMBERS
+            else:
+                continue
+            found[name.replace("/", ".") if transposed else name] = values.T if transposed else values
     return found
-
-
-def _add(found: dict[str, Array], name: str, value: Any) -> None:
-    if hasattr(value, "_fieldnames"):
-        for field in value._fieldnames:  # noqa: SLF001 - scipy's only way to list the fields of a structure
-            _add(found, f"{name}.{field}", getattr(value, field))
-    else:
-        found[name] = np.asarray(value)

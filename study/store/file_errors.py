@@ -1,12 +1,29 @@
 """Files that cannot be read, used or written, each as an error that a person can act on."""
 
+import csv
 import errno
+import struct
+import tokenize
+import zipfile
+import zlib
+from itertools import islice
 from pathlib import Path
 
 from study.errors import StudyError
 from study.store.regular_file import RefusedFileError
 
 CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
+
+
+DAMAGED = (
+    OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RuntimeError, EOFError, MemoryError,
+    AssertionError, SystemError, SyntaxError, csv.Error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+    struct.error,
+)  # fmt: skip
+"""What the libraries that read files raise for those that are damaged or not what their name says."""
+
+_LONGEST_PROBLEM = 600
+_MOST_PROBLEMS = 40
 
 
 class UnusableFileError(StudyError):
@@ -17,8 +34,8 @@ class UnusableFileError(StudyError):
 
     def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = CHECKED) -> None:
         self.kind = kind
-        self.problems = problems
-        self.sentences = tuple(_sentence(problem) for problem in problems)
+        self.problems = _shown(problems)
+        self.sentences = tuple(_sentence(problem) for problem in self.problems)
         super().__init__(
             title=f"{path.name} is not a usable {kind}",
             happened=" ".join(self.sentences),
@@ -63,6 +80,14 @@ class AlreadyThereError(StudyError):
 
 
 _PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
+
+
+def _shown(problems: tuple[str, ...]) -> tuple[str, ...]:
+    """A damaged file may have a name of a million letters, and a million problems."""
+    rest = len(problems) - _MOST_PROBLEMS
+    more = (f"and {rest} problems more",) if rest > 0 else ()
+    cut = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
+    return (*islice(cut, _MOST_PROBLEMS), *more)
 
 
 def _sentence(problem: str) -> str:

@@ -1,9 +1,13 @@
 """Attributes of HDF5 files as Python values, however the writing program chose to store them."""
 
+import math
 from typing import Any
 
 import h5py
 import numpy as np
+
+_MOST_ENTRIES = 1000
+_LONGEST_SHOWN = 100
 
 
 class AttributeProblemError(ValueError):
@@ -24,12 +28,15 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
         if default is None:
             raise AttributeProblemError(f"{_named(owner, name)} is missing")
         return default
-    values = np.atleast_1d(owner.attrs[name]).ravel().tolist()
+    found = _value(owner, name)
+    values = np.atleast_1d(found).ravel().tolist()
     if not all(isinstance(value, str | bytes) for value in values):
-        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(owner.attrs[name])}; it must be text")
+        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(found)}; it must be text")
     try:
-        return tuple(value.decode("utf-8") if isinstance(value, bytes) else value for value in values)
-    except UnicodeDecodeError:
+        # h5py gives bytes that are no UTF-8 as half characters, which nothing can write again.
+        texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
+        return tuple(text.decode() for text in texts[:-1])
+    except UnicodeError:
         raise AttributeProblemError(f"{_named(owner, name)} is not text in UTF-8") from None
 
 
@@ -39,10 +46,11 @@ def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, .
         if default is None:
             raise AttributeProblemError(f"{_named(owner, name)} is missing")
         return default
-    values = np.atleast_1d(owner.attrs[name]).ravel()
+    found = _value(owner, name)
+    values = np.atleast_1d(found).ravel()
     if values.dtype.kind not in "iuf" or len(values) != count:
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(owner.attrs[name])}; it must be {wanted}")
+        raise AttributeProblemError(f"{_named(owner, name)} is {_shown(found)}; it must be {wanted}")
     return tuple(float(value) for value in values)
 
 
@@ -58,8 +66,17 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
         owner.attrs.create(name, list(texts), dtype=h5py.string_dtype())
 
 
+def _value(owner: Any, name: str) -> Any:
+    """What stands there. Raises AttributeProblemError, before any memory is taken, where it is too much."""
+    shape = owner.attrs.get_id(name).shape
+    if shape is None or math.prod(shape) > _MOST_ENTRIES:
+        raise AttributeProblemError(f"{_named(owner, name)} has the shape {shape}; up to {_MOST_ENTRIES} are read")
+    return owner.attrs[name]
+
+
 def _shown(value: Any) -> str:
-    return repr(np.asarray(value).tolist())
+    text = repr(np.asarray(value).tolist())
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 
 
 def _named(owner: Any, name: str) -> str:

@@ -11,8 +11,9 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.store.atomic_write import write_atomically
-from study.store.file_errors import CannotReadError, UnusableFileError
+from study.store.file_errors import DAMAGED, CannotReadError, UnusableFileError
 from study.store.hdf5_attributes import AttributeProblemError, numbers_attribute, text_attribute
+from study.store.hdf5_contents import check_contents
 from study.store.regular_file import open_regular
 
 Value = TypeVar("Value")
@@ -39,7 +40,7 @@ def is_hdf5(path: Path) -> bool:
 
 def format_of(path: Path) -> str:
     """What an HDF5 file calls itself; empty where it says nothing. Raises UnusableFileError."""
-    with _opened(path, "HDF5 file") as file:
+    with opened_any_hdf5(path, "HDF5 file") as file:
         try:
             return text_attribute(file, "format", "")
         except AttributeProblemError:
@@ -49,7 +50,7 @@ def format_of(path: Path) -> str:
 @contextmanager
 def opened_hdf5(path: Path, kind: str, format_name: str, version: int) -> Iterator[Any]:
     """The open file, once it says the right format and version. Raises CannotReadError, UnusableFileError."""
-    with _opened(path, kind) as file:
+    with opened_any_hdf5(path, kind) as file:
         try:
             found = text_attribute(file, "format")
             (number,) = numbers_attribute(file, "version", 1)
@@ -84,15 +85,20 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool) -> N
 
 
 @contextmanager
-def _opened(path: Path, kind: str) -> Iterator[Any]:
+def opened_any_hdf5(path: Path, kind: str) -> Iterator[Any]:
+    """The open file, whatever its format, once its contents are checked. Raises CannotReadError, UnusableFileError."""
     try:
         open_regular(path).close()
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r") as file, np.errstate(all="ignore"):
+            try:
+                check_contents(file)
+            except ValueError as problem:
+                raise UnusableFileError(path, kind, (str(problem),)) from problem
             yield file
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError) as problem:
+    except DAMAGED as problem:
         # All of these come out of h5py for damaged files; what is ours to say was said as an UnusableFileError.
         raise UnusableFileError(
             path, kind, (f"it is not HDF5 that can be read, or it is cut off ({problem})",)

@@ -12,6 +12,7 @@ from study.store.file_errors import UnusableFileError
 from study.store.hdf5_attributes import numbers_attribute, text_attribute, text_or_list, texts_attribute, write_texts
 from study.store.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
 from study.store.layout import Entry
+from study.store.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-model", 1
 KIND = "identified model"
@@ -103,8 +104,8 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
 def _provenance(file: Any) -> dict[str, Any]:
     text = text_attribute(file, "provenance", "{}")
     try:
-        found = json.loads(text)
-    except json.JSONDecodeError as error:
+        found = load_json(text)
+    except ValueError as error:
         raise ValueError(f"the attribute 'provenance' is not JSON: {error}") from error
     if not isinstance(found, dict):
         raise ValueError(f"the attribute 'provenance' is {found!r}; it must be a JSON object")

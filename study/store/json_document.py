@@ -8,6 +8,7 @@ from typing import Any
 from study.store.file_errors import UnusableFileError
 from study.store.provenance import Provenance
 from study.store.regular_file import DOCUMENT_BYTES
+from study.store.strict_json import load_json
 from study.store.text_file import read_text, write_text
 
 
@@ -51,17 +52,13 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
 def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
     """A JSON object. Raises UnusableFileError."""
     try:
-        document = json.loads(text, parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:
+        document = load_json(text)
+    except ValueError as error:
         raise UnusableFileError(path, kind, (f"this is not JSON: {error}",)) from error
     if not isinstance(document, dict):
         wrong = f"it holds a {type(document).__name__}; a document of ours is an object with format and version"
         raise UnusableFileError(path, kind, (wrong,))
     return document
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"JSON has no {constant}; write null")
 
 
 def _said(value: Any) -> str:

@@ -11,6 +11,7 @@ from study.session.fact_types import utc_time
 from study.session.live import Activity, Live
 from study.store.privacy import write_private
 from study.store.regular_file import read_regular
+from study.store.strict_json import load_json
 
 LIVE_NAME = "live.json"
 LIVE_FORMAT = "hapteq-live"
@@ -43,8 +44,8 @@ def remove_live(folder: Path) -> None:
 def read_live(folder: Path) -> Live | None:
     """None where there is none, or none that can be used. Never raises."""
     try:
-        document = json.loads(read_regular(folder / LIVE_NAME, _LARGEST_BYTES), parse_constant=_refuse)
-    except (OSError, ValueError, RecursionError):
+        document = load_json(read_regular(folder / LIVE_NAME, _LARGEST_BYTES))
+    except (OSError, ValueError):
         return None
     if not isinstance(document, dict):
         return None
@@ -86,7 +87,3 @@ def _is_time(text: str) -> bool:
 
 def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"JSON has no {constant}")

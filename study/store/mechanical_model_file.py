@@ -6,8 +6,10 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
 from study.store.file_errors import UnusableFileError
 from study.store.layout import Entry
-from study.store.regular_file import DOCUMENT_BYTES
-from study.store.text_file import read_text, write_text
+from study.store.text_file import write_text
+from study.store.toml_text import read_toml_text
+
+KIND = "mechanical model"
 
 LAYOUT = (
     Entry("model.name", "text", "what it is a model of"),
@@ -39,9 +41,9 @@ LAYOUT = (
 def read_mechanical_model(path: Path) -> MechanicalModel:
     """Raises CannotReadError, UnusableFileError."""
     try:
-        return parse_mechanical_model(read_text(path, DOCUMENT_BYTES))
+        return parse_mechanical_model(read_toml_text(path, KIND))
     except MechanicalModelError as error:
-        raise UnusableFileError(path, "mechanical model", error.problems) from error
+        raise UnusableFileError(path, KIND, error.problems) from error
 
 
 def write_mechanical_model(path: Path, model: MechanicalModel, *, overwrite: bool = False) -> None:

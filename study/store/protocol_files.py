@@ -16,6 +16,7 @@ from study.errors import StudyError, WrongUseError
 from study.store.file_errors import UnusableFileError
 from study.store.regular_file import DOCUMENT_BYTES
 from study.store.text_file import read_text, write_text
+from study.store.toml_text import read_toml_text
 
 P = TypeVar("P", bound=Protocol, covariant=True)
 
@@ -79,7 +80,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
     text = (
         files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
         if path is None
-        else read_text(path, DOCUMENT_BYTES)
+        else read_toml_text(path, "protocol")
     )
     source = f"{name}.toml" if path is None else path.name
     try:

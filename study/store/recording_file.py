@@ -16,6 +16,7 @@ from study.store.file_errors import UnusableFileError
 from study.store.hdf5_attributes import numbers_attribute, text_attribute, text_or_list, texts_attribute, write_texts
 from study.store.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
 from study.store.recording_layout import FORMAT, KIND, SEGMENT_FIELDS, VERSION
+from study.store.strict_json import load_json
 
 _SEGMENT_TYPE = np.dtype(
     [
@@ -162,8 +163,8 @@ def _meta(file: Any) -> dict[str, Any]:
     for key in file["meta"].attrs if "meta" in file else ():
         text = text_attribute(file["meta"], key)
         try:
-            found[key] = json.loads(text)
-        except json.JSONDecodeError as error:
+            found[key] = load_json(text)
+        except ValueError as error:
             raise ValueError(f"the attribute '{key}' of meta is not JSON: {error}") from error
     return found
 

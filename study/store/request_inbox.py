@@ -19,6 +19,7 @@ from study.errors import StudyError
 from study.session.requests import NoteAsked, PauseAsked, Request, StopAsked, Who
 from study.store.privacy import PRIVATE_FOLDER, write_private
 from study.store.real_folder import is_real_folder
+from study.store.strict_json import load_json
 
 REQUESTS_NAME = "requests"
 REQUEST_FORMAT = "hapteq-request"
@@ -148,8 +149,8 @@ def _content(path: Path) -> bytes:
 
 def _parsed(content: bytes) -> Request | None:
     try:
-        document = json.loads(content)
-    except (ValueError, RecursionError):
+        document = load_json(content)
+    except ValueError:
         return None
     if not isinstance(document, dict) or document.pop("format", None) != REQUEST_FORMAT:
         return None

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,10 @@ from typing import Any
 
 from study.store.file_errors import CannotReadError, UnusableFileError
 from study.store.hdf5_file import format_of, is_hdf5
+from study.store.regular_file import DOCUMENT_BYTES
+from study.store.strict_json import load_json
 from study.store.text_file import read_text
+from study.store.toml_text import TOML_BYTES, too_long_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +29,9 @@ class FileContent:
     toml: dict[str, Any] | None = None
 
     @property
-    def json_format(self) -> Any:
-        return self.json.get("format") if isinstance(self.json, dict) else None
+    def json_format(self) -> str | None:
+        said = self.json.get("format") if isinstance(self.json, dict) else None
+        return said if isinstance(said, str) else None
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -57,13 +60,15 @@ def open_content(path: Path) -> FileContent:
 
 def _json(text: str) -> Any:
     try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
+        return load_json(text) if len(text) <= DOCUMENT_BYTES else None
+    except ValueError:
         return None
 
 
 def _toml(text: str) -> dict[str, Any] | None:
+    if len(text) > TOML_BYTES or too_long_key(text):
+        return None
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return None

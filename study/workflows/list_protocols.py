@@ -7,8 +7,7 @@ from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
 from study.session.archive_views import ProtocolLine
 from study.store.protocol_files import ProtocolRefusedError, read_protocol, shipped_protocols
-from study.store.regular_file import DOCUMENT_BYTES
-from study.store.text_file import read_text
+from study.store.toml_text import read_toml_text
 
 
 def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
@@ -28,7 +27,7 @@ def _toml_files(folder: Path) -> list[Path]:
 
 def _says_study(path: Path) -> bool:
     try:
-        return tomllib.loads(read_text(path, DOCUMENT_BYTES)).get("kind") == "study"
+        return tomllib.loads(read_toml_text(path, "protocol")).get("kind") == "study"
     except (StudyError, ValueError, RecursionError):
         return False
 

@@ -1,6 +1,5 @@
 """`hapteq validate`: what a file is, and everything that is wrong with it, in words."""
 
-import json
 import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,6 +8,9 @@ from study.errors import StudyError
 from study.store.archive import FOLDER
 from study.store.file_errors import UnusableFileError
 from study.store.privacy import warning
+from study.store.regular_file import DOCUMENT_BYTES
+from study.store.strict_json import load_json
+from study.store.toml_text import TOML_BYTES, too_long_key
 from study.workflows.file_content import FileContent, open_content
 from study.workflows.recognisers import RECOGNISERS, Recogniser
 from study.workflows.session_recognisers import SESSION_RECOGNISERS
@@ -75,8 +77,8 @@ def _unknown(content: FileContent) -> tuple[str, str]:
 
 def _json_problem(content: FileContent) -> str:
     try:
-        json.loads(content.text or "")
-    except (ValueError, RecursionError) as error:
+        load_json((content.text or "")[: DOCUMENT_BYTES + 1])
+    except ValueError as error:
         return f"this is not JSON: {error}"
     if content.json_format is None:
         return "it says no format; every document of ours says its format and version"
@@ -84,9 +86,14 @@ def _json_problem(content: FileContent) -> str:
 
 
 def _toml_problem(content: FileContent) -> str:
+    text = content.text or ""
+    if len(text) > TOML_BYTES:
+        return f"it has {len(text)} characters; up to {TOML_BYTES} are read"
+    if problem := too_long_key(text):
+        return problem
     try:
-        tomllib.loads(content.text or "")
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         return f"this is not TOML: {error}"
     keys = ", ".join(content.toml or ())
     return (

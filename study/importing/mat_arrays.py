@@ -1,0 +1,138 @@
+"""Arrays out of MAT files of version 5 (Matlab's -v6 and -v7), read here and not by a library in C: its sizes and its
+nesting are compared with what the file holds before memory is taken. Format: MAT-File Level 5, MathWorks, 2010."""
+
+import math
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.store.declared_size import SizeLimit
+from study.store.regular_file import read_regular
+
+Array = npt.NDArray[Any]
+MOST_MAT_BYTES = 2**32
+DEEPEST = 32
+_HEADER_BYTES = 128
+_COMPRESSED, _MATRIX = 15, 14
+_CELL, _STRUCT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER = 1, 2, 4, 6, 15
+_COMPLEX = 0x0800
+_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_CLASSES = {
+    6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
+}  # fmt: skip
+_NO_NUMBERS = np.array(None, dtype=object)
+
+
+class _Bytes:
+    """What is left of one element, with the byte order of the file."""
+
+    def __init__(self, content: memoryview, order: str) -> None:
+        self.content = content
+        self.order = order
+        self.at = 0
+
+    @property
+    def left(self) -> int:
+        return len(self.content) - self.at
+
+    def element(self) -> "tuple[int, _Bytes]":
+        """Its type and its content; `at` is then behind it. Raises ValueError where it is longer than what is left."""
+        if self.left < 8:
+            raise ValueError("it is cut off")
+        kind, size = struct.unpack_from(self.order + "II", self.content, self.at)
+        begin, padded = self.at + 8, True
+        if kind >> 16:  # four bytes or fewer stand in the tag itself
+            kind, size, begin = kind & 0xFFFF, kind >> 16, self.at + 4
+            padded = False
+        if size > (4 if not padded else self.left - 8):
+            raise ValueError(f"an element of {size} bytes is longer than what is left of the file")
+        self.at = self.at + 8 if not padded else begin + size
+        if padded and kind != _COMPRESSED:
+            self.at = min(begin + -(-size // 8) * 8, len(self.content))
+        return kind, _Bytes(self.content[begin : begin + size], self.order)
+
+    def numbers(self) -> Array:
+        """Of the next element. Raises ValueError where it holds none."""
+        kind, found = self.element()
+        if kind not in _TYPES:
+            raise ValueError(f"an element of the type {kind} stands where numbers are needed")
+        return np.frombuffer(found.content, np.dtype(self.order + _TYPES[kind]))
+
+
+def read_mat5_arrays(path: Path) -> dict[str, Array]:
+    """Fields of structures are named with a dot, as in `data.u`. Raises ValueError, OSError."""
+    content = read_regular(path, MOST_MAT_BYTES)
+    if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
+        raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
+    limit = SizeLimit(len(content))
+    file = _Bytes(memoryview(content)[_HEADER_BYTES:], "<" if content[126:128] == b"IM" else ">")
+    found: dict[str, Array] = {}
+    while file.left >= 8:
+        kind, element = file.element()
+        if kind == _COMPRESSED:
+            kind, element = _unpacked(element, limit).element()
+        if kind == _MATRIX:
+            name, value = _matrix(element, 0)
+            if not name.startswith("__"):
+                _add(found, name, value)
+    return found
+
+
+def _unpacked(packed: _Bytes, limit: SizeLimit) -> _Bytes:
+    unpacker = zlib.decompressobj()
+    content = unpacker.decompress(packed.content, limit.most_bytes)
+    if unpacker.unconsumed_tail:
+        limit.take("a compressed variable", limit.most_bytes + 1)
+    limit.take("a compressed variable", len(content))
+    return _Bytes(memoryview(content), packed.order)
+
+
+def _matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
+    """Name and value: an array, or a dict of them for a structure."""
+    if depth > DEEPEST:
+        raise ValueError(f"its structures are nested more than {DEEPEST} levels deep")
+    if not element.left:
+        return "", np.empty(0)
+    flags = int(element.numbers()[0])
+    code = flags & 0xFF
+    shape = tuple(int(length) for length in element.numbers())
+    name = bytes(element.element()[1].content).decode("utf-8", "replace")
+    if _FIRST_NUMBER <= code <= _LAST_NUMBER:
+        return name, np.array(0j) if flags & _COMPLEX else _numeric(element, shape, _CLASSES[code])
+    if code == _STRUCT and math.prod(shape) == 1:
+        return name, _fields(element, depth)
+    return name, _NO_NUMBERS  # texts, cells, sparse matrices, objects, arrays of structures
+
+
+def _numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
+    values = element.numbers()
+    if math.prod(shape) != len(values) or min(shape, default=0) < 0:
+        raise ValueError(f"an array of the shape {shape} has {len(values)} numbers")
+    return values.astype(number).reshape(shape, order="F")
+
+
+def _fields(element: _Bytes, depth: int) -> dict[str, Any]:
+    length = int(element.numbers()[0])
+    names = bytes(element.element()[1].content)
+    if length < 1 or len(names) % length:
+        raise ValueError("the names of a structure's fields are damaged")
+    words = [names[at : at + length].split(b"\0")[0].decode("utf-8", "replace") for at in range(0, len(names), length)]
+    found: dict[str, Any] = {}
+    for word in words:
+        kind, inner = element.element()
+        if kind != _MATRIX:
+            raise ValueError(f"the field '{word}' of a structure is damaged")
+        found[word] = _matrix(inner, depth + 1)[1]
+    return found
+
+
+def _add(found: dict[str, Array], name: str, value: Any) -> None:
+    if isinstance(value, dict):
+        for field, inner in value.items():
+            _add(found, f"{name}.{field}", inner)
+    else:
+        found[name] = value

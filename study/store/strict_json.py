@@ -1,0 +1,53 @@
+"""JSON as the standard has it, of ordinary size: what Python reads beyond that fails later, in another place."""
+
+import json
+import math
+from typing import Any
+
+DEEPEST = 64
+_LONGEST_NUMBER = 40
+"""Digits of a whole number: seeds may have 128 bits."""
+
+
+def load_json(text: str | bytes) -> Any:
+    """Raises ValueError with a sentence fragment, and nothing else."""
+    try:
+        found = json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    _check(found)
+    return found
+
+
+def _check(found: Any) -> None:
+    waiting = [(found, 0)]
+    while waiting:
+        value, depth = waiting.pop()
+        if depth > DEEPEST:
+            raise ValueError(f"it is nested more than {DEEPEST} levels deep")
+        if isinstance(value, dict):
+            waiting += ((inner, depth + 1) for entry in value.items() for inner in entry)
+        elif isinstance(value, list):
+            waiting += ((inner, depth + 1) for inner in value)
+        elif isinstance(value, str):
+            try:
+                value.encode()
+            except UnicodeEncodeError:
+                raise ValueError("a text in it has half of a character (a lone surrogate)") from None
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"JSON has no {constant}; write null")
+
+
+def _finite(digits: str) -> float:
+    number = float(digits)
+    if not math.isfinite(number):
+        raise ValueError(f"the number {digits[:30]} is larger than any that is read")
+    return number
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > _LONGEST_NUMBER + digits.startswith("-"):
+        raise ValueError(f"a whole number in it has {len(digits)} digits; up to {_LONGEST_NUMBER} are read")
+    return int(digits)

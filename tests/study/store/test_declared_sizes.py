@@ -1,0 +1,309 @@
+"""Files that say more than they hold, or whose samples lie in other files: refused before anything is read."""
+
+import io
+import json
+import os
+import struct
+import subprocess
+import sys
+import zipfile
+import zlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from study.importing.arrays import read_arrays
+from study.importing.import_map import CsvMap
+from study.importing.map_errors import ImportRefusedError
+from study.store.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES, SizeLimit
+from study.store.file_errors import UnusableFileError
+from study.store.identified_model_file import read_identified_model
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.recording_file import read_recording
+from study.store.strict_json import load_json
+from study.store.toml_text import too_long_key
+from study.workflows.validate import validate_file
+
+pytestmark = pytest.mark.timeout(60)
+FROZEN = Path(__file__).parents[2] / "frozen" / "v0_1"
+SECRET = b"root:x:0:0:root\n" * 100
+
+
+@pytest.fixture
+def recording(tmp_path) -> Path:
+    path = tmp_path / "r.h5"
+    path.write_bytes((FROZEN / "lever.h5").read_bytes())
+    return path
+
+
+def replaced(path: Path, name: str, *place, **how) -> None:
+    """The dataset with its attributes kept, and all else as said."""
+    with h5py.File(path, "r+") as file:
+        kept = dict(file[name].attrs)
+        del file[name]
+        file.create_dataset(name, *place, **how).attrs.update(kept)
+
+
+def refusals(path: Path) -> list[str]:
+    """Of the reader of recordings, the validation and the import."""
+    said = []
+    for read in (read_recording, lambda path: read_arrays(path, CsvMap())):
+        with pytest.raises((UnusableFileError, ImportRefusedError)) as refused:
+            read(path)
+        said.append(refused.value.happened)
+    return [*said, *validate_file(path).problems]
+
+
+def test_samples_in_another_file_are_not_read(recording, tmp_path):
+    (tmp_path / "secret").write_bytes(SECRET)
+    replaced(recording, "command", (50, 1), "f8", external=[(str(tmp_path / "secret"), 0, 400)])
+    assert all("the samples of command lie in other files" in said.lower() for said in refusals(recording))
+
+
+def test_samples_in_a_pipe_are_not_waited_for(recording, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    replaced(recording, "command", (50, 1), "f8", external=[(str(tmp_path / "pipe"), 0, 400)])
+    assert all("lie in other files" in said for said in refusals(recording))
+
+
+def test_virtual_samples_are_not_read(recording, tmp_path):
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = np.zeros((50, 1))
+    layout = h5py.VirtualLayout((50, 1), "f8")
+    layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", (50, 1))
+    with h5py.File(recording, "r+") as file:
+        del file["command"]
+        file.create_virtual_dataset("command", layout)
+    assert all("lie in other files" in said for said in refusals(recording))
+
+
+@pytest.mark.parametrize("name", ["command", "beside", "meta/deep"])
+def test_links_to_other_files_are_not_followed(recording, tmp_path, name):
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = np.zeros((50, 1))
+    with h5py.File(recording, "r+") as file:
+        if name in file:
+            del file[name]
+        file[name] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/x")
+        file["by_way_of_it"] = h5py.SoftLink(f"/{name}")
+    assert all(f"{name} is a link to another file".lower() in said.lower() for said in refusals(recording))
+
+
+def test_groups_that_hold_themselves_are_walked_once(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["g/x"] = [1.0, 2.0]
+        file["g/again"] = file["g"]
+        file["alias"] = h5py.SoftLink("/g")
+    assert list(read_arrays(tmp_path / "a.h5", CsvMap()).by_name) == ["g/x"]
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"shape": (2**29, 1), "dtype": "f8", "chunks": (1000, 1)},
+        {"shape": (2**29, 1), "dtype": "f8", "chunks": (1000, 1), "compression": "gzip", "fillvalue": 1.0},
+        {"shape": (2**29, 1), "dtype": "f8"},
+        {"shape": (2**29, 1), "dtype": "u1", "chunks": (1000, 1)},
+        {"shape": (2**62, 1), "dtype": "f8", "chunks": (1000, 1)},
+        {"shape": (2**40, 2**20), "dtype": "f2", "chunks": (1000, 1)},
+    ],
+)
+def test_a_small_hdf5_file_that_declares_gigabytes_is_refused(recording, how):
+    replaced(recording, "command", **how)
+    assert recording.stat().st_size < 100_000
+    assert all("is said to hold" in said for said in refusals(recording))
+
+
+def test_a_piece_that_unpacks_to_more_than_its_size_is_refused(recording):
+    bomb = zlib.compress(bytes(2**26), 1)
+    replaced(recording, "command", (50, 1), "f8", chunks=(50, 1), compression="gzip")
+    with h5py.File(recording, "r+") as file:
+        file["command"].id.write_direct_chunk((0, 0), bomb)
+    assert all("unpacks to more" in said for said in refusals(recording))
+
+
+def test_an_attribute_of_thousands_of_entries_is_refused(recording):
+    with h5py.File(recording, "r+") as file:
+        file["command"].attrs["unit"] = np.zeros(2000)
+    with pytest.raises(UnusableFileError, match=r"attribute 'unit' of command has the shape \(2000,\)"):
+        read_recording(recording)
+
+
+def test_a_model_is_held_to_the_same(tmp_path):
+    (tmp_path / "m.h5").write_bytes((FROZEN / "model.h5").read_bytes())
+    replaced(tmp_path / "m.h5", "A", (2**15, 2**15), "f8", chunks=(100, 100))
+    with pytest.raises(UnusableFileError, match="A is said to hold 8589934592 bytes"):
+        read_identified_model(tmp_path / "m.h5")
+
+
+def header(shape: str, descr: str = "<f8") -> bytes:
+    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
+
+
+@pytest.mark.parametrize("shape", ["(536870912,)", "(-1,)", "(4294967296, 4294967296)", "(2, -2, -3)", "(True,)"])
+def test_a_header_of_npy_that_says_more_than_there_is_is_refused(tmp_path, shape):
+    (tmp_path / "a.npy").write_bytes(header(shape))
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("u.npy", header(shape))
+    for name in ("a.npy", "a.npz"):
+        with pytest.raises(ImportRefusedError):
+            read_arrays(tmp_path / name, CsvMap())
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_archive_that_unpacks_to_much_more_than_itself_is_refused(tmp_path, packing):
+    count = 2**24 + 1 if packing == zipfile.ZIP_DEFLATED else 1000
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", packing, compresslevel=1) as archive:
+        archive.writestr("u.npy", header(f"({count},)") + bytes(8 * count))
+    with pytest.raises(ImportRefusedError, match=r"is said to hold|is packed in a way"):
+        read_arrays(tmp_path / "a.npz", CsvMap())
+
+
+def test_a_pickle_is_never_loaded(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "trapped"),)
+
+    np.save(tmp_path / "a.npy", np.array([Trap()], dtype=object), allow_pickle=True)
+    np.savez(tmp_path / "a.npz", bad=np.array([Trap()], dtype=object), u=[1.0, 2.0])
+    (tmp_path / "b.npz").write_bytes(b"\x80\x04" + b"." * 50)
+    assert list(read_arrays(tmp_path / "a.npz", CsvMap()).by_name) == ["u"]
+    for name in ("a.npy", "b.npz"):
+        with pytest.raises(ImportRefusedError):
+            read_arrays(tmp_path / name, CsvMap())
+    assert not (tmp_path / "trapped").exists()
+
+
+def matrix(flags: int, dims: tuple[int, ...], name: bytes, rest: bytes) -> bytes:
+    size = 8 * len(dims) // 2
+    body = struct.pack("<IIII", 6, 8, flags, 0) + struct.pack("<II", 5, 4 * len(dims))
+    body += struct.pack(f"<{len(dims)}i", *dims).ljust(-(-size // 8) * 8, b"\0")
+    return wrapped(14, body + struct.pack("<II", 1, len(name)) + name.ljust(-(-len(name) // 8) * 8, b"\0") + rest)
+
+
+def wrapped(kind: int, body: bytes) -> bytes:
+    return struct.pack("<II", kind, len(body)) + body
+
+
+def mat(*elements: bytes) -> bytes:
+    return b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM" + b"".join(elements)
+
+
+def nested_cells(depth: int) -> bytes:
+    inner = matrix(6, (1, 1), b"", wrapped(9, struct.pack("<d", 1.0)))
+    for _ in range(depth):
+        names = struct.pack("<HHI", 5, 4, 2) + wrapped(1, b"a\0\0\0\0\0\0\0"[:8])
+        inner = matrix(2, (1, 1), b"", names + inner)
+    return inner
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (mat(matrix(6, (2**15, 2**14), b"u", wrapped(9, b"\0" * 8))), "an array of the shape"),
+        (mat(matrix(6, (-2, -4), b"u", wrapped(9, b"\0" * 64))), "an array of the shape"),
+        (mat(wrapped(15, zlib.compress(bytes(2**27 + 9), 1))), "a compressed variable is said to hold"),
+        (mat(struct.pack("<II", 14, 2**31)), "is longer than what is left"),
+        (mat(nested_cells(400)), "nested more than 32 levels"),
+    ],
+)
+def test_a_mat_file_that_says_more_than_it_holds_is_refused(tmp_path, content, sentence):
+    (tmp_path / "a.mat").write_bytes(content)
+    with pytest.raises(ImportRefusedError) as refused:
+        read_arrays(tmp_path / "a.mat", CsvMap())
+    assert sentence in refused.value.happened.lower()
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("kind", ["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"])
+def test_what_scipy_writes_is_read_to_the_last_digit(tmp_path, kind, packed):
+    u = (np.random.default_rng(1).normal(size=(7, 3, 2)) * 50).astype(kind)
+    savemat(tmp_path / "a.mat", {"u": u, "s": {"v": u[0], "w": u[:1, 0, 0]}, "b": u > 0}, do_compression=packed)
+    found = read_arrays(tmp_path / "a.mat", CsvMap()).by_name
+    np.testing.assert_array_equal(found["u"], u)
+    np.testing.assert_array_equal(found["s.v"], u[0])
+    np.testing.assert_array_equal(found["s.w"], u[0, 0, 0])
+    np.testing.assert_array_equal(found["b"], u > 0)
+
+
+def test_an_hour_of_nine_channels_at_ten_kilohertz_is_within_the_limit():
+    size = 3600 * 10_000 * 9 * 8
+    SizeLimit(size // FACTOR).take("it", size)
+    assert PLAIN_BYTES < size < MOST_BYTES
+
+
+def test_memory_is_taken_for_nothing_that_is_only_declared(tmp_path, recording):
+    """In a process that may have 2 GB of addresses in all."""
+    replaced(recording, "command", (2**29, 1), "f8", chunks=(1000, 1))
+    (tmp_path / "a.npy").write_bytes(header("(536870912,)"))
+    script = (
+        "import resource, sys\nfrom pathlib import Path\nfrom study.workflows.validate import validate_file\n"
+        "from study.importing.arrays import read_arrays\nfrom study.importing.import_map import CsvMap\n"
+        "from study.errors import StudyError\nresource.setrlimit(resource.RLIMIT_AS, (2**31, 2**31))\n"
+        "print(validate_file(Path(sys.argv[1])).problems[0])\n"
+        "try: read_arrays(Path(sys.argv[2]), CsvMap())\nexcept StudyError as refused: print(refused.happened)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, recording, tmp_path / "a.npy"], capture_output=True, text=True, check=True
+    )
+    assert "is said to hold" in done.stdout and "4294967296 bytes, but holds" in done.stdout, done.stdout
+
+
+DEEP = "[" * 100_000 + "]" * 100_000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        DEEP, DEEP[:50], "[" * 70 + "]" * 70, '{"a": NaN}', '{"a": 1e999}', '{"a": ' + "9" * 5000 + "}",
+        '{"a": ' + "9" * 50 + "}", r'["\ud800"]', r'{"\udfff": 1}', "", "{", "\0",
+    ],
+)  # fmt: skip
+def test_json_beyond_the_ordinary_is_refused(text):
+    with pytest.raises(ValueError, match="."):
+        load_json(text)
+
+
+def test_ordinary_json_is_read():
+    value = {"a": [1, -2.5e-3, None, True, "é\n", {"b": []}], "n": 2**127}
+    assert load_json(json.dumps(value)) == value
+    assert load_json(json.dumps(value).encode()) == value
+
+
+@pytest.mark.parametrize("key", ["a", '"a b"', "'a'", "a-1", '"\\""'])
+def test_a_key_of_many_parts_is_named_with_its_line(key):
+    assert too_long_key("x = 1\n[" + ".".join([key] * 32) + "]\n") == ""
+    assert too_long_key("x = 1\n[" + " . ".join([key] * 33) + "]\n") == "line 2 has a key of more than 32 parts"
+    assert too_long_key('x = """\n' + ".".join([key] * 33).replace('"', "") + '"""\n') == ""
+    assert too_long_key("# " + ".".join([key] * 33)) == ""
+
+
+@pytest.mark.parametrize(
+    "deep", [DEEP, "0x" + "f" * 10_000, "9" * 10_000, '"' + "x" * 10**5 + '"', "{ a = " * 900 + "1"]
+)
+def test_models_and_protocols_and_maps_of_unlikely_values_are_refused_by_name(tmp_path, deep):
+    for name, key in (("twin.toml", "mass"), ("corpus_study.toml", "steps"), ("lever_map.toml", "rate_hz")):
+        text = f"{key} = {deep}\n" + (FROZEN / name).read_text()
+        nested = (FROZEN / name).read_text() + f"\n[[effect]]\nkind = {deep}\n[tolerance]\nmass_kg = {deep}\n"
+        for content in (text, nested):
+            (tmp_path / name).write_text(content)
+            assert validate_file(tmp_path / name).problems
+    with pytest.raises(UnusableFileError):
+        read_mechanical_model(tmp_path / "twin.toml")
+
+
+def test_a_table_of_a_hundred_thousand_columns_is_refused_at_once(tmp_path):
+    (tmp_path / "a.csv").write_text(",".join(f"c{n}" for n in range(100_000)) + "\n" + ",".join(["1"] * 100_000) + "\n")
+    with pytest.raises(ImportRefusedError, match="It has 100000 columns"):
+        read_arrays(tmp_path / "a.csv", CsvMap())
+
+
+def test_a_problem_of_a_million_letters_is_cut():
+    error = UnusableFileError(Path("a"), "file", ("x" * 10**6, *["y"] * 1000))
+    assert len(error.happened) < 1000
+    assert error.problems[-1] == "and 961 problems more"
+    assert io.StringIO(str(error))
