@@ -37,8 +37,15 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
     """Never raises for what is in a file or for one that is not there."""
     found = _validated(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
-    said = (warning(folder) for folder in folders if folder.is_dir())
+    said = (warning(folder) for folder in folders if _is_folder(folder))
     return replace(found, notes=tuple(filter(None, said)))
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # a name that no file can have
+        return False
 
 
 def _validated(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
