@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from protocols.trial import Phase, VoidCause
-from study.session.answer_health import AnswerHealth
+from study.session.answer_given import AnswerGiven
 from study.session.fact_types import (
     AngleDeg,
     Count,
@@ -68,7 +68,13 @@ __all__ = [
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 SESSION_VERSION: Literal[1] = 1
 
-FIELDS_SINCE: dict[str, object] = {"monotonic_s": None, "dose_elsewhere": None, "rules": 1, "cause": None}
+FIELDS_SINCE: dict[str, object] = {
+    "monotonic_s": None,
+    "dose_elsewhere": None,
+    "rules": 1,
+    "cause": None,
+    "health": None,
+}
 """Fields that came after the first logs, as they are where a line does not say them: then they are not written."""
 
 
@@ -129,22 +135,6 @@ class TrialPresented:
     """The acceleration that the level stands for; null where levels are commanded forces."""
     monotonic_s: Seconds | None = None
     event: Literal["trial_presented"] = "trial_presented"
-
-
-@dataclass(frozen=True, config=FACT)
-class AnswerGiven:
-    """Written before anything reacts to it."""
-
-    utc: UtcTime
-    run: Index
-    trial: Index
-    attempt: Index
-    answer: Literal[1, 2]
-    response_time_s: Seconds
-    monotonic_s: Seconds | None = None
-    health: AnswerHealth | None = None
-    """Null in logs of older versions."""
-    event: Literal["answer_given"] = "answer_given"
 
 
 @dataclass(frozen=True, config=FACT)

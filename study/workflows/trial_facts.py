@@ -8,7 +8,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health, Played
-from study.session.answer_health import AnswerHealth
+from study.session.answer_given import AnswerHealth
 from study.session.delivered import Delivered
 from study.session.due_trial import Present
 from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
