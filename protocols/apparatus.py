@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from protocols.plausibility import PlausibilitySettings
 from protocols.problem import Problem, refuse
 from protocols.staircase_rule import STRICT
 
@@ -72,16 +73,32 @@ class SafetySettings:
 
     stimulus_cap_n: Annotated[
         float,
-        Field(gt=0, le=3.0, description="Norm of the stimulus force, spring not counted; 3 N at the most."),
+        Field(
+            gt=0,
+            le=3.0,
+            description="Norm of the stimulus force, spring and damper not counted; 3 N at the most, whatever a "
+            "protocol says. Together with them the command may be larger: see total_cap_n.",
+        ),
     ]
     total_cap_n: Annotated[
         float,
         Field(
             gt=0,
             le=6.0,
-            description="Norm of the whole command, spring included; direction is kept at the cap.",
+            description="Norm of the whole command: stimulus, spring and damper. This is what a hand may feel; "
+            "6 N at the most, whatever a protocol says. Direction is kept at the cap.",
         ),
     ]
+    feedback_cap_n: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=6.0,
+            description="Norm of the spring's force, of the damper's, and of both together; never above total_cap_n. "
+            "Default 1.5: the room that the shipped protocols leave between stimulus and total, so that a lean never "
+            "reduces a stimulus, and a wrong position that cannot be told pulls with no more. Measured: 1.35 N.",
+        ),
+    ] = 1.5
     longest_trial_s: Annotated[
         float,
         Field(
@@ -104,6 +121,7 @@ class SafetySettings:
         float,
         Field(gt=0, le=1, description="Duration of a fade for safety. Default 0.05: soon gone, without a jerk."),
     ] = 0.05
+    plausibility: PlausibilitySettings = Field(default_factory=PlausibilitySettings)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -6,11 +6,12 @@ from typing import Any
 
 from protocols.dumping import protocol_values
 from protocols.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
+from protocols.plausibility import UNTOUCHED
 from protocols.preparation import ConsentSettings, DemoSettings, PracticeSettings, SetupSettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.study_protocol import StudyProtocol
 
-Untouched = str | float | bool | list[Any]
+Untouched = str | float | bool | list[Any] | dict[str, Any]
 
 TABLES_SINCE = {
     "consent": ConsentSettings(),
@@ -26,9 +27,11 @@ TABLES_SINCE = {
 """Tables that came after the first locks and sessions, as they are where nobody writes them: then they do not count,
 or an old fingerprint would fit no more."""
 
+SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
+
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
-    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3},
-    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": ""},
+    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **SAFETY_SINCE},
+    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }
 """Likewise single fields, for each kind of protocol; `segments.role` is that of every segment."""
 

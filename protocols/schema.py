@@ -22,7 +22,17 @@ ADAPTERS: dict[str, TypeAdapter[Any]] = {
 }
 """One for each `kind` of protocol."""
 
-UNITS = {"n": "newtons", "db": "decibels", "s": "seconds", "hz": "hertz", "deg": "degrees", "n_s_per_m": "N s/m"}
+UNITS = {
+    "n": "newtons",
+    "db": "decibels",
+    "s": "seconds",
+    "hz": "hertz",
+    "deg": "degrees",
+    "n_s_per_m": "N s/m",
+    "m": "metres",
+    "m_per_s": "m/s",
+    "mps2": "m/s²",
+}
 """What the suffix of a key says about its value."""
 
 

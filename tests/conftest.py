@@ -95,6 +95,18 @@ def rigs() -> ModuleType:
     return _module_at(Path(__file__).parent / "rigs.py")
 
 
+@pytest.fixture(scope="session")
+def force_judge() -> ModuleType:
+    """`tests/force_judge.py`, what a hand may be given, without a look at the safety layer."""
+    return _module_at(Path(__file__).parent / "force_judge.py")
+
+
+@pytest.fixture(scope="session")
+def lying(rigs, force_judge) -> ModuleType:
+    """`tests/lying_encoders.py`, handles whose encoders lie, and ticks that come late. Imported late: it compiles."""
+    return _module_at(Path(__file__).parent / "lying_encoders.py")
+
+
 @pytest.fixture
 def small_file(tmp_path, small_text) -> Path:
     path = tmp_path / "small.toml"

@@ -101,11 +101,13 @@ class ScriptedRig:
 
 
 class HeldForceRig:
-    """Like hardware it keeps the last force it was given. Its driver can be made to hang and to fail."""
+    """Like hardware it keeps the last force it was given. Its driver can be made to hang and to fail. A hand holds it
+    that trembles along y by the encoders' resolution: one that stood still under such forces would be stale."""
 
     def __init__(self) -> None:
         self.drops_force_after_s = 0.1
         self.last_n = np.zeros(3)
+        self.sensed = 0
         self.written_n: list[FloatArray] = []
         self.closed = 0
         self.before_sensing: Callable[[], None] | None = None
@@ -118,7 +120,10 @@ class HeldForceRig:
     def sense(self) -> FloatArray:
         if self.before_sensing is not None:
             self.before_sensing()
-        return np.zeros(READING_SIZE)
+        self.sensed += 1
+        reading = np.zeros(READING_SIZE)
+        reading[1] = 1e-5 * (self.sensed % 2)
+        return reading
 
     def buttons(self) -> frozenset[int]:
         return frozenset()
@@ -151,8 +156,8 @@ def force(samples: FloatArray) -> Signal:
 def violations(forces_n: FloatArray, limits: Limits) -> list[str]:
     """What a rig must never have been given, in words. forces_n (n, 3): every write, from rest to rest.
 
-    A step above the slew limit is allowed in a safety release only: then the force shrinks from write to write,
-    and is zero after `release_s`.
+    A step above the slew limit is allowed in a safety release only: then the force shrinks from write to write along
+    itself, never turning round, and is zero after `release_s`.
     """
     found = []
     if not np.isfinite(forces_n).all():
@@ -168,4 +173,8 @@ def violations(forces_n: FloatArray, limits: Limits) -> list[str]:
         fading = norms[max(k - 1, 0) : k + (zeros[0] + 1 if len(zeros) else release)]
         if (np.diff(fading) > 0).any() or not (len(zeros) or cut_off):
             found.append(f"slew: {steps[k] * RATE_HZ} N/s at write {k}")
+        faded = forces_n[max(k - 1, 0) : k + (zeros[0] + 1 if len(zeros) else release)]
+        along = faded @ faded[0]
+        if (along < -1e-12).any() or (np.linalg.norm(np.cross(faded, faded[0]), axis=1) > 1e-9).any():
+            found.append(f"fade: it turns the force, at write {k}")
     return found

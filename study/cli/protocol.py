@@ -32,6 +32,7 @@ def show(
     """Every key of a protocol with its value, its default and the reason for it."""
     from protocols.explain import explain
     from protocols.hashing import protocol_hash
+    from study.session.limits import forces_in_words
     from study.store.protocol_files import read_protocol
 
     file = read_protocol(name)
@@ -44,6 +45,7 @@ def show(
         typer.echo(json.dumps({"hash": protocol_hash(file.protocol), "fields": rows}, indent=2, default=str))
         return
     typer.echo(f"{file.protocol.title} (hash {protocol_hash(file.protocol)[:12]})")
+    typer.echo(f"Force at the handle: {forces_in_words(file.protocol.safety)}.")
     for field in fields:
         typer.echo(f"\n{field.key} = {field.value}")
         typer.echo(f"    {field.description}")

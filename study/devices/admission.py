@@ -25,6 +25,23 @@ HIGHEST = {
     "keep_s": 600.0,
 }
 
+HIGHEST_PLAUSIBLE = {
+    "workspace_m": 0.5,
+    "fastest_m_per_s": 20.0,
+    "longest_jump_m": 0.5,
+    "acceleration_mps2": 1e4,
+    "resolution_m": 1e-3,
+    "friction_n": 3.0,
+    "stale_s": 5.0,
+    "still_s": 60.0,
+}
+"""As in `protocols.plausibility`: kept once more, for settings that come from no protocol."""
+
+RATES_HZ = (100.0, 10_000.0)
+
+HEAVIEST_KG = 10.0
+"""The spring's stiffness rests on the mass that the device says: no handle on a desk weighs so much."""
+
 LONGEST_DROP_S = 1.0
 """For the hardware to let go when nothing writes any more."""
 
@@ -32,12 +49,15 @@ FADE_SHAPES = ("raised_cosine", "linear")
 
 
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
-    """Raises `DeviceError` for limits that are no limits, or weaker than may be."""
+    """Raises `DeviceError` for limits that are no limits, or weaker than may be, and for a device of no known kind."""
+    _check_info(info)
     limits = settings.limits
     times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
     for name, value in times.items():
         _within(name, value, HIGHEST[name])
     _check_caps(settings, info)
+    for name, highest in HIGHEST_PLAUSIBLE.items():
+        _within(f"plausibility.{name}", getattr(limits.plausibility, name), highest, zero=name == "friction_n")
     _within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
     _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
     if not all(math.isfinite(component) for component in settings.place_m):
@@ -97,6 +117,21 @@ def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
         raise _refused(f"it changes by {steepest:.4g} N/s; the slew limit is {limits.slew_n_per_s:g} N/s")
 
 
+def _check_info(info: DeviceInfo) -> None:
+    """What the spring, the fades and all times rest on."""
+    told = (
+        ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
+        ("effective_mass_kg", info.effective_mass_kg, 1e-3, HEAVIEST_KG),
+    )
+    for name, value, least, most in told:
+        if not least <= value <= most:
+            raise DeviceError(
+                "The device was not opened: what it says of itself cannot be",
+                f"'{info.name}' says that its {name} is {value:g}; it must lie between {least:g} and {most:g}.",
+                "Correct the device's driver or its settings.",
+            )
+
+
 def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
     limits, beyond = settings.limits, settings.beyond_hand_ceiling
     if beyond and settings.hand_on_handle:
@@ -104,6 +139,7 @@ def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
     ceiling_n = info.max_force_n if beyond else min(info.max_force_n, HAND_TOTAL_CAP_N)
     stimulus_ceiling_n = ceiling_n if beyond else min(ceiling_n, HAND_STIMULUS_CAP_N)
     _within("total_cap_n", limits.total_cap_n, ceiling_n)
+    _within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if beyond else HAND_TOTAL_CAP_N)
     _within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
 
 

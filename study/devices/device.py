@@ -60,6 +60,10 @@ class Fault(Enum):
     STOPPED = "the emergency stop was pressed"
     LOST = "the device stopped answering"
     FORCE_LEFT = "the device took no zero force: let go of the handle and switch the device off"
+    OUTSIDE = "the position lay outside the workspace, so the force was let go"
+    JUMPED = "the position jumped further than a handle can move, so the force was let go"
+    SHAKEN = "the position changed its speed faster than a handle can, so the force was let go"
+    STALE = "the position stood still although the handle must have moved, so the force was let go"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +76,12 @@ class Health:
     stimulus_clipped: int
     """The stimulus itself was above its cap."""
     total_clipped: int
-    """Stimulus and spring together were above the total cap (a lean on the spring)."""
+    """Stimulus, spring and damper together were above the total cap."""
     slew_limited: int
     sensor_clipped: int
     peak_command_n: float
+    feedback_clipped: int = 0
+    """Spring, damper, or both together were above their cap (a lean on the spring)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,8 +2,8 @@
 
 A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits, `write` (held until t_(k+1)).
 
-The places below are compiled into the safety layer and the simulated devices, and numba's cache on disk does not
-watch this file: whoever changes them deletes the compiled files (`*.nbi`, `*.nbc`) too.
+The places below are compiled into the safety layer, which watches this file, and into the simulated devices, whose
+code kept on disk does not: after a change of them, delete the compiled files (`*.nbi`, `*.nbc`) of those.
 """
 
 from collections.abc import Callable

@@ -188,7 +188,7 @@ class SafeDevice:
         if isinstance(rig, CompiledRig):
             block_ticks = round((VIRTUAL_BLOCK_S if virtual else BLOCK_S) * rig.info.sample_rate_hz)
             return CompiledRunner(rig, self._governor, block_ticks)
-        return SteppedRunner(rig, self._governor, catches_up=virtual)
+        return SteppedRunner(rig, self._governor, virtual, now_s=None if virtual else self._clock.now_s)
 
     def _drive_of(self, clock: Clock) -> VirtualDrive | RealtimeDrive:
         rate_hz = self._info.sample_rate_hz

@@ -6,11 +6,12 @@ its own write zero; and the loop, whenever its call returns, writes zero once mo
 
 import contextlib
 import threading
+from collections.abc import Callable
 
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.devices import govern
+from study.devices import cells, govern
 from study.devices.device import Fault
 from study.devices.governor import Governor
 from study.devices.rig import READING_SIZE, Rig
@@ -24,9 +25,14 @@ CLOSE_PATIENCE_S = 1.0
 
 
 class SteppedRunner:
-    def __init__(self, rig: Rig, governor: Governor, catches_up: bool) -> None:
+    """now_s: the clock by which readings are stamped, where time passes by itself. Without it, each is a tick apart."""
+
+    def __init__(
+        self, rig: Rig, governor: Governor, catches_up: bool, now_s: Callable[[], float] | None = None
+    ) -> None:
         self._rig = rig
         self._governor = governor
+        self._now_s = now_s
         self.catches_up = catches_up
         self.failure: BaseException | None = None
         self.force_off = True
@@ -100,6 +106,8 @@ class SteppedRunner:
         reading = self._read()
         if self._gone.is_set():
             return True
+        if self._now_s is not None:
+            governor.state[cells.STAMP_S] = self._now_s()
         self._deciding = True
         over = govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
         self._writing = True

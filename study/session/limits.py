@@ -1,9 +1,10 @@
 """The limits of a sitting, from its protocol: what the safety layer keeps at every tick."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from protocols.apparatus import SafetySettings
+from protocols.plausibility import PlausibilitySettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import MultisineSegment, highest_hz
 from protocols.study_protocol import StudyProtocol
@@ -27,6 +28,9 @@ class Limits:
     longest_hold_s: float
     watchdog_s: float
     release_s: float
+    feedback_cap_n: float = SafetySettings.feedback_cap_n
+    """Of spring and damper: each by itself, and both together."""
+    plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
 
 
 def limits_of_study(protocol: StudyProtocol) -> Limits:
@@ -47,6 +51,15 @@ def limits_of_recording(protocol: RecordingProtocol) -> Limits:
     return _limits(protocol.safety, max(slews))
 
 
+def forces_in_words(safety: SafetySettings) -> str:
+    """What a hand may feel at the most, for the places where a person decides."""
+    feedback_n = min(safety.feedback_cap_n, safety.total_cap_n)
+    return (
+        f"stimulus at most {safety.stimulus_cap_n:g} N, spring and damper {feedback_n:g} N, "
+        f"all together {safety.total_cap_n:g} N"
+    )
+
+
 def _slew(frequency_hz: float, amplitude_n: float, fade_s: float) -> float:
     """Bound of |d/dt (fade(t) A sin(2 pi f t))|: the fade's own slope is at most pi / (2 fade_s)."""
     steepest = amplitude_n * (2 * math.pi * frequency_hz + math.pi / (2 * fade_s))
@@ -61,4 +74,6 @@ def _limits(safety: SafetySettings, slew_n_per_s: float) -> Limits:
         longest_hold_s=safety.longest_trial_s,
         watchdog_s=safety.watchdog_s,
         release_s=safety.release_s,
+        feedback_cap_n=safety.feedback_cap_n,
+        plausibility=safety.plausibility,
     )

@@ -5,8 +5,10 @@ import math
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from protocols.apparatus import SafetySettings
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Look
+from study.session.limits import forces_in_words
 from study.session.views import DeviceFinding, DeviceReport
 
 LOOKS = 50
@@ -30,11 +32,16 @@ CENTRE_M = (0.0, 0.0, 0.0)
 
 
 def check_device(
-    device: Device, clock: Clock, place_m: tuple[float, float, float] = CENTRE_M, total_cap_n: float | None = None
+    device: Device,
+    clock: Clock,
+    place_m: tuple[float, float, float] = CENTRE_M,
+    total_cap_n: float | None = None,
+    safety: SafetySettings | None = None,
 ) -> DeviceReport:
     """Findings of an idle device; takes `LOOKS` times `EVERY_S`. Commands no force and raises nothing.
 
-    place_m: where trials start. total_cap_n: the largest force that will be asked for, if it is known.
+    place_m: where trials start. total_cap_n: the largest force that will be asked for, if it is known; safety: what it
+    is made of.
     """
     looks = []
     for _ in range(LOOKS):
@@ -43,7 +50,9 @@ def check_device(
     answered = [look for look in looks if look.position_m is not None or look.acceleration_mps2 is not None]
     sensors = (_handle(answered, place_m), _accelerometer(answered)) if answered else ()
     info = device.info
-    findings = (_kind(info), _answers(len(answered)), *sensors, _rate(info), _largest_force(info, total_cap_n))
+    largest = _largest_force(info, total_cap_n)
+    made_of = (DeviceFinding("Force on a hand", forces_in_words(safety), fine=True),) if safety is not None else ()
+    findings = (_kind(info), _answers(len(answered)), *sensors, _rate(info), largest, *made_of)
     return DeviceReport(info.name, info.simulated, findings)
 
 

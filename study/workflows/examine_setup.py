@@ -62,7 +62,8 @@ def _examine_device(
     report = DeviceReport(name, simulated=False, findings=())
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
-            report = check_device(device, clock, settings.place_m, settings.limits.total_cap_n)
+            total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL).protocol.safety
+            report = check_device(device, clock, settings.place_m, total_cap_n, safety)
             timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
             return report, timing
     except DeviceError as error:

@@ -28,6 +28,7 @@ def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_wh
     observed = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
+        (health.feedback_clipped > 0, "leaned on the spring: its pull held at the feedback's cap"),
         (health.total_clipped > 0, "leaned on the spring: stimulus reduced at the total cap"),
         (health.slew_limited > 0, "slew limited"),
         (health.sensor_clipped > 0, "accelerometer clipped"),

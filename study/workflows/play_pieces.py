@@ -27,7 +27,7 @@ class Take:
     sensor_clipped_before: int
     """Samples that the accelerometer cut off in the takes that were thrown away."""
     total_clipped_before: int
-    """Likewise ticks at the cap of the total force."""
+    """Likewise ticks at the cap of the total force, or of the spring's."""
     recording: Recording
     health: Health
 
@@ -42,7 +42,7 @@ class Take:
 
 def is_clipped(health: Health) -> bool:
     """Whether something was at its limit, so that the take tells less about the device than it seems to."""
-    return bool(health.sensor_clipped or health.total_clipped)
+    return bool(health.sensor_clipped or health.total_clipped or health.feedback_clipped)
 
 
 def play_pieces(
@@ -85,7 +85,7 @@ def _take(
         if last or not is_clipped(health):
             break
         sensor_before += health.sensor_clipped
-        total_before += health.total_clipped
+        total_before += health.total_clipped + health.feedback_clipped
         amplitude_n = max(LOWERED_TO * amplitude_n, least_n)
     return Take(played, requested_n, tries, sensor_before, total_before, recording, health)
 

@@ -53,7 +53,8 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     """As often as somebody wants to check again. Going on in spite of a finding is their decision, and is logged."""
     sitting.attendant.begin("preparing")
     device, clock = sitting.device, sitting.clock
-    report = check_device(device, clock, sitting.place_m, state.protocol.safety.total_cap_n)
+    safety = state.protocol.safety
+    report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
     # In virtual time nothing waits for a processor.
     load = None if clock.virtual else load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)

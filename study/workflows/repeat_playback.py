@@ -137,7 +137,10 @@ def _measured(played: Played) -> FloatArray:
         raise DeviceError("The device let go", f"While repeating: {health.fault.value}.", "Check the device.")
     spoilt = {
         "the accelerometer clipped": health.sensor_clipped,
-        "the force was limited": health.stimulus_clipped + health.total_clipped + health.slew_limited,
+        "the force was limited": health.stimulus_clipped
+        + health.feedback_clipped
+        + health.total_clipped
+        + health.slew_limited,
         "ticks were missed": health.missed_ticks,
     }
     if found := [f"{what} ({count} samples)" for what, count in spoilt.items() if count]:

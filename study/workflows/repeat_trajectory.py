@@ -190,6 +190,7 @@ def _settings(plan: EqualizePlan, models: ModelsForPlaying) -> DeviceSettings:
             longest_hold_s=600.0,
             watchdog_s=0.5,
             release_s=0.05,
+            feedback_cap_n=plan.cap_n + SPRING_ROOM_N,  # no hand is there; beyond its cap the spring stretches further
         ),
         spring_frequency_hz=float(feedback.get("natural_frequency_hz", SPRING_HZ)),
         spring_damping_n_s_per_m=float(feedback.get("damping_n_s_per_m", 0.0)),

@@ -101,4 +101,6 @@ def _steady(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
             "Run the command again.",
             saved="Recordings and models so far are in the folder.",
         )
-    return played.truth.samples[-len(loop) :], played.health.stimulus_clipped + played.health.total_clipped
+    health = played.health
+    clipped = health.stimulus_clipped + health.feedback_clipped + health.total_clipped
+    return played.truth.samples[-len(loop) :], clipped

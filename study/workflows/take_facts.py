@@ -31,7 +31,7 @@ def segment_facts(take: Take) -> dict[str, Any]:
         "played_amplitude_n": take.played_n,
         "tries": take.tries,
         "sensor_clipped": take.health.sensor_clipped,
-        "total_clipped": take.health.total_clipped,
+        "total_clipped": take.health.total_clipped + take.health.feedback_clipped,
     }
 
 
@@ -43,6 +43,8 @@ def warnings_of(take: Take) -> list[str]:
         found.append(_lowered(take))
     if health.sensor_clipped:
         found.append(f"The accelerometer clipped in {health.sensor_clipped} samples at {take.played_n:.3g} N ({what}).")
+    if health.feedback_clipped:
+        found.append(f"The spring's pull was limited at its cap at {take.played_n:.3g} N ({what}).")
     if health.total_clipped or health.stimulus_clipped:
         found.append(f"The force was limited at its cap at {take.played_n:.3g} N ({what}).")
     if health.missed_ticks:

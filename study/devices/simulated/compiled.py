@@ -1,11 +1,9 @@
 """The compiled entry points. Their machine code is kept on disk, so that only a first run waits for the compiler.
 
-numba holds kept code for good as long as the file of that very function is the same. Most of the mechanism stands in
-other files of this folder, so a changed equation would go on running as it was. numba also compares what a function
-encloses: these enclose a fingerprint of all sources here.
+Most of the mechanism stands in other files of this folder: each entry point encloses the fingerprint of them all, as
+`study.devices.compiling` explains.
 """
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from numba import njit, types
 from numpy import uint64
 
 from equalizer.signals.signal import FloatArray
+from study.devices.compiling import fingerprint
 from study.devices.simulated.dynamics import integrate_tick
 from study.devices.simulated.linkage import inverse_kinematics
 from study.devices.simulated.sensors import read_sensors
@@ -21,14 +20,6 @@ from study.devices.simulated.sensors import read_sensors
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _NOISE = types.uint64[::1]
-
-
-def fingerprint(folder: Path) -> int:
-    """Of all Python sources in it; 32 bits."""
-    digest = hashlib.sha256()
-    for source in sorted(folder.glob("*.py")):
-        digest.update(source.read_bytes())
-    return int.from_bytes(digest.digest()[:4], "big")
 
 
 def _entry_points(sources: int) -> tuple[Any, Any, Any]:

@@ -233,6 +233,7 @@ def test_protocols_are_listed_and_explained(run):
     assert [line.split()[0] for line in out.splitlines()] == list(shipped_protocols())
     code, out, _ = run("protocol", "show", "direction_threshold")
     assert "staircase.step_change = after_reversal" in out
+    assert "stimulus at most 3 N, spring and damper 1.5 N, all together 4.5 N" in out
     code, out, _ = run("protocol", "show", "direction_threshold", "--json")
     assert {field["key"] for field in json.loads(out)["fields"]} >= {"staircase.start_n", "trial.feedback"}
     code, out, _ = run("protocol", "show", "sweep", "--text")

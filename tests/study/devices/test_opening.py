@@ -3,15 +3,18 @@
 import math
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from protocols.plausibility import PlausibilitySettings
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceSettings
 from study.devices.opening import DEVICES, FRICTIONLESS, SIMULATIONS, open_device
 from study.devices.rigs_by_name import RIGS_BY_NAME
+from study.devices.safe import SafeDevice
 from study.errors import DeviceError, ExitCode
 from study.session.limits import Limits
 
@@ -48,9 +51,36 @@ def test_a_limit_that_is_no_limit_is_refused(name, value):
         open_device("simulated", limited(**{name: value}), VirtualClock(), seed=1)
 
 
+BOUNDS = [field.name for field in fields(PlausibilitySettings)]
+
+
+@pytest.mark.parametrize("name", ["feedback_cap_n", *BOUNDS])
+@pytest.mark.parametrize("value", [math.nan, -1.0, math.inf])
+def test_a_bound_of_what_a_position_may_be_that_is_no_bound_is_refused(name, value):
+    bounds = None if name == "feedback_cap_n" else unchecked_bounds(name, value)
+    settings = limited(feedback_cap_n=value) if bounds is None else limited(plausibility=bounds)
+    with pytest.raises(DeviceError, match=f"limits are not safe.*{name} is .*at most"):
+        open_device("simulated", settings, VirtualClock(), seed=1)
+
+
+def unchecked_bounds(name: str, value: float) -> SimpleNamespace:
+    """A protocol would refuse the value before: here it comes past that."""
+    return SimpleNamespace(**(asdict(PlausibilitySettings()) | {name: value}))
+
+
+@pytest.mark.parametrize("name", ["sample_rate_hz", "effective_mass_kg"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 0.0, 1e6])
+def test_a_device_that_says_nonsense_of_itself_is_refused(rigs, name, value):
+    """The spring's stiffness is made from its mass, every duration from its rate."""
+    rig = replace(rigs.compiled_rig(), info=replace(rigs.INFO, **{name: value}))
+    with pytest.raises(DeviceError, match=f"what it says of itself cannot be.*{name} is"):
+        SafeDevice(rig, rigs.SETTINGS, VirtualClock())
+
+
 @pytest.mark.parametrize(
     "settings",
     [
+        limited(feedback_cap_n=6.1),
         limited(total_cap_n=6.1),
         limited(stimulus_cap_n=3.1, total_cap_n=6.0),
         limited(stimulus_cap_n=3.0, total_cap_n=2.0),

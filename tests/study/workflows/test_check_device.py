@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from protocols.apparatus import SafetySettings
 from study.devices.clock import VirtualClock
 from study.devices.opening import open_device
 from study.devices.rig import READING_SIZE
@@ -159,3 +160,11 @@ def test_a_device_that_is_too_weak_is_found(rig, rigs, clock):
     assert (force.value, force.fine) == ("12 N; at most 12.5 N will be asked for", False)
     assert force.advice == "Lower total_cap_n in the protocol's [safety] section, or take a stronger device."
     assert findings(rig, rigs, clock)["Largest force"].value == "12 N"
+
+
+def test_what_a_hand_may_feel_is_said_before_a_sitting(rig, rigs, clock):
+    safety = SafetySettings(stimulus_cap_n=2.5, total_cap_n=4.0)
+    with contextlib.closing(SafeDevice(rig, rigs.SETTINGS, clock)) as device:
+        report = check_device(device, clock, (0.0, 0.0, 0.0), 4.0, safety)
+    value = {finding.name: finding.value for finding in report.findings}["Force on a hand"]
+    assert value == "stimulus at most 2.5 N, spring and damper 1.5 N, all together 4 N"

@@ -1,0 +1,43 @@
+"""Where each number stands in the arrays that the governed tick reads and changes, and what its codes mean."""
+
+(
+    TICK_S, STIFFNESS, DAMPING, VELOCITY_SHARE, CENTRE_X, CENTRE_Y, CENTRE_Z,
+    STIMULUS_CAP, FEEDBACK_CAP, TOTAL_CAP, SLEW_STEP, WATCHDOG_TICKS, LET_GO_TICKS,
+    # What a reading may be: see `protocols.plausibility`.
+    WORKSPACE, LONGEST_JUMP, FASTEST_STEP, ACCELERATION, ACCELERATION_SHARE, RESOLUTION, FRICTION,
+    STALE_TICKS, STILL_TICKS, SETTINGS_SIZE,
+) = range(23)  # fmt: skip
+"""Cells of `settings`, fixed from opening to closing. SLEW_STEP in N per tick, FASTEST_STEP in m per tick,
+LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goes in one tick."""
+
+(
+    # Letter box: written from Python at any time, even in the middle of a block.
+    STOP_ASKED, RELEASE_ASKED, LET_GO_ASKED, SIGN_OF_LIFE,
+    # When the reading was taken, s, by a clock of the loop; 0 where the tick's number says it.
+    STAMP_S,
+    # What is played: written while nothing moves. In ticks; LENGTH is inf for a loop, LEAD rows of it are played once.
+    START, FADE_IN, FADE_OUT, RAISED_COSINE, SPRING_RAMP, LENGTH, LEAD, LONGEST, RECORD_FROM,
+    # How it goes.
+    PHASE, FAULT, TICK, LAST_SIGN, RELEASED_AT, LET_GO_AT, STIMULUS_GAIN, SPRING_GAIN,
+    # What was counted.
+    TICKS, MISSED, STIMULUS_CLIPPED, FEEDBACK_CLIPPED, TOTAL_CLIPPED, SLEW_LIMITED, SENSOR_CLIPS, PEAK, RECORDED,
+    # Of the readings: ticks since the one before, that one's tick and time, N of spring and damper together.
+    ELAPSED, READ_AT, READ_AT_S, PULL, SHAKING, UNCHANGED,
+    # Vectors: the place of their first component.
+    FORCE, _FY, _FZ, EXCITATION, _EY, _EZ, LAST_POSITION, _XY, _XZ, VELOCITY, _VY, _VZ, LET_GO_FROM, _LY, _LZ,
+    # LAST_STEP in m per tick; where the reading last changed; the motion that is expected meanwhile, m.
+    LAST_STEP, _SY, _SZ, CHANGED, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
+    LEAST, _AY, _AZ, MOST, _BY, _BZ,
+    STATE_SIZE,
+) = range(74)  # fmt: skip
+"""Cells of `state`."""
+
+STILL, PLAYING, RELEASING, LETTING_GO = range(4)
+"""Phases. RELEASING is asked for and fades as the stimulus says; LETTING_GO is the safety layer's own fade of the
+last force: straight to zero, needing neither sensor nor program, and exempt from the slew limit."""
+
+NO_FAULT, NOT_A_NUMBER, STALLED, HELD_TOO_LONG, STOPPED, LOST, FORCE_LEFT, OUTSIDE, JUMPED, SHAKEN, STALE = range(11)
+"""In the order of `study.devices.device.Fault`."""
+
+ROW_SIZE = 15
+"""A row of the recording: command, excitation, position, acceleration, true acceleration."""

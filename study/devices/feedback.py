@@ -1,0 +1,55 @@
+"""Spring and damper: the share of the force that follows the handle. Confined by itself, so that a reading that is
+wrong in a way that nothing can tell pulls with no more than that."""
+
+import math
+
+from equalizer.signals.signal import FloatArray
+from study.devices.cells import (
+    CENTRE_X,
+    DAMPING,
+    ELAPSED,
+    FEEDBACK_CAP,
+    FEEDBACK_CLIPPED,
+    LAST_POSITION,
+    PULL,
+    STIFFNESS,
+    TICK_S,
+    VELOCITY,
+    VELOCITY_SHARE,
+)
+from study.devices.compiling import part
+from study.devices.confine import BEYOND, kept_share, norm_of
+
+
+@part
+def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
+    """A low-pass of displacement over the time that really went by: its corner stays the same when ticks are late."""
+    elapsed = state[ELAPSED]
+    share = settings[VELOCITY_SHARE]
+    if elapsed != 1.0:
+        share = 1.0 - (1.0 - share) ** elapsed
+    for i in range(3):
+        last = state[LAST_POSITION + i]
+        speed = 0.0 if math.isnan(last) else (reading[i] - last) / (elapsed * settings[TICK_S])
+        state[VELOCITY + i] += share * (speed - state[VELOCITY + i])
+
+
+@part
+def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
+    """The spring, the damper and both together are each within FEEDBACK_CAP."""
+    _track_velocity(state, settings, reading)
+    cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
+    x = stiffness * (reading[0] - settings[CENTRE_X])
+    y = stiffness * (reading[1] - settings[CENTRE_X + 1])
+    z = stiffness * (reading[2] - settings[CENTRE_X + 2])
+    u, v, w = damping * state[VELOCITY], damping * state[VELOCITY + 1], damping * state[VELOCITY + 2]
+    of_spring, of_damper = norm_of(x, y, z), norm_of(u, v, w)
+    spring, damper = kept_share(of_spring, cap), kept_share(of_damper, cap)
+    x, y, z = spring * x + damper * u, spring * y + damper * v, spring * z + damper * w
+    both = norm_of(x, y, z)
+    kept = kept_share(both, cap)
+    force[0] -= gain * (kept * x)
+    force[1] -= gain * (kept * y)
+    force[2] -= gain * (kept * z)
+    state[PULL] = abs(gain) * kept * both
+    state[FEEDBACK_CLIPPED] += max(of_spring, of_damper, both) > cap * BEYOND

@@ -1,0 +1,134 @@
+"""Whether a reading of the position can be a handle's: where it is, how it got there, and whether it follows the force.
+
+The bounds and their reasons: `protocols.plausibility`. What passes may still be wrong; then it pulls with the
+feedback's cap at the most.
+"""
+
+import math
+
+from equalizer.signals.signal import FloatArray
+from study.devices.cells import (
+    ACCELERATION,
+    ACCELERATION_SHARE,
+    CHANGED,
+    ELAPSED,
+    EXCITATION,
+    EXPECTED,
+    EXPECTED_SPEED,
+    FASTEST_STEP,
+    FRICTION,
+    JUMPED,
+    LAST_POSITION,
+    LAST_STEP,
+    LEAST,
+    LONGEST_JUMP,
+    MOST,
+    MOVING_FORCE,
+    NO_FAULT,
+    NOT_A_NUMBER,
+    OUTSIDE,
+    PULL,
+    RESOLUTION,
+    SHAKEN,
+    SHAKING,
+    STALE,
+    STALE_TICKS,
+    STILL_TICKS,
+    TICK_S,
+    UNCHANGED,
+    WORKSPACE,
+)
+from study.devices.compiling import part
+from study.devices.confine import below, norm_of
+
+IMPLAUSIBLE_M = 0.5
+"""Beyond it a reading counts as no number at all."""
+
+GRIPPED_KG, GRIPPED_N_S_PER_M, GRIPPED_N_PER_M = 1.0, 60.0, 3000.0
+"""A handle in a hard grip moves no less than this. A whole arm has 0.55 kg, 6.5 N s/m, 135 N/m (Sci. Rep. srep18004),
+a hard grip some 20 times that stiffness."""
+
+STEPS_OF_RESOLUTION = 2.0
+"""Between the differences of three readings that are each wrong by half a step; and so far must a handle be expected
+to have moved, before a reading that did not change is stale."""
+
+
+@part
+def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
+    """Of the gripped handle in the last tick, by the stimulus: what a hand at rest holds, it has held before. Dry
+    friction lets only that part through by which it goes beyond the last one that moved the handle (Prandtl's play)."""
+    x = state[EXCITATION] - state[MOVING_FORCE]
+    y = state[EXCITATION + 1] - state[MOVING_FORCE + 1]
+    z = state[EXCITATION + 2] - state[MOVING_FORCE + 2]
+    beyond = norm_of(x, y, z)
+    share = 1.0 - settings[FRICTION] / beyond if beyond > settings[FRICTION] else 0.0
+    state[MOVING_FORCE] += share * x
+    state[MOVING_FORCE + 1] += share * y
+    state[MOVING_FORCE + 2] += share * z
+    for i in range(3):
+        left = state[MOVING_FORCE + i] - GRIPPED_N_PER_M * state[EXPECTED + i]
+        left -= GRIPPED_N_S_PER_M * state[EXPECTED_SPEED + i]
+        state[EXPECTED_SPEED + i] += settings[TICK_S] / GRIPPED_KG * left
+        state[EXPECTED + i] += settings[TICK_S] * state[EXPECTED_SPEED + i]
+        state[LEAST + i] = min(state[LEAST + i], state[EXPECTED + i])
+        state[MOST + i] = max(state[MOST + i], state[EXPECTED + i])
+
+
+@part
+def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
+    """Since the reading that was the last to change. Then it is that one itself."""
+    away = norm_of(reading[0] - state[CHANGED], reading[1] - state[CHANGED + 1], reading[2] - state[CHANGED + 2])
+    if away < 0.5 * settings[RESOLUTION]:
+        return False
+    for i in range(3):
+        state[CHANGED + i] = reading[i]
+        state[LEAST + i] = state[MOST + i] = state[EXPECTED + i]
+    return True
+
+
+@part
+def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
+    _expect_motion(state, settings)
+    if _has_changed(state, settings, reading):
+        state[UNCHANGED] = 0.0
+        return False
+    state[UNCHANGED] += 1.0
+    expected = max(state[MOST] - state[LEAST], state[MOST + 1] - state[LEAST + 1], state[MOST + 2] - state[LEAST + 2])
+    if state[UNCHANGED] >= settings[STALE_TICKS] and expected > STEPS_OF_RESOLUTION * settings[RESOLUTION]:
+        return True
+    return bool(state[UNCHANGED] >= settings[STILL_TICKS] and state[PULL] > settings[FRICTION])
+
+
+@part
+def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: float) -> bool:
+    """x, y, z: the present step, in m per tick."""
+    last = state[LAST_STEP]
+    if not math.isnan(last):  # as it is before the second reading
+        change = norm_of(x - last, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
+        change = max(0.0, change - STEPS_OF_RESOLUTION * settings[RESOLUTION])
+        acceleration = change / (settings[TICK_S] * settings[TICK_S])
+        state[SHAKING] += settings[ACCELERATION_SHARE] * (acceleration - state[SHAKING])
+    state[LAST_STEP], state[LAST_STEP + 1], state[LAST_STEP + 2] = x, y, z
+    return bool(state[SHAKING] > settings[ACCELERATION])
+
+
+@part
+def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
+    """NO_FAULT, or why the force must be let go. LAST_POSITION and ELAPSED say what was before."""
+    if not below(reading, IMPLAUSIBLE_M):
+        return NOT_A_NUMBER
+    if not norm_of(reading[0], reading[1], reading[2]) <= settings[WORKSPACE]:
+        return OUTSIDE
+    last_x = state[LAST_POSITION]
+    if math.isnan(last_x):  # the first reading
+        _has_changed(state, settings, reading)
+        return NO_FAULT
+    x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
+    # Driver and loop have clocks of their own: readings may be a tick apart, though they were taken one after another.
+    ticks = max(1.0, state[ELAPSED])
+    way = norm_of(x, y, z)
+    if not (way <= settings[LONGEST_JUMP] and way <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):
+        return JUMPED
+    if _is_shaken(state, settings, x / ticks, y / ticks, z / ticks):
+        return SHAKEN
+    return STALE if _is_stale(state, settings, reading) else NO_FAULT
