@@ -84,5 +84,5 @@ def _open(path: Path, parent: int | None) -> RealFolder:
 def _kind(path: Path) -> int:
     try:
         return stat.S_IFMT(path.lstat().st_mode)
-    except OSError:
+    except (OSError, ValueError):  # no name that a file can have
         return 0
