@@ -70,7 +70,7 @@ def _with_marks(lines: list[str], dots: list[tuple[float, float]], staircase: St
 
 
 def _mark(correct: bool, reversal: bool) -> str:
-    """A turn after a right answer is a peak: down from here; after a wrong one a valley."""
+    """A reversal after a right answer is a peak: down from here; after a wrong one a valley."""
     if reversal:
         return PEAK if correct else VALLEY
     return RIGHT if correct else WRONG

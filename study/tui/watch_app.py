@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -22,11 +23,18 @@ class WatchApp(App[None]):
     TITLE = "hapteq watch"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]
 
-    def __init__(self, source: WatchSource, ask: Callable[[Request], object], theme: str = DARK.name) -> None:
-        """ask: hands a request to the session; raises StudyError where it cannot."""
+    def __init__(
+        self,
+        source: WatchSource,
+        ask: Callable[[Request], object],
+        theme: str = DARK.name,
+        clock_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """ask: hands a request to the session; raises StudyError where it cannot. clock_s: time of alarms, seconds."""
         super().__init__()
         self._source = source
         self._ask = ask
+        self._clock_s = clock_s
         self._keys = KeysInOrder(self, super().on_event)
         self.animation_level = "none"
         register_themes(self, theme)
@@ -39,7 +47,7 @@ class WatchApp(App[None]):
 
     def on_mount(self) -> None:
         leave_with_the_terminal(self, self.exit)
-        self.push_screen(WatchScreen(self._source, self._ask))
+        self.push_screen(WatchScreen(self._source, self._ask, self._clock_s))
 
     def on_watch_screen_left(self) -> None:
         self.exit()

@@ -8,11 +8,11 @@ from study.tui.watch_words import (
     dose_words,
     handle_words,
     local_time,
+    reversals,
     run_name,
     sensor_words,
     staircase_title,
     time_words,
-    turns,
     verdict,
     what_goes_on,
 )
@@ -52,7 +52,7 @@ def status(view: WatchView) -> list[str]:
     for run in view.runs:
         lines.append(f"Run        {run_name(view, run)}, {run.frequency_hz:g} Hz: {run.status}, {run.trials} trials")
         if run.reversals_needed:
-            lines[-1] += f", {turns(run)} reversals"
+            lines[-1] += f", {reversals(run)} reversals"
     lines += [f"Last       {_trial_line(trial)}" for trial in view.last[:3]]
     lines += [f"Note       {local_time(note.utc)} {note.who}: {note.text}" for note in view.notes[:3]]
     return lines

@@ -49,7 +49,7 @@ def run_name(view: WatchView, run: WatchedRun) -> str:
     return f"{run.phase} {1 + [r.run for r in view.runs if r.phase == run.phase].index(run.run)}"
 
 
-def turns(run: WatchedRun) -> str:
+def reversals(run: WatchedRun) -> str:
     return f"{run.reversals}/{run.reversals_needed}" if run.reversals_needed else "–"
 
 

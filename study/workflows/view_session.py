@@ -23,7 +23,7 @@ from study.workflows.session_results import due_results
 if TYPE_CHECKING:
     from analysis.study_analysis import StudyAnalysis
 
-THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "turns", "trials", "right", "remark")
+THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark")
 
 
 def session_view(path: Path) -> SessionView:

@@ -32,7 +32,7 @@ HELP = """\
 * **1 Overview**: who, what, when, and what to know about it.
 * **2 Thresholds**: one row per run. "cut by the cap": the strongest force allowed was not enough, and the true
   threshold may lie elsewhere.
-* **3 Staircases**: force over trials. ○ right, × wrong, ▼ a peak, ▲ a valley, ┄ the cap, ··· the threshold.
+* **3 Staircases**: force over trials. ○ right, × wrong, ▼ ▲ reversals (a peak, a valley), ┄ the cap, ··· the threshold.
 * **4 Log**: everything that happened, in words.
 * **5 Report**: where report and figures lie. **o** opens the report in the browser.
 
@@ -203,7 +203,7 @@ def _thresholds(view: SessionView) -> ComposeResult:
     yield Static(
         Content.styled(
             "Thresholds: mean of the last peaks and valleys. Delivered: what the handle did along the direction there. "
-            "Turns: reversals. Cut by the cap: the staircase met the strongest force allowed.",
+            "Rev.: reversals. Cut by the cap: the staircase met the strongest force allowed.",
             "$foreground 65%",
         ),
         classes="part",

@@ -63,14 +63,17 @@ class WatchScreen(Screen[None]):
     class Left(Message):
         """Whoever watched wants to leave; the session goes on."""
 
-    def __init__(self, source: WatchSource, ask: Callable[[Request], object]) -> None:
-        """ask: hands a request to the session. Raises StudyError where it cannot."""
+    def __init__(
+        self, source: WatchSource, ask: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        """ask: hands a request to the session. Raises StudyError where it cannot. clock_s: time of alarms, seconds."""
         super().__init__()
+        self._clock_s = clock_s
         self._source = source
         self._ask = ask
         self._book = AlarmBook()
         self._taken: WatchView | None = None
-        self._news_s = time.monotonic()
+        self._news_s = self._clock_s()
         self._stop_sent_s: float | None = None
         self._stopped_here = False
         self._said_s = float("-inf")
@@ -96,10 +99,10 @@ class WatchScreen(Screen[None]):
         titles = {"#trials": "Last trials", "#runs": "Runs", "#gauges": "Exposure and device", "#aside": "Details"}
         for name, title in titles.items():
             self.query_one(name).border_title = title
-        self.set_interval(LOOK_EVERY_S, self._look)
-        self._look()
+        self.set_interval(LOOK_EVERY_S, self.look)
+        self.look()
 
-    def _look(self) -> None:
+    def look(self) -> None:
         """Ten times a second: is there a new view, must the bell ring, was the stop heard?"""
         view = self._source.latest()
         if view is not None and view is not self._taken:
@@ -109,7 +112,7 @@ class WatchScreen(Screen[None]):
             self._attend()
 
     def on_watch_message(self, message: WatchMessage) -> None:
-        self._news_s = time.monotonic()
+        self._news_s = self._clock_s()
         self._stopped_here = self._stopped_here and message.view.standing not in ON
         self.view = message.view
 
@@ -136,7 +139,7 @@ class WatchScreen(Screen[None]):
         trials.update(trials_lines(self.view, trials.content_size.height, trials.content_size.width))
 
     def _attend(self) -> None:
-        now_s = time.monotonic()
+        now_s = self._clock_s()
         alarms = (*self._own_alarms(now_s), *self._alarms_of_the_view())
         if self._book.take(alarms, now_s):
             self.app.bell()
@@ -174,7 +177,7 @@ class WatchScreen(Screen[None]):
         panel.update(alarm_lines(unseen, seen))
 
     def action_stop(self) -> None:
-        self._stop_sent_s = time.monotonic()
+        self._stop_sent_s = self._clock_s()
         self._send(StopAsked("experimenter"), "Stop sent: the force goes off at once.")
 
     def action_pause(self) -> None:
@@ -191,7 +194,7 @@ class WatchScreen(Screen[None]):
         self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
 
     def action_acknowledge(self) -> None:
-        seen = self._book.acknowledge(time.monotonic())
+        seen = self._book.acknowledge(self._clock_s())
         self._say(f"{seen} alarm{'' if seen == 1 else 's'} seen." if seen else "There is no alarm to be seen.")
         self._show_alarms()
 
@@ -219,7 +222,7 @@ class WatchScreen(Screen[None]):
         self._say(said)
 
     def _say(self, sentence: str) -> None:
-        self._said_s = time.monotonic()
+        self._said_s = self._clock_s()
         self._guide(sentence, said=True)
 
     def _guide(self, sentence: str, said: bool) -> None:

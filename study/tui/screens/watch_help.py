@@ -16,10 +16,11 @@ light, dark and high contrast, **q** leaves the view; the session goes on.
 
 ## What you see
 
-* **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ turns of the level, ? the next level.
+* **Staircase**: force over trials. ○ right, × wrong, ▼ and ▲ reversals, ? the next level.
 * **Last trials**: the newest on top. *shown* and *said* are the numbers 1 and 2; *s* is the time to answer; *m/s²* is \
 what the handle did along the direction, *off* across it. ↺ marks a reversal, + a repeated trial, ! a remark \
 (shown in a wider window).
+* **Runs**: *rev.* counts reversals, *n* trials.
 * **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
 * **Catch**: trials at full force that anybody should get right; errors in them are lapses of attention.
 

@@ -18,7 +18,7 @@ DOTS_PER_TRIAL = 4.0
 
 MUTED = "$foreground 65%"
 NEXT = "?"
-LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} turn {NEXT} next ┄ cap"
+LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} reversal {NEXT}next ┄cap"
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}
 _FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
@@ -78,7 +78,7 @@ def level_history(
 
 
 def _mark(point: StaircasePoint) -> str:
-    """A turn after a right answer is a peak gone past: down from here; after a wrong one a valley."""
+    """A reversal after a right answer is a peak gone past: down from here; after a wrong one a valley."""
     if point.reversal:
         return PEAK if point.correct else VALLEY
     return RIGHT if point.correct else WRONG

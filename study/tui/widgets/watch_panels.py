@@ -12,10 +12,10 @@ from study.tui.watch_words import (
     dose_words,
     handle_words,
     local_time,
+    reversals,
     run_name,
     sensor_words,
     time_words,
-    turns,
     verdict,
     what_goes_on,
 )
@@ -54,7 +54,7 @@ def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
 
 def runs_lines(view: WatchView, rows: int) -> Content:
     """As many runs as there are rows for, the present one among them."""
-    lines = [Content.styled("  run            Hz turns  n", MUTED)]
+    lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
     lines += [_run_line(view, run) for run in _around_the_present(view.runs, rows - 1)]
     return Content("\n").join(lines)
 
@@ -116,7 +116,8 @@ def _around_the_present(runs: tuple[WatchedRun, ...], rows: int) -> tuple[Watche
 
 
 def _run_line(view: WatchView, run: WatchedRun) -> Content:
-    text = f"{_RUN_SYMBOLS[run.status]} {run_name(view, run):<12} {run.frequency_hz:4g} {turns(run):>5} {run.trials:>2}"
+    name = f"{_RUN_SYMBOLS[run.status]} {run_name(view, run):<12}"
+    text = f"{name} {run.frequency_hz:4g} {reversals(run):>5} {run.trials:>2}"
     return Content.styled(text, {"present": "bold", "done": "", "to come": MUTED}[run.status])
 
 
@@ -125,14 +126,16 @@ def _trial_line(trial: ClosedTrial, columns: int) -> Content:
     number = f"{trial.trial + 1}{'+' * min(trial.attempt, 2)}"
     left = f"{number:>5} {trial.level_n:5.3g} {_or_dash(trial.shown, 5)} {_or_dash(trial.answer, 4)} "
     right = f"{_number(trial.response_time_s, 4)} {_number(trial.delivered_mps2, 4)} {_number(trial.off_axis_mps2, 4)}"
-    turned = "↺" if trial.reversal else " "
+    reversed_here = "↺" if trial.reversal else " "
     room = columns - len(left) - len(right) - 9
     remark = trial.remark or ("" if trial.status in ("ok", "spoiled") else trial.status)
     if trial.phase == "catch":
         remark = f"catch {remark}".rstrip()
     shortened = remark if len(remark) <= room else f"{remark[: room - 1]}…"
     tail = f"  {shortened}" if room >= 8 else " !" if remark else ""
-    return Content.assemble(left, (f"{word:<5}", _VERDICT_STYLES.get(word, MUTED)), f"{turned} {right}", (tail, MUTED))
+    return Content.assemble(
+        left, (f"{word:<5}", _VERDICT_STYLES.get(word, MUTED)), f"{reversed_here} {right}", (tail, MUTED)
+    )
 
 
 def _or_dash(value: int | None, width: int) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.session.live import Live
 from study.session.requests import NoteAsked, PauseAsked, StopAsked
@@ -23,8 +24,9 @@ from study.session.watch_view import (
     WatchedRun,
     WatchView,
 )
-from study.tui.screens import watch
+from study.tui.screens.watch import NO_NEWS_AFTER_S, UNHEARD_AFTER_S
 from study.tui.watch_app import WatchApp
+from study.tui.widgets.alarm_book import RING_EVERY_S
 
 HERE = Path(__file__).parent
 UTC = "2026-11-22T10:17:00.000+00:00"
@@ -91,8 +93,15 @@ class Source:
 class Seat:
     """Whoever sits before the screen."""
 
-    def __init__(self, app: WatchApp, pilot, source: Source, asked: list, bells: list) -> None:
-        self.app, self.pilot, self.source, self.asked, self.bells = app, pilot, source, asked, bells
+    def __init__(self, app: WatchApp, clock: VirtualClock, source: Source, asked: list, bells: list) -> None:
+        self.app, self.clock, self.source, self.asked, self.bells = app, clock, source, asked, bells
+        self.pilot = None
+
+    async def pass_time(self, seconds: float) -> None:
+        """Of the alarms' clock; the screen then looks, as it does ten times a second."""
+        self.clock.sleep(seconds)
+        self.app.screen_stack[1].look()
+        await self.pilot.pause()
 
     @property
     def lines(self) -> list[str]:
@@ -128,9 +137,10 @@ def seated(monkeypatch):
 
     def run(story, first=None, size=(80, 24), theme="hapteq-dark", ask=None) -> Seat:
         source, asked, bells = Source(view() if first is None else first), [], []
-        app = WatchApp(source, ask or asked.append, theme)
-        app.bell = lambda: bells.append(time.monotonic())
-        seat = Seat(app, None, source, asked, bells)
+        clock = VirtualClock()
+        app = WatchApp(source, ask or asked.append, theme, clock.now_s)
+        app.bell = lambda: bells.append(clock.now_s())
+        seat = Seat(app, clock, source, asked, bells)
 
         async def told() -> None:
             async with app.run_test(size=size) as pilot:
@@ -164,7 +174,6 @@ def test_the_screen_looks_as_it_did(seated, size, theme, alarms):
     picture = HERE / f"watch_{size[0]}x{size[1]}{'_alarm' if alarms else ''}.txt"
 
     async def story(seat):
-        await seat.pilot.pause(0.05)
         shown = "\n".join(seat.lines) + "\n"
         if "HAPTEQ_WRITE_SCREENS" in os.environ:
             picture.write_text(shown, "utf-8")
@@ -203,25 +212,26 @@ def test_a_small_s_stops_nothing(seated):
     assert seated(story).asked == []
 
 
-def test_a_stop_that_is_not_heard_is_an_alarm(seated, monkeypatch):
-    monkeypatch.setattr(watch, "UNHEARD_AFTER_S", 0.1)
-
+def test_a_stop_that_is_not_heard_is_an_alarm(seated):
     async def story(seat):
         await seat.press("S")
-        await seat.wait(lambda: "The session has not answered the stop." in seat.text)
+        await seat.pass_time(UNHEARD_AFTER_S - 0.1)
+        assert seat.bells == []
+        await seat.pass_time(0.2)
+        assert "The session has not answered the stop." in seat.text
         assert "switch the device off" in seat.text
 
     assert len(seated(story).bells) == 1
 
 
-def test_a_stop_that_is_not_heard_in_a_pause_is_an_alarm_too(seated, monkeypatch):
+def test_a_stop_that_is_not_heard_in_a_pause_is_an_alarm_too(seated):
     """A session hears it there within a moment, and ends."""
-    monkeypatch.setattr(watch, "UNHEARD_AFTER_S", 0.1)
 
     async def story(seat):
         await seat.show(view(standing="paused", activity="pausing", open_trial=None))
         await seat.press("S")
-        await seat.wait(lambda: "The session has not answered the stop." in seat.text)
+        await seat.pass_time(UNHEARD_AFTER_S + 0.1)
+        assert "The session has not answered the stop." in seat.text
 
     assert len(seated(story).bells) == 1
 
@@ -276,20 +286,22 @@ def test_a_note_being_typed_does_not_keep_anybody_from_stopping(seated):
     seated(story)
 
 
-def test_an_alarm_rings_until_it_is_seen_and_stays_on_the_screen(seated, monkeypatch):
-    monkeypatch.setattr("study.tui.widgets.alarm_book.RING_EVERY_S", 0.1)
-
+def test_an_alarm_rings_until_it_is_seen_and_stays_on_the_screen(seated):
     async def story(seat):
         assert seat.bells == []
         await seat.show(view(alarms=(ALARM,)))
-        await seat.wait(lambda: len(seat.bells) >= 3)
+        for look in range(9):
+            await seat.pass_time(0.3 * RING_EVERY_S)
+            await seat.show(view(alarms=(ALARM,), activity_s=float(look)))  # news keep coming
+        assert len(seat.bells) == 3
         assert "ALARM: press a when you have seen it" in seat.text
         assert "▲ The acceleration sensor is clipped: it reads too little. since 10:17:00" in seat.text
         await seat.press("a")
-        heard = len(seat.bells)
         assert "1 alarm seen." in seat.lines[1]
-        await asyncio.sleep(0.3)
-        assert len(seat.bells) == heard
+        await seat.pass_time(0.3 * RING_EVERY_S)
+        await seat.show(view(alarms=(ALARM,)))
+        await seat.pass_time(0.8 * RING_EVERY_S - 1.0)
+        assert len(seat.bells) == 3
         assert "seen: The acceleration sensor is clipped" in seat.text
         await seat.show(view())
         assert "sensor is clipped" not in seat.text
@@ -299,11 +311,12 @@ def test_an_alarm_rings_until_it_is_seen_and_stays_on_the_screen(seated, monkeyp
     seated(story)
 
 
-def test_a_view_that_stands_still_is_an_alarm(seated, monkeypatch):
-    monkeypatch.setattr(watch, "NO_NEWS_AFTER_S", 0.1)
-
+def test_a_view_that_stands_still_is_an_alarm(seated):
     async def story(seat):
-        await seat.wait(lambda: "This view has stood still for seconds" in seat.text)
+        await seat.pass_time(NO_NEWS_AFTER_S - 0.1)
+        assert seat.bells == []
+        await seat.pass_time(0.2)
+        assert "This view has stood still for seconds" in seat.text
 
     assert seated(story).bells
 

@@ -162,7 +162,7 @@ def session(line, staircase) -> SessionView:
         facts=(("participant", "P01, a person, number 1 of this protocol"),
                ("protocol", "direction_threshold (680ddede8420, locked)"), ("device", "omega.3, 1000 Hz"),
                ("begun", "2026-05-04 09:30:12 UTC"), ("runs", "6 of 6"), ("answers", "365"), ("seed", "62818196")),
-        thresholds=(("run", "phase", "at", "threshold", "delivered", "turns", "trials", "right", "remark"),
+        thresholds=(("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark"),
                     ("2", "test", "5 Hz", "0.475 N", "0.56 m/s²", "13", "68", "82 %", ""),
                     ("3", "test", "35 Hz", "2.681 N", "5.60 m/s²", "13", "53", "77 %", "cut by the cap")),
         warnings=("There is one participant: individual thresholds can be shown, nothing can be tested.",),
