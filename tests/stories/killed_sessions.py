@@ -1,7 +1,9 @@
 """Run sessions, kill each with SIGKILL at random moments, resume it, and check what is on the disk.
 
-A script of its own: `python killed_sessions.py FOLDER SESSIONS SEED PROTOCOL`. It forks its children from a warm
-process without threads, so that a hundred sessions take minutes rather than hours. Prints one JSON line per session.
+A script of its own: `python killed_sessions.py FOLDER SESSIONS SEED PROTOCOL [processes]`. Every sitting goes through
+the command line, `hapteq study` and `hapteq resume`, results included. It forks its children from a warm process
+without threads, so that a hundred sessions take minutes rather than hours; with `processes` each is a new program.
+Prints one JSON line per session.
 """
 
 import json
@@ -12,31 +14,41 @@ import sys
 import time
 from pathlib import Path
 
-from protocols.loading import load_protocol
-from study.devices.clock import VirtualClock
+from study.cli.main import main as hapteq
 from study.store.archive import SessionFolder, session_folders
 from study.store.event_log import read_log
-from study.workflows.conduct_session import conduct_new, conduct_resumed
 from study.workflows.fold_session import fold_session
-from study.workflows.open_session import SessionPlan
-from study.workflows.simulated_participant import simulated_participant
+from study.workflows.validate import validate_file
 
 KILLS = 3
+RESULTS = Path(sys.argv[1]).with_name("results.jsonl")
+PROCESSES = sys.argv[5:] == ["processes"]
 
 
-def plan(data: Path, subject: str, text: str, seed: int) -> SessionPlan:
-    protocol = load_protocol(text, "killed sessions")
-    return SessionPlan(protocol, text, False, subject, "scripted", seed, data)
-
-
-def sit(data: Path, subject: str, text: str, seed: int) -> None:
+def words(data: Path, subject: str, protocol: str, seed: int) -> list[str]:
     """Begin the subject's session, or go on with it."""
-    participant = simulated_participant("scripted", seed, VirtualClock())
     folder = begun(data, subject)
-    if folder is None:
-        conduct_new(plan(data, subject, text, seed), "simulated", participant)
-    else:
-        conduct_resumed(folder, "simulated", participant)
+    if folder is not None:
+        return ["resume", folder.name, "--data", str(data), "--json"]
+    return ["study", "--protocol", protocol, "--observer", "scripted", "--subject", subject, "--seed", str(seed),
+            "--data", str(data), "--json"]  # fmt: skip
+
+
+def started(asked: list[str]) -> int:
+    """The id of a new process that does what was asked, silently."""
+    child = os.fork()
+    if child:
+        return child
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.dup2(silence, 2)
+    if PROCESSES:
+        os.execv(sys.executable, [sys.executable, "-m", "study", *asked])
+    os._exit(hapteq(asked))
+
+
+def exit_code(asked: list[str]) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(started(asked), 0)[1])
 
 
 def begun(data: Path, subject: str) -> SessionFolder | None:
@@ -45,16 +57,12 @@ def begun(data: Path, subject: str) -> SessionFolder | None:
     return next((f for f in folders if b"\n" in f.log.read_bytes()), None)
 
 
-def killed_after(seconds: float, data: Path, subject: str, text: str, seed: int) -> bool:
-    """Whether the sitting was still going on when the signal came."""
-    child = os.fork()
-    if child == 0:
-        sit(data, subject, text, seed)
-        os._exit(0)
+def killed_after(seconds: float, asked: list[str]) -> bool:
+    """Whether it was still going on when the signal came."""
+    child = started(asked)
     time.sleep(seconds)
     os.kill(child, signal.SIGKILL)
-    _, status = os.waitpid(child, 0)
-    return os.WIFSIGNALED(status)
+    return os.WIFSIGNALED(os.waitpid(child, 0)[1])
 
 
 def decisions(folder: SessionFolder) -> list[list[object]]:
@@ -62,58 +70,61 @@ def decisions(folder: SessionFolder) -> list[list[object]]:
     return [[t.run, t.trial, t.frequency_hz, t.level_n, t.correct] for t in state.trials if t.counts]
 
 
+def thresholds(folder: SessionFolder) -> list[str]:
+    return [line.split(",")[:9] for line in (folder.path / "thresholds.csv").read_text().splitlines()]
+
+
 def answered(folder: SessionFolder) -> list[tuple[int, int, int, int]]:
     return [(e.run, e.trial, e.attempt, e.answer) for e in read_log(folder.log).events if e.event == "answer_given"]
 
 
-def try_one(data: Path, number: int, text: str, seed: int, typical_s: float, expected: list[list[object]]) -> dict:
+def try_one(data: Path, number: int, protocol: str, seed: int, typical_s: float, expected: SessionFolder) -> dict:
     rng, subject = random.Random(f"{seed} {number}"), f"K{number:03d}"
-    kills = torn = 0
+    kills = torn = late = 0
     prefixes_hold = answers_hold = True
     for _ in range(KILLS):
-        kills += killed_after(rng.uniform(0.0, 0.7 * typical_s), data, subject, text, seed)
+        before = begun(data, subject)
+        whole = b"" if before is None else before.log.read_bytes()
+        said = [] if before is None else answered(before)
+        kills += killed_after(rng.uniform(0.0, typical_s), words(data, subject, protocol, seed))
         folder = begun(data, subject)
-        if folder is None or fold_session(folder).state.closed:
+        if folder is None:
             continue
-        before, said = folder.log.read_bytes(), answered(folder)
-        whole = before[: before.rfind(b"\n") + 1]
-        torn += whole != before
-        child = os.fork()
-        if child == 0:
-            # A resumed sitting that is killed in its turn, at once or a little later.
-            sit(data, subject, text, seed)
-            os._exit(0)
-        time.sleep(rng.uniform(0.0, 0.2 * typical_s))
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        prefixes_hold &= folder.log.read_bytes().startswith(whole)
+        after = folder.log.read_bytes()
+        prefixes_hold &= after.startswith(whole[: whole.rfind(b"\n") + 1])
         answers_hold &= answered(folder)[: len(said)] == said
+        torn += not after.endswith(b"\n")
+        late += fold_session(folder).state.closed
+    codes = [exit_code(words(data, subject, protocol, seed))]
     folder = begun(data, subject)
-    if folder is None or not fold_session(folder).state.closed:
-        sit(data, subject, text, seed)
-    folder = begun(data, subject)
+    if codes == [0]:
+        codes.append(exit_code(words(data, subject, protocol, seed)))  # whole now: it says that it is finished
     return {
         "session": number,
         "kills": kills,
         "torn": torn,
-        "finished": fold_session(folder).state.closed,
+        "killed_when_closed": late,
+        "codes": codes,
+        "finished": codes[-1] == 1 and fold_session(folder).state.closed,
         "prefixes_hold": prefixes_hold,
         "answers_hold": answers_hold,
-        "decisions_equal": decisions(folder) == expected,
+        "decisions_equal": decisions(folder) == decisions(expected),
+        "results_whole": validate_file(folder.path).problems == () and (folder.path / "analysis/report.html").is_file(),
+        "results_equal": [row[2:] for row in thresholds(folder)] == [row[2:] for row in thresholds(expected)],
     }
 
 
 def main() -> None:
-    data, sessions, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
-    text = Path(sys.argv[4]).read_text()
-    sit(data, "WARM0", text, seed)  # compiles, so that the children need not
-    started = time.monotonic()
-    sit(data, "WHOLE0", text, seed)
-    typical_s = time.monotonic() - started
-    expected = decisions(begun(data, "WHOLE0"))
+    data, sessions, seed, protocol = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
+    hapteq(words(data, "WARM0", protocol, seed))  # compiles, so that the children need not
+    begin_s = time.monotonic()
+    assert exit_code(words(data, "WHOLE0", protocol, seed)) == 0
+    typical_s = time.monotonic() - begin_s
+    expected = begun(data, "WHOLE0")
     for number in range(sessions):
-        sys.stdout.write(json.dumps(try_one(data, number, text, seed, typical_s, expected)) + "\n")
-        sys.stdout.flush()
+        line = json.dumps(try_one(data, number, protocol, seed, typical_s, expected))
+        sys.stderr.write(f"{line}\n")
+        RESULTS.write_text((RESULTS.read_text() if RESULTS.exists() else "") + line + "\n")
 
 
 if __name__ == "__main__":
