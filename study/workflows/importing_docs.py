@@ -5,9 +5,13 @@ from collections.abc import Iterable
 from equalizer.signals.resampling import FLAT_TO
 from equalizer.signals.units import ALLOWED
 from protocols.schema import Node, resolved
+from study.importing.budget import DEEPEST, LARGEST, NUMBERS, WORK
+from study.importing.csv_arrays import MOST_ROWS
 from study.importing.functions import FUNCTIONS
 from study.importing.map_library import read_map, shipped_maps
 from study.importing.map_toml import MAP_SCHEMA, allowed_in_map
+from study.store.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
+from study.store.regular_file import TABLE_BYTES
 
 EXAMPLE = """\
 device = "one axis of our rig"
@@ -128,7 +132,18 @@ def importing_markdown() -> str:
         "is no word. A column `fx [N]` is also known as `fx`. Structures of Matlab are `array('data.u')`, datasets of "
         "HDF5 `array('run1/force')`. In computed channels `clock_s` is the reference time and `rate_hz` the rate. "
         "Nothing else is understood: an expression cannot run code.",
+        f"All expressions of an import together may hold {NUMBERS:.0e} numbers at once and 20 times as many as its "
+        f"files hold ({LARGEST:.0e} at most), compute {WORK:.0e} and 500 times as many, and nest {DEEPEST} levels "
+        "deep, definitions included; beyond that they are refused by name.",
         _rows(("function", "gives"), ((f"`{f.usage}`", f.meaning) for f in FUNCTIONS.values())),
+        "## What is not read",
+        "Only regular files: no pipes, devices or folders. A file is held to its size on disk before any memory is "
+        f"taken for it: what it declares may be {PLAIN_BYTES // 2**20} MiB in any case, beyond that {FACTOR} times "
+        f"its bytes, and {MOST_BYTES // 2**30} GiB at most (an hour of nine channels at 10 kHz is 2.6 GB). Compress "
+        f"less, or cut the recording, where that is refused. Tables may have {TABLE_BYTES // 2**20} MiB and "
+        f"{MOST_ROWS:.0e} rows. HDF5: no external storage, no virtual datasets, no links to other files. NPY and NPZ: "
+        "versions 1.0 and 2.0, stored or deflated, no Python objects. MAT: versions 5 to 7.3 (Matlab's -v6, -v7, "
+        "-v7.3); texts, cells, sparse matrices and arrays of structures are left out.",
         "## Keys of a map",
         _keys("At the top", MAP_SCHEMA),
         *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
