@@ -23,7 +23,7 @@ def hold(rigs, rng, seconds: float, frequency_hz: float, level_n: float) -> tupl
         limits=limits,
         hand_on_handle=bool(rng.random() < 0.5),
         spring_damping_n_s_per_m=float(rng.choice([0.0, 0.0, 0.5, 2.0])),
-        place_m=tuple(rng.choice([0.0, 0.02]) * rng.normal(size=3)),
+        place_m=tuple(rng.choice([0.0, 0.03]) * rng.uniform(-1.0, 1.0, size=3)),
     )
     governor, runner = omega(rng, settings)
     wave = np.sin(2 * np.pi * frequency_hz * np.arange(1000) / 1000)[:, None] * direction(rng) * level_n
