@@ -12,6 +12,8 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
     opened = state.opened
     who = f"simulated ({opened.observer})" if opened.observer else "a person"
     lock = "locked" if opened.protocol_locked else "not locked"
+    # Nothing waits for a simulated participant, so the log may end in the future.
+    ahead = ", in simulated time, which runs ahead of the clock" if opened.observer else ""
     facts = [
         ("participant", f"{opened.subject}, {who}, number {opened.participant_number + 1} of this protocol"),
         ("protocol", f"{state.protocol.name} ({opened.protocol_hash[:_HASH_DIGITS]}, {lock})"),
@@ -20,7 +22,7 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("equalizer", opened.equalizer),
         ("within reach", _reach(opened)),
         ("begun", when(opened.utc)),
-        ("finished" if state.closed else "last entry", when(_last_utc(folded))),
+        ("finished" if state.closed else "last entry", when(_last_utc(folded)) + ahead),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
         ("answers", _answers(folded)),

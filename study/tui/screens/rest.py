@@ -60,8 +60,8 @@ class RestScreen(Screen[float]):
         self._tick()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        # None: greyed out in the footer until the rest is over.
-        return True if action != "go_on" or self._over() else None
+        # Until the rest is over Enter does nothing, so the footer does not name it.
+        return action != "go_on" or self._over()
 
     def action_go_on(self) -> None:
         if self._over():

@@ -148,3 +148,8 @@ def test_whatever_happens_to_the_bytes_of_a_log_it_can_be_looked_at(session, see
         content[place] = random.integers(0, 256)
     log.write_bytes(bytes(content))
     assert session_view(session).line.name == "P01_001"
+
+
+def test_a_simulated_session_that_ends_in_the_future_says_why(taken):
+    finished = dict(session_view(taken).facts)["finished"]
+    assert finished.endswith("UTC, in simulated time, which runs ahead of the clock")

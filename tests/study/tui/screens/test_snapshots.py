@@ -1,6 +1,7 @@
 """Every screen of a participant as text at two sizes, and the trial as a picture in both themes."""
 
 import pytest
+from textual.widgets._footer import FooterKey
 
 from protocols.trial import Phase
 from study.session.form_views import Form, FormField, FormKind
@@ -138,3 +139,24 @@ def test_a_screen_survives_any_size_and_a_resize(on_stage, name, size):
         assert stage.text.strip()
 
     on_stage(SCREENS[name](), story)
+
+
+@pytest.mark.parametrize(
+    "name", ["form_consent", "form_setup", "rest", "device_check", "pause", "confirm_view", "await_return", "note"]
+)
+def test_every_key_that_a_footer_names_does_something(on_stage, name):
+    named = []
+
+    async def names(stage):
+        named.extend(key.key for key in stage.app.screen.query(FooterKey))
+
+    on_stage(SCREENS[name](), names)
+    assert named
+    for key in named:
+
+        async def story(stage, key=key):
+            before = stage.text
+            await stage.press(key)
+            assert stage.heard or stage.app.screen is not stage.app.first or stage.text != before, key
+
+        on_stage(SCREENS[name](), story)
