@@ -20,7 +20,9 @@ import numpy as np
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 from study.errors import StudyError
+from study.session.events import TrialMeasured
 from study.store.archive import SessionFolder, find_session
+from study.store.provenance import sha256_of
 from study.store.recording_file import read_recording
 from study.workflows.fold_session import fold_session
 
@@ -59,8 +61,10 @@ class _Trial:
 def session_recordings(session: Path, seed: int) -> SessionRecordings:
     """seed: draws which trials are taken where there are many, and which are kept for the test. Raises StudyError."""
     folder = find_session(str(session), session.absolute().parent)
-    opened = fold_session(folder).state.opened
-    found = [_trial(path) for path in sorted(folder.recordings.glob("*.h5"))]
+    folded = fold_session(folder)
+    opened = folded.state.opened
+    logged = {e.recording: e.sha256 for e in folded.contents.events if isinstance(e, TrialMeasured) and e.recording}
+    found = [_trial(path, logged) for path in sorted(folder.recordings.glob("*.h5"))]
     usable = [trial for trial in found if trial is not None]
     if not usable:
         raise StudyError(
@@ -82,8 +86,12 @@ def session_recordings(session: Path, seed: int) -> SessionRecordings:
     )
 
 
-def _trial(path: Path) -> _Trial | None:
-    """None where samples are missing or something was wrong while it was played."""
+def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
+    """None where samples are missing, something was wrong while it was played, or it is not the file that was written
+    under its name."""
+    name = f"{path.parent.name}/{path.name}"
+    if name in logged and sha256_of(path) != logged[name]:
+        return None
     recording = read_recording(path)
     meta = recording.meta
     whole = np.isfinite(recording.command.samples).all() and np.isfinite(recording.response.samples).all()
@@ -193,8 +201,8 @@ def _remarks(
     )
     if len(usable) < len(found):
         yield (
-            f"{len(found) - len(usable)} trials were left out: samples were missing, or something was wrong while they "
-            "were played."
+            f"{len(found) - len(usable)} trials were left out: samples were missing, something was wrong while "
+            "they were played, or the file was changed since."
         )
     yield (
         f"Levels within {LEVEL_STEP_DB:g} dB of each other count as one. Of each frequency and level, one trial in "

@@ -137,6 +137,32 @@ def test_the_answer_counts_even_when_its_recording_was_lost(sitter, session_logs
     assert resumed.state.trials[-1].status is TrialStatus.UNMEASURED
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        (b'"missed_ticks":0', b'"missed_ticks":900', "of the 1 kHz ticks were missed"),
+        (b'"fault":"NONE","felt_whole":true', b'"fault":"LOST","felt_whole":false', "the device stopped answering"),
+        (b'"fault":"NONE","felt_whole":true', b'"fault":"LATER","felt_whole":false', "no plausible number"),
+    ],
+)
+def test_an_answer_whose_program_died_is_judged_by_what_was_logged_with_it(sitter, session_logs, old, new, reason):
+    done = sitter.whole()
+    lines = done.folder.log.read_bytes().splitlines()
+    cut = max(i for i, line in enumerate(lines) if b'"answer_given"' in line)
+    session_logs.cut(done.folder.path, cut + 1)
+    session_logs.forged(done.folder.path, lambda events: [*events[:-1], events[-1].replace(old, new)])
+    assert new in done.folder.log.read_bytes()
+    trial = done.state.trials[-1]
+    (done.folder.recordings / f"run-{trial.run:02d}_trial-{trial.trial:03d}_attempt-0.h5").unlink()
+    resumed = sitter.resumed(done.folder)
+    (judged,) = [t for t in resumed.state.trials if (t.run, t.trial, t.attempt) == (trial.run, trial.trial, 0)]
+    assert judged.status is TrialStatus.SPOILED
+    spoiled = [e for e in read_log(done.folder.log).events if e.event == "trial_spoiled"]
+    assert reason in spoiled[-1].reason
+    assert spoiled[-1].vibrated_s > 0
+    assert resumed.state.closed
+
+
 def test_a_torn_last_line_is_mended_and_remembered(sitter):
     left = sitter.interrupted(after=6)
     whole = left.folder.log.read_bytes()
