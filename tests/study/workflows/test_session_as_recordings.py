@@ -118,13 +118,22 @@ def test_a_long_session_is_thinned_alike_at_all_levels(session, tmp_path):
         path.unlink()
     for number in range(60):
         level = (0.5, 2.0)[number % 2]
-        write_recording(copy / "recordings" / f"run-01_trial-{number:03d}_attempt-0.h5", trial(level, seconds=4))
+        write_recording(copy / "recordings" / f"run-09_trial-{number:03d}_attempt-0.h5", trial(level, seconds=4))
     found = session_recordings(copy, 1)
     segments = found.recording.segments
     assert sum(segment.stop - segment.start for segment in segments) <= (MOST_S + 8) * RATE_HZ
     counts = [sum(s.amplitude == level for s in segments) for level in {s.amplitude for s in segments}]
     assert len(counts) == 2 and counts[0] == counts[1] > 5
     assert found.remarks[0].startswith("16 of the 60 trials")
+
+
+def test_a_recording_that_was_changed_since_is_left_out(session, tmp_path):
+    copy = copied(session, tmp_path)
+    first, second, *_ = sorted((copy / "recordings").glob("*.h5"))
+    first.write_bytes(second.read_bytes())
+    found = session_recordings(copy, 1)
+    assert first not in found.parents
+    assert any("was changed since" in remark for remark in found.remarks)
 
 
 def test_a_session_without_a_whole_trial_is_refused(session, tmp_path):
