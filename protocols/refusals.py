@@ -64,6 +64,8 @@ def shown(value: Any) -> str:
 
 def _translated(root: Node, error: Any) -> tuple[Problem, ...]:
     place: Place = error["loc"]
+    if error["type"] == "json_invalid":  # nested too deeply
+        return (Problem("The text", f"cannot be read: {error['msg']}", "numbers and nesting of ordinary size"),)
     key = key_path(root, place)
     if error["type"] == "unexpected_keyword_argument":
         return (_unknown_key(root, place),)

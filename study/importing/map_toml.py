@@ -45,6 +45,9 @@ def is_map(values: dict[str, Any]) -> bool:
 def _problems(errors: Sequence[Any]) -> Iterator[str]:
     for error in errors:
         place: Place = error["loc"]
+        if error["type"] == "json_invalid":  # nested too deeply
+            yield f"it cannot be read: {error['msg']}"
+            continue
         key = key_path(MAP_SCHEMA, place)
         if error["type"] in ("unexpected_keyword_argument", "extra_forbidden"):
             yield _unknown(key, place)

@@ -11,6 +11,8 @@ from study.store.declared_size import PLAIN_BYTES, DeclaredSizeError, SizeLimit
 
 MOST_OBJECTS = 100_000
 _COMPRESSIONS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
+_OBJECT_BYTES = 1024
+"""What a text of any length, a reference or a row of a table takes as an object of Python, with room to spare."""
 _DEFLATE_FACTOR = 1032
 """What zlib can gain at most: its densest code is 2 bits for 258 bytes."""
 
@@ -57,7 +59,8 @@ def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
     filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
     if sum(code in _COMPRESSIONS for code in filters) > 1:
         raise ValueError(f"{name} is compressed more than once; save it compressed once, or not at all")
-    entry_bytes = max(8, dataset.dtype.itemsize)  # as float64
+    in_python = dataset.dtype.hasobject or dataset.dtype.names is not None
+    entry_bytes = _OBJECT_BYTES if in_python else max(8, dataset.dtype.itemsize)  # as float64
     limit.take(name, math.prod(dataset.shape) * entry_bytes)
     if dataset.chunks is not None:
         chunk_bytes = math.prod(dataset.chunks) * entry_bytes

@@ -108,6 +108,7 @@ def test_groups_that_hold_themselves_are_walked_once(tmp_path):
         {"shape": (2**29, 1), "dtype": "f8"},
         {"shape": (2**29, 1), "dtype": "u1", "chunks": (1000, 1)},
         {"shape": (2**62, 1), "dtype": "f8", "chunks": (1000, 1)},
+        {"shape": (2**20, 3), "dtype": h5py.ref_dtype, "chunks": (1000, 1)},
         {"shape": (2**40, 2**20), "dtype": "f2", "chunks": (1000, 1)},
     ],
 )
@@ -283,7 +284,8 @@ def test_a_key_of_many_parts_is_named_with_its_line(key):
 
 
 @pytest.mark.parametrize(
-    "deep", [DEEP, "0x" + "f" * 10_000, "9" * 10_000, '"' + "x" * 10**5 + '"', "{ a = " * 900 + "1"]
+    "deep",
+    [DEEP, "[" * 220 + "]" * 220, "0x" + "f" * 10_000, "9" * 10_000, '"' + "x" * 10**5 + '"', "{ a = " * 900 + "1"],
 )
 def test_models_and_protocols_and_maps_of_unlikely_values_are_refused_by_name(tmp_path, deep):
     for name, key in (("twin.toml", "mass"), ("corpus_study.toml", "steps"), ("lever_map.toml", "rate_hz")):
