@@ -10,6 +10,17 @@ from protocols.problem import Problem, refuse
 from protocols.staircase_rule import STRICT
 
 Sentence = Annotated[str, Field(min_length=1, max_length=500)]
+RoveDb = Annotated[
+    float,
+    Field(
+        ge=0,
+        le=20,
+        description="Width of the range, level_n in its middle, from which each amplitude is drawn evenly in dB, "
+        "whatever the direction. At one fixed level, labels and feedback teach how strong each direction feels: with a "
+        "range of r dB, a difference of d dB between the directions tells at most 50 + 50 d / r % of the trials. "
+        "Default 0: one fixed level, as in protocols of before there was a range.",
+    ),
+]
 Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 
 
@@ -72,12 +83,13 @@ class DemoSettings:
     level_n: Annotated[
         float, Field(ge=0, le=3.0, description="Amplitude, in newtons. Default 0: no demonstration.")
     ] = 0.0
+    rove_db: RoveDb = 0.0
     seconds: Annotated[float, Field(ge=0.5, le=20, description="Length of each. Default 2: ten periods at 5 Hz.")] = 2.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class PracticeSettings:
-    """A short run at a fixed level for each frequency, passed by right answers. It enters no result."""
+    """A short run around one level for each frequency, passed by right answers. It enters no result."""
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
@@ -91,6 +103,7 @@ class PracticeSettings:
             description="Amplitude of every practice trial. Default 2: well above most thresholds, well below the cap.",
         ),
     ] = 2.0
+    rove_db: RoveDb = 0.0
     right_needed: Annotated[
         int, Field(ge=1, le=50, description="Passed with so many right answers among the last `of_last`. Default 4.")
     ] = 4

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from protocols.exposure import CatchSettings
+from protocols.preparation import DemoSettings, PracticeSettings
+from protocols.staircase import to_db, to_newton
 from protocols.study_protocol import ScheduleSettings, StudyProtocol
 from protocols.trial import Phase
 from protocols.williams import williams_rows
@@ -27,7 +29,7 @@ class Run:
     phase: Phase
     frequency_hz: float
     practice: bool = False
-    """A training run at a fixed level, with a criterion to pass."""
+    """A training run without a staircase, with a criterion to pass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +93,25 @@ def detection_direction(seed: int, run: int, trial: int, attempt: int) -> int:
     return 1 + (keyed_words(seed, (run, trial, attempt, _DETECTION), 1)[0] >> 63)
 
 
-_CATCH, _DETECTION = 0, 1
+def practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int, attempt: int) -> float:
+    """The amplitude of a practice trial. A draw of its own: it tells nothing about the direction."""
+    return _roved_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE))
+
+
+def demo_level_n(settings: DemoSettings, seed: int, played: int) -> float:
+    """The amplitude of a demonstration. played: how many came before in the session."""
+    return _roved_n(settings.level_n, settings.rove_db, seed, (played,))
+
+
+def _roved_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...]) -> float:
+    """Even in dB over the range, level_n in its middle."""
+    if rove_db == 0:
+        return level_n
+    share = ((keyed_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
+    return to_newton(to_db(level_n) + rove_db * (share - 0.5))
+
+
+_CATCH, _DETECTION, _ROVE = 0, 1, 2
 """Last part of keys that are one longer than a trial's."""
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from protocols.problem import Problem
 
 if TYPE_CHECKING:
+    from protocols.preparation import DemoSettings, PracticeSettings
     from protocols.study_protocol import StudyProtocol
 
 
@@ -20,14 +21,20 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
         wrong = f"is {protocol.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
         problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
     levels = {
-        "demo.level_n": protocol.demo.level_n,
-        "practice.level_n": protocol.practice.level_n if protocol.practice.frequencies_hz else 0.0,
+        "demo.level_n": _highest_n(protocol.demo),
+        "practice.level_n": _highest_n(protocol.practice) if protocol.practice.frequencies_hz else 0.0,
         "detection.start_n": protocol.detection.start_n if protocol.detection.frequencies_hz else 0.0,
     }
     for key, level_n in levels.items():
         if level_n > cap_n:
-            problems.append(Problem(key, f"is {level_n} N, above staircase.cap_n", f"at most {cap_n} N, the cap"))
+            wrong = f"is {level_n:g} N, with its rove_db, above staircase.cap_n"
+            problems.append(Problem(key, wrong, f"at most {cap_n} N, the cap"))
     return problems
+
+
+def _highest_n(settings: DemoSettings | PracticeSettings) -> float:
+    """Half of the range lies above its middle."""
+    return settings.level_n * float(10.0 ** (settings.rove_db / 40.0))
 
 
 def _times(protocol: StudyProtocol) -> list[Problem]:

@@ -1,6 +1,7 @@
 """The methods of a study in words, with the numbers of its protocol."""
 
 from analysis.wording import listed
+from protocols.preparation import DemoSettings, PracticeSettings
 from protocols.staircase_rule import StaircaseRule, StepChange
 from protocols.study_protocol import StudyProtocol
 
@@ -132,14 +133,14 @@ def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
     if demo.level_n:
         sentences.append(
             f"Before anything was asked, both directions were played at every frequency, labelled, for "
-            f"{demo.seconds:g} s each at {demo.level_n:g} N."
+            f"{demo.seconds:g} s each at {levels_words(demo)}."
         )
     if protocol.gate.radius_mm:
         sentences.append(f"A trial began with the handle within {protocol.gate.radius_mm:g} mm of its place.")
     if practice.frequencies_hz:
         feedback = "with" if practice.feedback == "after_answer" else "without"
         sentences.append(
-            f"Practice at {_hz(practice.frequencies_hz)} used a fixed level of {practice.level_n:g} N, {feedback} "
+            f"Practice at {_hz(practice.frequencies_hz)} was at {levels_words(practice)}, {feedback} "
             f"feedback, until {practice.right_needed} of the last {practice.of_last} answers were right or "
             f"{practice.trial_limit} trials were over. It excluded nobody and enters no result."
         )
@@ -155,6 +156,14 @@ def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
             f"which. The staircase was the same, from {detection.start_n:g} N."
         )
     return (" ".join(sentences),) if sentences else ()
+
+
+def levels_words(settings: DemoSettings | PracticeSettings) -> str:
+    """The fixed level, or the range that each level was drawn from."""
+    if not settings.rove_db:
+        return f"a fixed level of {settings.level_n:g} N"
+    half = 10.0 ** (settings.rove_db / 40.0)
+    return f"levels drawn evenly in dB from {settings.level_n / half:.2f} to {settings.level_n * half:.2f} N"
 
 
 def _hz(frequencies_hz: tuple[float, ...]) -> str:

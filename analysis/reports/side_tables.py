@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from analysis.bias import CRITERION_WORDS
 from analysis.equalized_delivery import deliveries
+from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
 from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number
@@ -111,7 +112,7 @@ def practice_table(analysis: StudyAnalysis) -> Table:
             )
             for run in analysis.practice
         ),
-        notes=(f"At {settings.level_n:g} N; passed with {settings.right_needed} right.",),
+        notes=(f"At {levels_words(settings)}; passed with {settings.right_needed} right.",),
         folded=True,
     )
 

@@ -3,7 +3,13 @@
 from dataclasses import dataclass
 from typing import Literal
 
-Standing = Literal["finished", "unfinished", "running", "withdrawn", "unreadable"]
+Standing = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
+
+TURNED_AWAY = {
+    "refused": "consent was not given",
+    "excluded": "a question of the exclusion list was answered with yes",
+}
+"""Outcomes of people who do not take part, in words."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,15 @@
 
 from dataclasses import dataclass
 
-from protocols.schedule import Run, detection_direction, draw_trial, is_catch_trial, label_of, labels_swapped
+from protocols.schedule import (
+    Run,
+    detection_direction,
+    draw_trial,
+    is_catch_trial,
+    label_of,
+    labels_swapped,
+    practice_level_n,
+)
 from protocols.staircase import StaircaseState, level_n, to_db
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
@@ -55,7 +63,8 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
     phase, level_db = run.phase, place.staircase.level_db
     newton = level_n(rule, place.staircase)
     if run.practice:
-        newton, level_db = protocol.practice.level_n, to_db(protocol.practice.level_n)
+        newton = practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
+        level_db = to_db(newton)
     elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
         phase, newton, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
     return Present(

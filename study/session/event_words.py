@@ -7,6 +7,7 @@ reads this may sit beside the participant. Runs and trials count from 1 here, as
 from collections.abc import Iterable
 
 from protocols.trial import Phase
+from study.session.archive_views import TURNED_AWAY
 from study.session.events import (
     AnswerGiven,
     DemoFinished,
@@ -17,6 +18,7 @@ from study.session.events import (
     FormFilled,
     NoteTaken,
     PauseTaken,
+    PlaceTaken,
     RestTaken,
     SessionClosed,
     SessionInterrupted,
@@ -73,6 +75,8 @@ def _around(event: Event) -> str:
             return _sitting(event)
         case FormFilled():
             return _form(event)
+        case PlaceTaken():
+            return f"Takes part, as number {event.participant_number + 1} of this protocol."
         case DeviceChecked():
             found = " ".join(_whole(finding) for finding in event.findings)
             return f"The device was checked: {'fine' if event.passed else 'not fine'}. {found}".rstrip()
@@ -102,6 +106,8 @@ def _sitting(event: SessionOpened | SessionResumed | SessionInterrupted | Sessio
         case SessionInterrupted():
             return f"The sitting ended: {event.reason}. The session can be resumed."
         case SessionClosed():
+            if event.outcome != "completed":
+                return f"The session is over: {TURNED_AWAY[event.outcome]}. The person does not take part."
             return "The session is finished."
 
 

@@ -37,7 +37,9 @@ from study.session.sitting_events import (
     FormFilled,
     NoteTaken,
     PauseTaken,
+    PlaceTaken,
     RestTaken,
+    SessionClosed,
 )
 
 __all__ = [
@@ -53,6 +55,7 @@ __all__ = [
     "FormFilled",
     "NoteTaken",
     "PauseTaken",
+    "PlaceTaken",
     "RestTaken",
     "SessionClosed",
     "SessionInterrupted",
@@ -200,16 +203,6 @@ class SessionResumed:
     event: Literal["session_resumed"] = "session_resumed"
 
 
-@dataclass(frozen=True, config=FACT)
-class SessionClosed:
-    """Last line of a finished session."""
-
-    utc: UtcTime
-    outcome: Literal["completed"]
-    monotonic_s: Seconds | None = None
-    event: Literal["session_closed"] = "session_closed"
-
-
 Event = (
     SessionOpened
     | TrialPresented
@@ -222,6 +215,7 @@ Event = (
     | DemoPlayed
     | DemoFinished
     | PauseTaken
+    | PlaceTaken
     | NoteTaken
     | SessionInterrupted
     | SessionResumed

@@ -17,6 +17,7 @@ from study.session.events import (
     Event,
     FormFilled,
     NoteTaken,
+    PlaceTaken,
     RestTaken,
     SessionClosed,
     SessionInterrupted,
@@ -27,6 +28,7 @@ from study.session.events import (
     TrialSpoiled,
 )
 from study.session.log_time import Moment
+from study.session.rules import place_comes_later
 from study.session.sitting_state import (
     SittingState,
     check,
@@ -38,7 +40,7 @@ from study.session.sitting_state import (
     pass_time,
     sit_down_again,
 )
-from study.session.state import SessionState, begin_session, current_rule, due, felt, repeats_left
+from study.session.state import SessionState, begin_session, current_rule, due, felt, placed, repeats_left
 from study.session.trial_row import trial_row
 from study.session.void_reasons import computer_too_busy
 
@@ -49,6 +51,8 @@ def apply(state: SessionState, event: Event) -> SessionState:
     """The state after one more event. Raises LogContradiction where it cannot follow."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
+    if state.turned_away_for_good and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
+        raise LogContradiction(f"{event.event} of a person who does not take part")
     state = replace(state, sitting=_up_to(state.sitting, event))
     match event:
         case TrialPresented():
@@ -76,8 +80,10 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case SessionResumed():
             again = sit_down_again(state.sitting, state.answers)
             return replace(state, sitting=with_dose_elsewhere(again, event.dose_elsewhere))
+        case PlaceTaken():
+            return _take_place(state, event)
         case SessionClosed():
-            return _close(state)
+            return _close(state, event)
         case SessionOpened():
             raise LogContradiction("a session cannot be opened twice")
         case _:  # notes, pauses and interruptions change nothing
@@ -115,7 +121,17 @@ def _rest(state: SessionState, event: RestTaken) -> SessionState:
     return replace(state, rest_due_s=0.0)
 
 
-def _close(state: SessionState) -> SessionState:
+def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
+    if state.trials or state.sitting.placed or not place_comes_later(state.opened):
+        raise LogContradiction("a place in the order was taken where none was due")
+    return placed(state, event.participant_number)
+
+
+def _close(state: SessionState, event: SessionClosed) -> SessionState:
+    if event.outcome != "completed":
+        if not state.turned_away_for_good or event.outcome != state.sitting.turned_away:
+            raise LogContradiction(f"the session was closed as {event.outcome}, which no form says")
+        return replace(state, closed=True)
     if not state.finished or state.presented is not None:
         raise LogContradiction("the session was closed before its last run was finished")
     return replace(state, closed=True)
@@ -186,7 +202,7 @@ def _around(state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed 
         case DemoPlayed():
             amplitude = likely_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
             sitting = exposed(moved(state.sitting), event.frequency_hz, amplitude, event.seconds)
-            return replace(state, sitting=sitting)
+            return replace(state, sitting=replace(sitting, demos=sitting.demos + 1))
 
 
 def _shaken(

@@ -36,7 +36,9 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
     answers = {key: answer.strip() for key, answer in reply.answers.items()}
     match kind:
         case FormKind.CONSENT:
-            return FormOutcome(all(answer == "yes" for answer in answers.values()), answers)
+            agreed = all(answer == "yes" for answer in answers.values())
+            # Of a person who does not take part only that is kept.
+            return FormOutcome(agreed, answers if agreed else {})
         case FormKind.EXCLUSION:
             # Which question it was is about somebody's health, and no study needs it.
             return FormOutcome(all(answer == "no" for answer in answers.values()), {})
@@ -44,6 +46,27 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
             return FormOutcome(True, answers, _reminder(protocol.setup, answers))
         case FormKind.DEBRIEF:
             return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
+
+
+def confirmation_of(form: Form, reply: FormReply) -> Form:
+    """Before consent that was not given, or an exclusion, is final: what was answered, and whether that is right."""
+    consent = form.kind is FormKind.CONSENT
+    given, other = ("no", "yes") if consent else ("yes", "no")
+    told = [f"“{field.label}”" for field in form.fields if reply.answers.get(field.key, "").strip() != other]
+    end = "you do not take part in the study" if consent else "you cannot take part in the study"
+    return Form(
+        form.kind,
+        "Please check your answer",
+        f"You answered {given} to: {' '.join(told)}",
+        (FormField("right", f"With this answer {end}, and nothing is played. Is that right?", YES_NO),),
+        form.version,
+        form.ethics_id,
+    )
+
+
+def confirmed(reply: FormReply) -> bool:
+    """Else the form is to be filled in once more."""
+    return reply.answers.get("right", "").strip() == "yes"
 
 
 def _consent(settings: ConsentSettings) -> Form:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from study.session.archive_views import TURNED_AWAY
 from study.session.due_trial import Present
 from study.session.form_views import Form, FormKind
 from study.session.forms import form_of
@@ -52,8 +53,8 @@ def next_preparation(state: SessionState) -> Preparation | None:
     sitting = state.sitting
     if state.opened.observer is not None or state.finished:
         return None
-    if sitting.refused:
-        return Leave(sitting.refused)
+    if sitting.turned_away:
+        return Leave(TURNED_AWAY[sitting.turned_away])
     forms = (
         (FormKind.CONSENT, sitting.consented),
         (FormKind.EXCLUSION, sitting.included),

@@ -1,11 +1,11 @@
-"""Facts of a sitting around its trials: forms, checks, demonstrations, rests, pauses, notes."""
+"""Facts of a sitting around its trials: forms, checks, demonstrations, rests, pauses, notes, the end."""
 
 from typing import Literal
 
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
-from study.session.fact_types import AngleDeg, ForceN, FrequencyHz, Index, Magnitude, Seconds, UtcTime
+from study.session.fact_types import AngleDeg, Count, ForceN, FrequencyHz, Index, Magnitude, Seconds, UtcTime
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -39,6 +39,18 @@ class FormFilled:
     answers: dict[str, str]
     monotonic_s: Seconds | None = None
     event: Literal["form_filled"] = "form_filled"
+
+
+@dataclass(frozen=True, config=FACT)
+class PlaceTaken:
+    """A person takes part: consent, exclusion questions, set-up and device check are passed."""
+
+    utc: UtcTime
+    participant_number: Count
+    """How many participants of this protocol took their places before; from here on this one holds, not that of the
+    opening line."""
+    monotonic_s: Seconds | None = None
+    event: Literal["place_taken"] = "place_taken"
 
 
 @dataclass(frozen=True, config=FACT)
@@ -102,3 +114,13 @@ class NoteTaken:
     """Something happened to the participant: pain, numbness, a fright."""
     monotonic_s: Seconds | None = None
     event: Literal["note_taken"] = "note_taken"
+
+
+@dataclass(frozen=True, config=FACT)
+class SessionClosed:
+    """Last line of a session that is over: finished, or final because the person does not take part."""
+
+    utc: UtcTime
+    outcome: Literal["completed", "refused", "excluded"]
+    monotonic_s: Seconds | None = None
+    event: Literal["session_closed"] = "session_closed"

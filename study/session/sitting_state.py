@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from protocols.trial import Trial
 from study.session.log_time import ClockStep, Moment, clock_step, passed_s
@@ -26,11 +27,15 @@ class SittingState:
 
     consented: bool = False
     included: bool = False
-    refused: str = ""
-    """Why nothing may be played; empty where nothing speaks against it."""
+    turned_away: Literal["", "refused", "excluded"] = ""
+    """Why nothing may be played: see TURNED_AWAY. Empty where nothing speaks against it."""
+    placed: bool = False
+    """The place in the balanced order is taken."""
     setup_done: bool = False
     device_checked: bool = False
     demo_done: bool = False
+    demos: int = 0
+    """Demonstrations played in the session."""
     debriefed: bool = False
     last: Moment = Moment("")  # noqa: RUF009 - frozen
     """Time of the last entry in the log, up to which everything here counts."""
@@ -60,18 +65,13 @@ zone, may fall into a sitting. Within a sitting the monotonic clock counts, betw
 clock that is set forward by so much between them passes for a night, unless it is set back later."""
 NIGHT_S = 3600 * NIGHT_H
 
-REFUSALS = {
-    "consent": "consent was not given",
-    "exclusion": "a question of the exclusion list was answered with yes",
-}
-
 
 def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
     match event.form:
         case "consent":
-            return replace(sitting, consented=event.passed, refused="" if event.passed else REFUSALS["consent"])
+            return replace(sitting, consented=event.passed, turned_away="" if event.passed else "refused")
         case "exclusion":
-            return replace(sitting, included=event.passed, refused="" if event.passed else REFUSALS["exclusion"])
+            return replace(sitting, included=event.passed, turned_away="" if event.passed else "excluded")
         case "setup":
             return replace(sitting, setup_done=True)
         case "debrief":
@@ -87,9 +87,16 @@ def demonstrated(sitting: SittingState, event: DemoFinished) -> SittingState:
 
 
 def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
-    """A new sitting of the same session: whoever was refused is asked again, in case it was a slip of the finger."""
+    """A new sitting of the same session. Under the first rules, which ask once, a person who was turned away is asked
+    again, in case it was a slip of the finger."""
     return replace(
-        sitting, setup_done=False, device_checked=False, sat_s=None, busy_voids=0, refused="", answers_before=answers
+        sitting,
+        setup_done=False,
+        device_checked=False,
+        sat_s=None,
+        busy_voids=0,
+        turned_away="",
+        answers_before=answers,
     )
 
 

@@ -14,7 +14,7 @@ from study.session.draw_check import LogContradiction
 from study.session.due_trial import Place, Present, due_trial
 from study.session.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.log_time import Moment
-from study.session.rules import same_stimulus_again
+from study.session.rules import place_comes_later, refusal_is_final, same_stimulus_again
 from study.session.sitting_state import SittingState
 
 
@@ -44,6 +44,16 @@ class SessionState:
     @property
     def finished(self) -> bool:
         return self.run >= len(self.runs)
+
+    @property
+    def turned_away_for_good(self) -> bool:
+        """Refused or excluded, under rules by which that is final."""
+        return bool(self.sitting.turned_away) and refusal_is_final(self.opened)
+
+    @property
+    def takes_part(self) -> bool:
+        """Whether the participant number of `opened` is a place in the balanced order."""
+        return self.sitting.placed or bool(self.trials) or not place_comes_later(self.opened)
 
     @property
     def answers(self) -> int:
@@ -79,6 +89,14 @@ def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
     missing = [f"{frequency:g} Hz" for frequency in protocol.all_frequencies_hz if frequency not in known]
     if missing:
         raise LogContradiction(f"the session has no scale of levels for {', '.join(missing)}")
+
+
+def placed(state: SessionState, participant_number: int) -> SessionState:
+    """Before the first trial: from here on this number, not that of the opening line, gives the order of the runs."""
+    opened = replace(state.opened, participant_number=participant_number)
+    order = runs(state.protocol, opened.seed, participant_number)
+    after = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, placed=True))
+    return replace(after, staircase=begin(current_rule(after)))
 
 
 def current_rule(state: SessionState) -> StaircaseRule:

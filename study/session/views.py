@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from protocols.trial import Phase, VoidCause
 
@@ -77,8 +77,7 @@ class Question:
     """A short practice, with a criterion to pass."""
     progress: Progress | None = None
     repeats_left: int | None = None
-    """How often the participant may still ask for a trial of this run again; a display refuses the key at 0. None:
-    without limit, and a new trial is drawn (sessions of the first rules)."""
+    """The participant may still ask so often for a trial of this run again. None: no limit (first rules)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,6 +212,8 @@ class Goodbye:
     answers: int
     reason: str = ""
     """Why the sitting ended before the session was finished."""
+    outcome: Literal["", "refused", "excluded"] = ""
+    """Of a person who does not take part: there is nothing to go on with."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Literal
 
 from study.session.live import Live
 
-Standing = Literal["running", "paused", "resting", "not running", "finished", "stopped"]
+Standing = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
 """`stopped`: the sitting was ended; `not running`: the program is gone without a word. Both can be resumed."""
 
 ON: tuple[Standing, ...] = ("running", "paused", "resting")

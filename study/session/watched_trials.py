@@ -5,7 +5,7 @@ from protocols.run_rules import staircase_rule
 from protocols.schedule import Run
 from protocols.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
-from study.session.state import SessionState, current_rule
+from study.session.state import SessionState, current_rule, due
 from study.session.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
 from study.session.watched import Watched
 
@@ -39,7 +39,7 @@ def next_level_n(state: SessionState, shown: int | None) -> float | None:
     if state.finished or shown != state.run:
         return None
     run = state.runs[state.run]
-    return state.protocol.practice.level_n if run.practice else level_n(current_rule(state), state.staircase)
+    return due(state).level_n if run.practice else level_n(current_rule(state), state.staircase)
 
 
 def run_line(state: SessionState, run: Run) -> WatchedRun:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from protocols.trial import Phase
+from study.session.archive_views import TURNED_AWAY
 from study.session.live import Live
 from study.session.log_time import Moment, minutes_between
 from study.session.sitting_state import SittingState, dose_now, pass_time
@@ -74,6 +75,8 @@ def _of_this_sitting(watched: Watched, live: Live | None) -> Live | None:
 
 
 def _standing(watched: Watched, live: Live | None, writer: bool | None) -> Standing:
+    if watched.state.turned_away_for_good:
+        return watched.state.sitting.turned_away or "refused"
     if watched.state.closed:
         return "finished"
     if watched.left:
@@ -94,6 +97,8 @@ def _reason(watched: Watched, standing: Standing) -> str:
             return "its program is gone; every answer is on disk"
         case "finished":
             return "all runs are done"
+        case "refused" | "excluded":
+            return f"{TURNED_AWAY[standing]}; the person does not take part"
         case _:
             return ""
 

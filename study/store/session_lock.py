@@ -10,6 +10,9 @@ from study.errors import StudyError
 from study.store.privacy import PRIVATE_FILE
 
 LOCK_NAME = "session.lock"
+PLACES_NAME = ".places.lock"
+PATIENCE_S = 20.0
+"""Taking a place means reading the first lines of every session beside it."""
 
 
 @contextmanager
@@ -32,6 +35,25 @@ def locked(folder: Path) -> Iterator[None]:
             "Check the permissions of the folder.",
             saved="Nothing was changed.",
         ) from problem
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def places_locked(data: Path) -> Iterator[None]:
+    """Hold the right to take a place in the balanced order; waits for others. Raises StudyError after PATIENCE_S."""
+    lock = FileLock(data / PLACES_NAME, mode=PRIVATE_FILE)
+    try:
+        lock.acquire(timeout=PATIENCE_S)
+    except Timeout as held:
+        raise StudyError(
+            "No place in the order of conditions could be taken",
+            f"Another program has held {PLACES_NAME} in {data} for {PATIENCE_S:g} s.",
+            "End the program that holds it.",
+            saved="The forms are on disk; no trial was played.",
+        ) from held
     try:
         yield
     finally:

@@ -25,7 +25,8 @@ class Begun:
 
     protocol: str
     simulated: bool
-    number: int
+    number: int | None
+    """The place in the balanced order; None where none was taken."""
 
 
 @dataclass(frozen=True, slots=True)

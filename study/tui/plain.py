@@ -28,7 +28,7 @@ from study.tui import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.conversation import Conversation
 from study.tui.line_input import LineInput
-from study.tui.trial_words import progress_sentence, run_name
+from study.tui.trial_words import progress_sentence, run_name, turned_away_words
 from study.workflows.display import SignOfLife
 
 
@@ -96,7 +96,9 @@ class PlainDisplay:
         self._talk.answer_or_leave()
 
     def goodbye(self, notice: Goodbye) -> None:
-        if notice.finished:
+        if notice.outcome:
+            self._talk.say("", *turned_away_words(notice.outcome))
+        elif notice.finished:
             self._talk.say("", f"Finished: {notice.answers} answers. Thank you.")
         else:
             because = f": {notice.reason}" if notice.reason else ""

@@ -1,11 +1,13 @@
 """How a session stands, as a symbol and a word: neither is told by colour alone."""
 
-from study.session.archive_views import SessionLine, Standing
+from study.session.archive_views import TURNED_AWAY, SessionLine, Standing
 
 SYMBOLS: dict[Standing, str] = {
     "finished": "✓",
     "unfinished": "◐",
     "running": "▶",
+    "refused": "○",
+    "excluded": "○",
     "withdrawn": "✕",
     "unreadable": "!",
 }
@@ -14,6 +16,8 @@ STYLES: dict[Standing, str] = {
     "finished": "$text-success",
     "unfinished": "$text-warning",
     "running": "bold $text-accent",
+    "refused": "$foreground 65%",
+    "excluded": "$foreground 65%",
     "withdrawn": "$foreground 65%",
     "unreadable": "$text-error",
 }
@@ -33,6 +37,8 @@ def describe(line: SessionLine) -> str:
             return f"{_who(line)} is not finished: {done}. It can be resumed."
         case "running":
             return f"{_who(line)} is running now in another program. You can watch it."
+        case "refused" | "excluded":
+            return f"{line.name} is over: {TURNED_AWAY[line.standing]}. The person does not take part."
         case "withdrawn":
             return f"{line.subject}: {line.remark or 'the participant withdrew; the data were erased.'}"
         case "unreadable":

@@ -1,6 +1,8 @@
 """Where a session stands, in words that line mode and screens share: by runs and counts, which say nothing about
 levels."""
 
+from typing import Literal
+
 from protocols.trial import Phase
 from study.session.views import Progress, Question, Task, Welcome
 
@@ -39,3 +41,14 @@ def plan(notice: Welcome) -> str:
     if notice.training_runs and notice.runs:
         return f"There is some training first, then {runs} with rests between them."
     return f"There {'are' if notice.runs != 1 else 'is'} {runs}." if notice.runs else "This is a training session."
+
+
+def turned_away_words(outcome: Literal["refused", "excluded"]) -> tuple[str, ...]:
+    """The last words to a person who does not take part."""
+    kept = "Nothing was played, and only this is kept."
+    if outcome == "refused":
+        return ("Thank you for coming. You decided not to take part, and that is fine.", kept)
+    return (
+        "Thank you for coming. With one of your answers you cannot take part in this study.",
+        f"{kept} Which answer it was is not kept. The experimenter can tell you more.",
+    )

@@ -11,6 +11,8 @@ SYMBOLS: dict[Standing, str] = {
     "stopped": "■",
     "finished": "✓",
     "not running": "!",
+    "refused": "○",
+    "excluded": "○",
 }
 
 

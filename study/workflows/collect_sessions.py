@@ -8,6 +8,7 @@ from analysis.population import Population, split_by_population
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial
 from study.errors import StudyError, WrongUseError
+from study.session.archive_views import TURNED_AWAY
 from study.session.state import SessionState
 from study.store.archive import SessionFolder, session_folders
 from study.store.event_log import LOG_NAME
@@ -92,9 +93,14 @@ def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolde
             left_out.append(f"{folder.name} was withdrawn by the participant.")
             continue
         try:
-            folded.append((folder, fold_session(folder)))
+            session = fold_session(folder)
         except StudyError as problem:
             left_out.append(f"{folder.name} cannot be used. {problem.happened}")
+            continue
+        if turned_away := session.state.sitting.turned_away:
+            left_out.append(f"{folder.name} does not take part: {TURNED_AWAY[turned_away]}.")
+        else:
+            folded.append((folder, session))
     if not folded:
         raise StudyError("There is nothing to analyse", " ".join(left_out), "Record new sessions.")
     return folded, left_out

@@ -1,6 +1,6 @@
 """The labelled demonstration: each direction at each frequency, as often as the participant wants."""
 
-from protocols.schedule import label_of
+from protocols.schedule import demo_level_n, label_of
 from study.devices.device import Fault
 from study.session.due_trial import labels_are_swapped
 from study.session.events import DemoFinished, DemoPlayed
@@ -54,11 +54,12 @@ def _asked_to_end(state: SessionState, sitting: Sitting) -> AfterTrial | None:
 def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
+    level_n = demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)
     direction = label_of(choice.number, labels_are_swapped(protocol, state.opened))
     played = DemoPlayed(
         utc=sitting.clock.utc(),
         frequency_hz=frequency_hz,
-        level_n=protocol.demo.level_n,
+        level_n=level_n,
         direction=1 if choice.number == 1 else 2,
         angle_deg=direction_angle_deg(protocol.directions, direction),
         seconds=protocol.demo.seconds,
@@ -69,7 +70,7 @@ def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial
             protocol.stimulus,
             direction_vector(protocol.directions, direction),
             frequency_hz,
-            amplitude(state.opened.equalized, protocol.demo.level_n, frequency_hz),
+            amplitude(state.opened.equalized, level_n, frequency_hz),
             sitting.equalizer,
             sitting.device.info.sample_rate_hz,
         )

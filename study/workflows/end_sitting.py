@@ -10,8 +10,9 @@ from study.store.archive import SessionFolder
 from study.store.session_lock import locked
 from study.workflows.conduct_session import Conducted
 from study.workflows.fold_session import FoldedSession
+from study.workflows.prepare_sitting import does_not_take_part
 from study.workflows.resume_session import already_finished
-from study.workflows.session_results import REPORT_NAME, due_results, write_results
+from study.workflows.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables
 from study.workflows.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.written_analysis import WrittenAnalysis
 
@@ -23,6 +24,9 @@ def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
     Erases first what a participant withdrew."""
     if end.withdrawn:
         raise _erased(end, utc)
+    if end.state.turned_away_for_good:
+        write_tables(end.folder)
+        raise does_not_take_part(end.state)
     if end.left:
         raise _not_finished(end)
     return write_results(end.folder)
@@ -31,6 +35,9 @@ def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
 def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalysis:
     """What a kill after the last run left undone: seal, tables, summary and report. Raises StudyError where nothing is
     due, or it cannot be written."""
+    if folded.state.turned_away_for_good:
+        finish_tables(folder, folded)
+        raise does_not_take_part(folded.state)
     report = () if (folder.path / REPORT_NAME).exists() else (REPORT_NAME,)
     due = (*due_results(folder, folded), *report)
     if not due:

@@ -41,4 +41,4 @@ def _can_go_on(folder: SessionFolder, protocol: str) -> bool:
         state = fold_session(folder).state
     except StudyError:
         return False
-    return not state.closed and state.protocol.name == protocol
+    return not state.closed and not state.sitting.turned_away and state.protocol.name == protocol

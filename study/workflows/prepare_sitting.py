@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
-from study.session.events import DeviceChecked, FormFilled
+from study.errors import StudyError
+from study.session.archive_views import TURNED_AWAY
+from study.session.events import DeviceChecked, FormFilled, SessionClosed
 from study.session.form_views import Form
-from study.session.forms import judge_form
+from study.session.forms import confirmation_of, confirmed, judge_form
 from study.session.machine import CheckDevice, FillIn, Leave, next_preparation
 from study.session.requests import NoteAsked
 from study.session.state import SessionState
@@ -33,7 +35,11 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
 
 def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     sitting.attendant.begin("form")
-    outcome = judge_form(state.protocol, form.kind, sitting.display.fill_in(form))
+    reply = sitting.display.fill_in(form)
+    outcome = judge_form(state.protocol, form.kind, reply)
+    if not outcome.passed and not confirmed(sitting.display.fill_in(confirmation_of(form, reply))):
+        # A slip of the finger: asked once more, and what is answered then holds. The slip itself is kept nowhere.
+        outcome = judge_form(state.protocol, form.kind, sitting.display.fill_in(form))
     event = FormFilled(
         utc=sitting.clock.utc(),
         form=form.kind.value,
@@ -47,6 +53,23 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
         sitting.display.trouble(outcome.reminder)
         sitting.attendant.note(NoteAsked("program", outcome.reminder))
     return state
+
+
+def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
+    """The session is over: nothing but the outcome is in it."""
+    state = write_notes(state, sitting)
+    outcome = state.sitting.turned_away or "refused"
+    return record(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
+
+
+def does_not_take_part(state: SessionState) -> StudyError:
+    """At the end of such a sitting, and where it is to be resumed."""
+    return StudyError(
+        "This person does not take part",
+        f"{state.opened.session} is over: {TURNED_AWAY[state.sitting.turned_away or 'refused']}.",
+        "Begin a session for the next participant.",
+        saved="Nothing was played. Only this outcome is kept, and no place in the order of conditions was taken.",
+    )
 
 
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:

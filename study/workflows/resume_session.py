@@ -11,7 +11,14 @@ from study.errors import StudyError
 from study.session.counted import answers_are
 from study.session.delivered import delivered
 from study.session.due_trial import labels_are_swapped
-from study.session.events import SessionInterrupted, SessionResumed, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.events import (
+    SessionClosed,
+    SessionInterrupted,
+    SessionResumed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
 from study.session.fold import apply
 from study.session.state import SessionState
 from study.session.stimulus import direction_vector
@@ -23,10 +30,12 @@ from study.store.provenance import versions
 from study.store.request_inbox import RequestInbox
 from study.store.session_lock import locked
 from study.store.trial_recordings import find_trial_recording, recording_name
-from study.workflows.fold_session import fold_session
+from study.workflows.fold_session import FoldedSession, fold_session
 from study.workflows.judge_trial import Judgement, judge
 from study.workflows.open_session import OpenedSession, device_facts
 from study.workflows.other_sessions import dose_before
+from study.workflows.prepare_sitting import does_not_take_part
+from study.workflows.session_results import write_tables
 from study.workflows.trial_facts import known_again
 
 
@@ -43,6 +52,9 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
         remove_live(folder.path)
         try:
             folded = fold_session(folder)
+            if folded.state.turned_away_for_good:
+                _close_as_turned_away(folded, folder, log, clock)
+                raise does_not_take_part(folded.state)
             _check_resumable(folded.state, device, folder)
             mend(folder.log, folded.contents)
             utc, observer = clock.utc(), folded.state.opened.observer
@@ -61,6 +73,15 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
             yield OpenedSession(folder, log, state)
         finally:
             log.close()
+
+
+def _close_as_turned_away(folded: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
+    """What the program may have died before: the last line, seal and tables."""
+    if not folded.state.closed:
+        mend(folder.log, folded.contents)
+        outcome = folded.state.sitting.turned_away or "refused"
+        log.append(SessionClosed(utc=clock.utc(), outcome=outcome, monotonic_s=clock.now_s()))
+    write_tables(folder)
 
 
 def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:

@@ -7,6 +7,7 @@ from protocols.practice import practice_passed, practised, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
+from study.session.archive_views import TURNED_AWAY
 from study.session.counted import answers_are
 from study.session.due_trial import Present, labels_are_swapped
 from study.session.events import RestTaken, SessionClosed, SessionInterrupted
@@ -19,7 +20,8 @@ from study.store.log_seal import seal_log
 from study.workflows.after_trial import AfterTrial
 from study.workflows.demonstrate import demonstrate
 from study.workflows.fold_session import fold_session
-from study.workflows.prepare_sitting import fill_in, prepare_sitting
+from study.workflows.participant_number import take_place
+from study.workflows.prepare_sitting import fill_in, prepare_sitting, turn_away
 from study.workflows.present_trial import present_trial
 from study.workflows.sitting import Sitting, record, tell, write_notes
 from study.workflows.take_pause import take_pause
@@ -59,7 +61,8 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
         raise
     # Whoever leaves here by Ctrl-C leaves what is over already.
     with contextlib.suppress(KeyboardInterrupt):
-        sitting.display.goodbye(Goodbye(finished=not end.left, answers=end.state.answers, reason=end.left))
+        outcome = end.state.sitting.turned_away if end.state.closed else ""
+        sitting.display.goodbye(Goodbye(not end.left, end.state.answers, end.left, outcome))
     # As long as the log is open, who notes something is told that the session writes it.
     end = replace(end, state=write_notes(end.state, sitting))
     if end.state.closed:
@@ -69,8 +72,11 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
     state, refused = prepare_sitting(state, sitting)
+    if state.turned_away_for_good:
+        return SessionEnd(turn_away(state, sitting), refused)
     if refused:
         return _end(AfterTrial(state, leave=refused), sitting)
+    state = take_place(state, sitting)
     sitting.attendant.begin("instructions")
     sitting.display.welcome(_welcome(state, sitting))
     return _loop(state, sitting)
@@ -80,6 +86,9 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
     """What is on the disk decides: a session whose last line was written is finished, however it ended."""
     state = fold_session(sitting.folder).state
     still_on = sitting.device.fault() is Fault.FORCE_LEFT
+    if state.turned_away_for_good:  # nothing was played; its last line may be missing
+        state = state if state.closed else turn_away(state, sitting)
+        return SessionEnd(state, TURNED_AWAY[state.sitting.turned_away or "refused"])
     if state.closed and not still_on:
         return SessionEnd(state, left="")
     # A full disk must not hide why the sitting ended.
@@ -101,8 +110,10 @@ def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEn
 def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
     """The same error; only the session knows how much is safe and how to go on."""
     with contextlib.suppress(StudyError):
-        error.saved = f"{answers_are(fold_session(sitting.folder).state.answers)} on disk."
-        error.do_now = f"{error.do_now} Then go on with: hapteq resume {sitting.folder.path}"
+        state = fold_session(sitting.folder).state
+        if not state.turned_away_for_good:
+            error.saved = f"{answers_are(state.answers)} on disk."
+            error.do_now = f"{error.do_now} Then go on with: hapteq resume {sitting.folder.path}"
     return error
 
 

@@ -1,6 +1,7 @@
 """What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
 
 from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
+from study.session.state import SessionState
 from study.session.void_reasons import computer_too_busy
 from study.workflows.fold_session import FoldedSession
 
@@ -15,14 +16,14 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
     # Nothing waits for a simulated participant, so the log may end in the future.
     ahead = ", in simulated time, which runs ahead of the clock" if opened.observer else ""
     facts = [
-        ("participant", f"{opened.subject}, {who}, number {opened.participant_number + 1} of this protocol"),
+        ("participant", f"{opened.subject}, {who}, {_number(state)}"),
         ("protocol", f"{state.protocol.name} ({opened.protocol_hash[:_HASH_DIGITS]}, {lock})"),
         ("title", state.protocol.title),
         ("device", _device(opened)),
         ("equalizer", opened.equalizer),
         ("within reach", _reach(opened)),
         ("begun", when(opened.utc)),
-        ("finished" if state.closed else "last entry", when(_last_utc(folded)) + ahead),
+        (_end(state), when(_last_utc(folded)) + ahead),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
         ("answers", _answers(folded)),
@@ -32,6 +33,18 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
     ]
     return tuple((what, value) for what, value in facts if value)
+
+
+def _end(state: SessionState) -> str:
+    if state.sitting.turned_away:
+        return "ended"
+    return "finished" if state.closed else "last entry"
+
+
+def _number(state: SessionState) -> str:
+    if not state.takes_part:
+        return "without a place in the order of this protocol"
+    return f"number {state.opened.participant_number + 1} of this protocol"
 
 
 def _reach(opened: SessionOpened) -> str:

@@ -61,7 +61,7 @@ def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
         answers=state.answers,
         runs_done=state.run,
         runs=len(state.runs),
-        standing="finished" if state.closed else "unfinished",
+        standing=state.sitting.turned_away or ("finished" if state.closed else "unfinished"),
     )
 
 
@@ -103,6 +103,7 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
     content = read_regular(folder.log)
     opened = read_opening(folder.log)
     ours = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
+    ours = ours and MEASURED in content  # a person who does not take part left a short log
     planned = _planned(opened.protocol_text) if ours and isinstance(opened, SessionOpened) else None
     if planned is None or not isinstance(opened, SessionOpened):
         return line_of(fold_session(folder).state, folder)

@@ -130,7 +130,7 @@ def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
 def _described(folded: FoldedSession) -> str:
     state = folded.state
     who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
-    end = "finished" if state.closed else "not finished"
+    end = state.sitting.turned_away or ("finished" if state.closed else "not finished")
     steps = "".join(f". Before {step.utc}: {step.sentence}" for step in state.sitting.clock_steps).rstrip(".")
     sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
     kind = f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"

@@ -132,12 +132,13 @@ def _summary(state: SessionState) -> dict[str, Any]:
         "session": opened.session,
         "subject": opened.subject,
         "observer": opened.observer,
-        "participant_number": opened.participant_number,
+        "participant_number": opened.participant_number if state.takes_part else None,
         "protocol": {"name": state.protocol.name, "hash": opened.protocol_hash, "locked": opened.protocol_locked},
         "device": asdict(opened.device),
         "equalizer": opened.equalizer,
         "begun_utc": opened.utc,
         "closed": state.closed,
+        "outcome": state.sitting.turned_away or ("completed" if state.closed else "unfinished"),
         "runs": [
             {"index": r.index, "phase": r.phase.value, "frequency_hz": r.frequency_hz, "practice": r.practice}
             for r in state.runs

@@ -61,7 +61,17 @@ def test_any_changed_value_changes_the_fingerprint(threshold, threshold_text, ol
 
 def test_the_fingerprint_of_the_published_study_is_known(threshold):
     """Locks and sessions in the field hold it: if this fails, a value or a default was changed, knowingly or not."""
-    assert protocol_hash(threshold) == "acd7b086777d3ab2a13d6d3ac8ca8f763093621a92033bd07c5eb0613ff4478a"
+    assert protocol_hash(threshold) == "8bed16e78d40c24d36b274e752a906412fe52398c45e85575f1cc3392ff6c0ee"
+
+
+def test_the_published_study_of_before_levels_were_roved_keeps_its_fingerprint(threshold_text):
+    """New keys count only where they are used: copies of the older file keep their locks and sessions."""
+    since = ("rove_db", "repeats_per_run")
+    older = "\n".join(line for line in threshold_text.splitlines() if not line.startswith(since))
+    known = "acd7b086777d3ab2a13d6d3ac8ca8f763093621a92033bd07c5eb0613ff4478a"
+    assert protocol_hash(load_protocol(older, "older.toml")) == known
+    fewer = threshold_text.replace("repeats_per_run = 3", "repeats_per_run = 2")
+    assert protocol_hash(load_protocol(fewer, "fewer.toml")) != protocol_hash(load_protocol(threshold_text, "t.toml"))
 
 
 OLD = {

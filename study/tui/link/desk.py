@@ -118,8 +118,9 @@ class Desk:
         self._link.send(Preparing(OPENING))
         with self._participant() as participant:
             end = conduct(participant)
-        if not end.left:
+        if end.state.closed:
             self.opened = None  # there is nothing left to go on with
+        if not end.left:
             self._link.send(Preparing("Making the tables and the report."))
         written = end_sitting(end, self._clock.utc())
         self._link.send(Finished(str(end.folder.path), end.state.answers, _results(written)))

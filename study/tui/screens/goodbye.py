@@ -10,6 +10,7 @@ from textual.widgets import Footer
 from study.session.counted import answers_are
 from study.session.views import Goodbye
 from study.tui.take_off import take_off
+from study.tui.trial_words import turned_away_words
 from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
@@ -31,8 +32,11 @@ class GoodbyeScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         notice = self._notice
-        with Card("Finished" if notice.finished else "The end of this sitting"):
-            if notice.finished:
+        with Card("Thank you" if notice.outcome else "Finished" if notice.finished else "The end of this sitting"):
+            if notice.outcome:
+                for sentence in turned_away_words(notice.outcome):
+                    yield Said(sentence, classes="strong")
+            elif notice.finished:
                 yield Said("Thank you! This was the last trial.", classes="strong")
             else:
                 yield Said(f"Thank you. The session stops here{_because(notice.reason)}.", classes="strong")
@@ -40,7 +44,8 @@ class GoodbyeScreen(Screen[None]):
                 yield Said(f"{answers_are(notice.answers)} on the disk.", classes="gap")
             if notice.answers and not notice.finished:
                 yield Said("It can be resumed at the trial where it stopped.", classes="gap")
-            yield Said("You may let go of the handle. Press Enter to close this page.", classes="gap")
+            held = "" if notice.outcome else "You may let go of the handle. "
+            yield Said(f"{held}Press Enter to close this page.", classes="gap")
         yield Footer(show_command_palette=False)
 
     def action_close_page(self) -> None:

@@ -48,6 +48,7 @@ GUIDE = """\
 ✓  finished: all runs are done
 ◐  unfinished: every answer is safe; r resumes
 ▶  running now; w watches
+○  refused or excluded: takes no part
 ✕  withdrawn: the data were erased
 !  unreadable: Enter says why
 """
@@ -70,6 +71,7 @@ accelerations asks for a model of the device too: one that lies with the data (`
 | ✓ finished | all runs are done |
 | ◐ unfinished | it can be resumed; every answer is on disk |
 | ▶ running | another program writes it right now |
+| ○ refused, ○ excluded | the person does not take part; nothing was played, and the session is over |
 | ✕ withdrawn | the participant withdrew; the data were erased |
 | ! unreadable | its log cannot be used; opening it says why |
 

@@ -30,6 +30,8 @@ _STANDING_STYLES = {
     "finished": "bold $text-success",
     "stopped": "bold $text-error",
     "not running": "bold $text-error",
+    "refused": MUTED,
+    "excluded": MUTED,
 }
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}

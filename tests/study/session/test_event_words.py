@@ -16,6 +16,7 @@ from study.session.events import (
     FormFilled,
     NoteTaken,
     PauseTaken,
+    PlaceTaken,
     RestTaken,
     SessionClosed,
     SessionInterrupted,
@@ -58,6 +59,11 @@ SENTENCES = [
         "The session went on, on omega.3. A last line that a crash had torn was taken off.",
     ),
     (SessionClosed(UTC, "completed"), "The session is finished."),
+    (
+        SessionClosed(UTC, "refused"),
+        "The session is over: consent was not given. The person does not take part.",
+    ),
+    (PlaceTaken(UTC, 6), "Takes part, as number 7 of this protocol."),
     (
         DeviceChecked(UTC, True, ("handle 2 mm from its place",)),
         "The device was checked: fine. Handle 2 mm from its place.",

@@ -1,0 +1,76 @@
+"""The level of practice and demonstration varies: how strong a stimulus is must not tell its direction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocols.loading import ProtocolError, load_protocol
+from protocols.preparation import DemoSettings, PracticeSettings
+from protocols.schedule import demo_level_n, draw_trial, practice_level_n
+from protocols.staircase import to_db
+
+ROVED = PracticeSettings(frequencies_hz=(25.0,), level_n=2.0, rove_db=6.0)
+TRIALS = [(seed, trial) for seed in range(40) for trial in range(50)]
+
+
+@pytest.fixture
+def drawn(small_protocol):
+    """(levels in dB re 2 N, directions) of many practice trials."""
+    levels = [to_db(practice_level_n(ROVED, seed, 1, trial, 0) / 2.0) for seed, trial in TRIALS]
+    schedule = small_protocol.schedule
+    sides = [draw_trial(schedule, "random", seed, 1, trial, 0).direction for seed, trial in TRIALS]
+    return np.array(levels), np.array(sides)
+
+
+def test_levels_are_even_in_db_over_the_stated_range(drawn):
+    levels, _ = drawn
+    assert -3.0 <= levels.min() < -2.95
+    assert 2.95 < levels.max() <= 3.0
+    counts = np.histogram(levels, bins=6, range=(-3, 3))[0]
+    assert np.abs(counts - len(levels) / 6).max() < 4 * np.sqrt(len(levels) * 5 / 36)
+
+
+def test_a_level_tells_nothing_about_the_direction(drawn):
+    levels, sides = drawn
+    error = 6 / np.sqrt(12) * np.sqrt(4 / len(levels))
+    assert abs(levels[sides == 1].mean() - levels[sides == 2].mean()) < 4 * error
+
+
+@pytest.mark.parametrize(("difference_db", "share"), [(0.5, 0.5417), (1.0, 0.5833), (3.0, 0.75)])
+def test_who_goes_by_strength_alone_is_right_as_seldom_as_the_protocol_says(drawn, difference_db, share):
+    """The best criterion on felt strength, when direction 1 comes out so much stronger; perfect without roving."""
+    levels, sides = drawn
+    felt = levels + np.where(sides == 1, 0.5, -0.5) * difference_db
+    best = max(np.mean((felt > criterion) == (sides == 1)) for criterion in np.linspace(-5, 5, 201))
+    assert best == pytest.approx(share, abs=0.035)
+    fixed = felt - levels
+    assert np.mean((fixed > 0) == (sides == 1)) == 1.0
+
+
+def test_demonstrations_vary_too_and_a_width_of_0_is_one_level():
+    demo = DemoSettings(level_n=2.0, rove_db=6.0)
+    levels = {demo_level_n(demo, 7, played) for played in range(20)}
+    assert len(levels) == 20
+    assert 1.41 < min(levels) < max(levels) < 2.83
+    assert {demo_level_n(replace(demo, rove_db=0.0), 7, played) for played in range(20)} == {2.0}
+    assert practice_level_n(replace(ROVED, rove_db=0.0), 7, 1, 3, 0) == 2.0
+
+
+@pytest.mark.parametrize("table", ["demo", "practice"])
+def test_the_strongest_level_of_the_range_stays_within_the_cap(small_text, table):
+    frequencies = "frequencies_hz = [25.0]\n" if table == "practice" else ""
+    with pytest.raises(ProtocolError, match=rf"{table}.level_n is 3.0\d+ N, with its rove_db"):
+        load_protocol(f"{small_text}\n[{table}]\n{frequencies}level_n = 2.0\nrove_db = 7.2\n", "mine.toml")
+    load_protocol(f"{small_text}\n[{table}]\n{frequencies}level_n = 2.0\nrove_db = 7.0\n", "mine.toml")
+
+
+def test_shipped_studies_vary_the_level(shipped):
+    assert (shipped.practice.rove_db, shipped.demo.rove_db) == (6.0, 6.0)
+
+
+@pytest.fixture(params=["direction_threshold", "equalized_threshold"])
+def shipped(request):
+    from study.store.protocol_files import read_study_protocol
+
+    return read_study_protocol(request.param).protocol
