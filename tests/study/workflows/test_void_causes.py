@@ -11,6 +11,7 @@ from study.session.rules import LATEST
 from study.session.views import Unanswered
 from study.store.archive import SessionFolder
 from study.store.event_log import read_log
+from study.store.log_seal import seal_paths
 from study.store.trials_file import TRIALS_NAME, read_trials
 from study.tui.link.remote_display import silent
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
@@ -108,6 +109,8 @@ def test_ctrl_c_counts_as_leaving_and_a_dead_program_does_not(sitter):
     assert [t.void_cause for t in done.state.trials if t.void_cause] == [VoidCause.LEFT]
 
     whole = sitter.whole("P03")
+    for seal in seal_paths(whole.folder.path).values():  # written after the last line
+        seal.unlink(missing_ok=True)
     lines = whole.folder.log.read_bytes().splitlines(keepends=True)
     cut = max(i for i, line in enumerate(lines) if b'"trial_presented"' in line)
     whole.folder.log.write_bytes(b"".join(lines[: cut + 1]))
