@@ -10,7 +10,7 @@ from equalizer.identification.canonical_variate import poles_and_shapes as from_
 from equalizer.identification.modal_form import ModalForm
 from equalizer.identification.refinement import FittedForm, fitted, refine
 from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.stable_poles import largest_radius
+from equalizer.identification.stable_poles import Radius, largest_radius
 from equalizer.identification.warped_subspace import default_horizon, poles_and_shapes, warped_subspace
 from equalizer.identification.weighted_lines import (
     WeightedLines,
@@ -47,6 +47,8 @@ class Candidate:
     """Squared residual over noise variance, mean over all entries of all lines: about 1 at the noise."""
     outside_gain: float
     """Largest gain outside the band over the largest inside."""
+    radius: Radius
+    """Within which its poles were kept."""
 
     @property
     def sane(self) -> bool:
@@ -58,7 +60,7 @@ def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> t
 
 
 def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longer: int) -> Start:
-    radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
+    radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     horizon = default_horizon(settings.order, lines.response.shape[1]) + longer
     subspace = warped_subspace(lines, horizon, settings.centre_hz)
     return Start(f"warped subspace, horizon {horizon}", poles_and_shapes(subspace, settings.order, radius))
@@ -73,7 +75,7 @@ def record_starts(
         return ()
     records = driven_records(recordings, factor)
     p, m = lines.response.shape[1:]
-    radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
+    radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     starts = []
     for horizon in settings.record_horizons:
         observed = canonical_variate(records, m, horizon) if horizon * p > settings.order + p else None
@@ -84,15 +86,20 @@ def record_starts(
 
 
 def candidate(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
-    """Refined on bins, which are formed anew about each pass's result, and at last on all lines of a narrow band."""
-    radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
-    found = fitted(start.form, lines)
+    radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
+    return refined(start.name, fitted(start.form, lines), lines, settings, radius)
+
+
+def refined(
+    name: str, found: FittedForm, lines: WeightedLines, settings: IdentificationSettings, radius: Radius
+) -> Candidate:
+    """On bins, which are formed anew about each pass's result, and at last on all lines of a narrow band."""
     for steps in MOST_STEPS:
         found = refine(found.form, bins_about(found, lines, settings), radius, steps)
     if not settings.wide:
         found = refine(found.form, lines, radius, LAST_STEPS)
     cost = lines.cost(found.response(lines.z)) / lines.response.size
-    return Candidate(start.name, found, cost, outside_gain(found, lines))
+    return Candidate(name, found, cost, outside_gain(found, lines), radius)
 
 
 def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:

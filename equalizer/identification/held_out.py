@@ -12,7 +12,9 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 LEAD_S = 2.0
-"""Simulated before a segment that is not periodic, as far as the recording has it: the state has then settled."""
+"""Simulated before a segment, as far as the recording has it: the state has then settled..."""
+DECAYS = 5.0
+"""...or for so many time constants of the model's slowest pole, where those are longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ def _kept_for_a_test(recordings: Sequence[Recording]) -> Iterator[tuple[Recordin
 def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) -> _Part:
     _check(model, recording)
     rate_hz = recording.sample_rate_hz
-    start = max(0, segment.start - round(LEAD_S * rate_hz))
+    start = max(0, segment.start - _lead(model))
     commands = recording.command.samples[start : segment.stop]
     response = recording.response.samples[start : segment.stop]
     if not (np.isfinite(commands).all() and np.isfinite(response).all()):
@@ -74,9 +76,17 @@ def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) ->
     error = measured - _in_band(predicted[last:], rate_hz, model.band_hz)
     noise = None
     if segment.period and last - 2 * length >= segment.start - start:  # the first one holds the transient
-        before = _in_band(response[last - length : last], rate_hz, model.band_hz)
-        noise = _power(measured - before) / 2
+        # Of what the model leaves, so that ringing which dies out from period to period is no noise.
+        before = _in_band((response - predicted)[last - length : last], rate_hz, model.band_hz)
+        noise = _power(error - before) / 2
     return _Part(_power(error), noise, _power(measured), length / rate_hz)
+
+
+def _lead(model: IdentifiedModel) -> int:
+    """Samples."""
+    radius = model.spectral_radius
+    slowest = -1 / np.log(radius) if 0 < radius < 1 else 0.0
+    return round(max(LEAD_S * model.sample_rate_hz, DECAYS * slowest))
 
 
 def _last_whole_part(segment: Segment) -> int:

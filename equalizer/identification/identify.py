@@ -16,18 +16,20 @@ from equalizer.identification.candidates import (
     subspace_starts,
 )
 from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.misfit import Misfit, misfit_of
+from equalizer.identification.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.model_uncertainty import parameter_draws, response_deviation
 from equalizer.identification.refusals import IdentificationRefused, lines_or_refusal
+from equalizer.identification.relaxed_poles import Relaxed, SlowPole, relaxed, relaxed_again, slow_poles
 from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.stable_poles import largest_radius
 from equalizer.identification.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-UNEXPLAINED = 1.5
-"""Cost above which a model is said to leave more than noise."""
+FIRST_SEARCH = 0.8
+"""Share of the progress that is told of it; poles are relaxed in the rest."""
 SAMPLED_BEFORE_WRITTEN = 1.0
 """A response is read just before its row's command is written, so a device answers one sample later at the earliest."""
 
@@ -43,14 +45,28 @@ class Identified:
     """Model against estimate over the lines of the band; the estimate's own noise is in it."""
     worst_relative_error: float
     """The worst line's, relative to the root mean square of the response."""
-    expected_error: float | None
+    scatter: float | None
     """Of the model against the device, as the noise makes it: root mean square over the lines, relative to the
     response's; from the draws, None without them. What no linear model of this order can follow is not in it."""
+    misfit: Misfit
+    """What is: the lines' own difference to the model beyond their noise."""
+    expected_error: float | None
+    """Both together, likewise relative."""
     lines: int
     candidates: tuple[Candidate, ...]
     chosen: Candidate
+    relaxed: tuple[SlowPole, ...]
+    """Poles that the data need slower than the ordinary bound, slowest first."""
+    bound_costs: bool
+    """The bound that was asked for keeps the fit from what the data show."""
     remarks: tuple[str, ...]
-    """What the user should know about this model, in sentences."""
+    """What the user should know about this model, in sentences; `misfit_causes` says what a misfit may come from."""
+
+    @property
+    def slowest_decay_s(self) -> float:
+        """Time constant."""
+        radius = self.model.spectral_radius
+        return float(-1 / (np.log(radius) * self.model.sample_rate_hz)) if radius > 0 else 0.0
 
 
 def identify(
@@ -58,10 +74,12 @@ def identify(
     settings: IdentificationSettings | None = None,
     records: tuple[Recording, ...] = (),
     on_progress: Callable[[float], None] | None = None,
+    near: Candidate | None = None,
 ) -> Identified:
     """One model of all estimates together, each line counting by its noise. Always stable.
 
-    `records` give further starts in the time domain. `on_progress` is told the share done, 0 to 1.
+    `records` give further starts in the time domain. `on_progress` is told the share done, 0 to 1. `near`: refined on
+    these lines instead of a search; poles that were relaxed for it are bounded again where that costs nothing.
     Raises IdentificationRefused when the data do not carry a model.
     """
     settings = settings or IdentificationSettings()
@@ -69,16 +87,32 @@ def identify(
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = lines_or_refusal(responses, settings)
     _refuse_foreign(records, responses[0])
+
+    if near is not None:
+        again = Relaxed(relaxed_again(near, lines, settings), bound_costs=False)
+        return _identified((again.candidate,), again, lines, responses[0], settings)
+    found = _searched(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
+    after = relaxed(best(found), lambda freer: _searched(lines, freer, records, lambda _: None), lines, settings)
+    every = found if after.candidate in found else [*found, after.candidate]
+    identified = _identified(tuple(every), after, lines, responses[0], settings)
+    tell(1.0)
+    return identified
+
+
+def _searched(
+    lines: WeightedLines,
+    settings: IdentificationSettings,
+    records: tuple[Recording, ...],
+    tell: Callable[[float], None],
+) -> list[Candidate]:
     starts = _starts(lines, settings, records)
     found = []
     for number, start in enumerate(starts):
-        tell(number / (len(starts) + 1))
+        tell(number / len(starts))
         found.append(candidate(start, lines, settings))
     found += _spare_candidates(best(found), lines, settings)
-    tell(len(starts) / (len(starts) + 1))
-    identified = _identified(tuple(found), lines, responses[0], settings)
     tell(1.0)
-    return identified
+    return found
 
 
 def _starts(
@@ -105,30 +139,41 @@ def _spare_candidates(so_far: Candidate, lines: WeightedLines, settings: Identif
 
 
 def _identified(
-    found: tuple[Candidate, ...], lines: WeightedLines, like: FrequencyResponse, settings: IdentificationSettings
+    found: tuple[Candidate, ...],
+    after: Relaxed,
+    lines: WeightedLines,
+    like: FrequencyResponse,
+    settings: IdentificationSettings,
 ) -> Identified:
-    chosen = best(found)
+    chosen = after.candidate
     low, high = settings.band_hz
     p, m = lines.response.shape[1:]
     unknowns = settings.order * (p + m) + p * m
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
     inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
-    error = lines.relative_error(chosen.fitted.response(lines.z))[inside]
-    model = _model(chosen, lines, cost, like, settings)
+    modelled = chosen.fitted.response(lines.z)
+    error = lines.relative_error(modelled)[inside]
+    slow = () if settings.longest_decay_s else slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
+    misfit = misfit_of(lines, modelled, inside)
+    model = _model(chosen, lines, cost, like, settings, slow)
     return Identified(
         model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((error**2).mean())),
         worst_relative_error=float(error.max()),
-        expected_error=_expected_error(model, lines.frequency_hz[inside]),
+        scatter=(scatter := _scatter(model, lines.frequency_hz[inside])),
+        misfit=misfit,
+        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.error)),
         lines=int(inside.sum()),
         candidates=found,
         chosen=chosen,
-        remarks=tuple(_remarks(chosen, cost, settings)),
+        relaxed=slow,
+        bound_costs=after.bound_costs,
+        remarks=(*fit_remarks(cost, misfit, slow, after.bound_costs, settings), *_outside_remark(chosen)),
     )
 
 
-def _expected_error(model: IdentifiedModel, frequency_hz: FloatArray) -> float | None:
+def _scatter(model: IdentifiedModel, frequency_hz: FloatArray) -> float | None:
     if model.samples is None:
         return None
     some = frequency_hz[:: max(1, len(frequency_hz) // 200)]
@@ -147,31 +192,29 @@ def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> 
             )
 
 
-def _remarks(chosen: Candidate, cost: float, settings: IdentificationSettings) -> list[str]:
-    remarks = []
-    if cost > UNEXPLAINED:
-        remarks.append(
-            f"the model leaves {np.sqrt(cost):.2g} times the noise: the order {settings.order} may be too low, "
-            f"or the device is not linear"
-        )
-    if not chosen.sane:
-        remarks.append(
-            f"outside the band the model's gain is {chosen.outside_gain:.0f} times that inside: "
-            f"keep what is played within the band, or lower the order"
-        )
-    return remarks
+def _outside_remark(chosen: Candidate) -> list[str]:
+    if chosen.sane:
+        return []
+    return [
+        f"outside the band the model's gain is {chosen.outside_gain:.0f} times that inside: "
+        f"keep what is played within the band, or lower the order"
+    ]
 
 
 def _model(
-    chosen: Candidate, lines: WeightedLines, cost: float, like: FrequencyResponse, settings: IdentificationSettings
+    chosen: Candidate,
+    lines: WeightedLines,
+    cost: float,
+    like: FrequencyResponse,
+    settings: IdentificationSettings,
+    slow: tuple[SlowPole, ...],
 ) -> IdentifiedModel:
     fitted = chosen.fitted
     samples = None
     if settings.draws:
-        radius = largest_radius(settings.longest_decay_s, lines.sample_rate_hz)
         noise_factor = float(np.sqrt(max(cost, 1.0)))
         bins = bins_about(fitted, lines, settings)
-        samples = parameter_draws(fitted, bins, radius, noise_factor, settings.draws, settings.seed)
+        samples = parameter_draws(fitted, bins, chosen.radius, noise_factor, settings.draws, settings.seed)
     return IdentifiedModel(
         A=fitted.form.state_matrix,
         B=fitted.B,
@@ -189,6 +232,7 @@ def _model(
             "method": "subspace identification, refined by maximum likelihood on the lines of the response",
             "start": chosen.name,
             "residual_over_noise": float(np.sqrt(cost)),
-            "longest_decay_s": settings.longest_decay_s,
+            "longest_decay_s": settings.decay_s,
+            "relaxed_poles": [[pole.frequency_hz, pole.decay_s] for pole in slow],
         },
     )

@@ -50,17 +50,24 @@ class LocalPolynomial:
         return smooth
 
 
-def smoothed(response: FrequencyResponse, neighbours: int = 8, order: int = 2) -> FrequencyResponse:
+def smoothed(
+    response: FrequencyResponse, neighbours: int = 8, order: int = 2, about: ComplexArray | None = None
+) -> FrequencyResponse:
     """Each line from itself and `neighbours` lines on either side; near the ends from as many, further on one side.
+
+    about: (lines, outputs, inputs), of a model that is nearly right: only the difference to it is averaged, so that a
+    resonance narrower than the neighbourhood is not blunted.
 
     The new noise variance follows from the old one, or from the scatter about the polynomials where that is larger, so
     that a parabola that does not fit shows. Errors of lines next to each other are no longer independent. Raises
     ValueError where there are fewer lines than a polynomial takes.
     """
     local = LocalPolynomial.over(response, neighbours, order)
-    smooth = local.of(response.response)
+    known = 0.0 if about is None else about
+    rest = replace(response, response=np.asarray(response.response - known, dtype=np.complex128))
+    smooth = np.asarray(local.of(rest.response) + known, dtype=np.complex128)
     noise = local.power(response.noise_variance)
-    scatter = _scatter(response, local) * np.sum(local.rows**2, axis=1)[:, None, None]
+    scatter = _scatter(rest, local) * np.sum(local.rows**2, axis=1)[:, None, None]
     remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
     return replace(
         response, response=smooth, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.identification.refinement import FittedForm, refine
+from equalizer.identification.stable_poles import Radius
 from equalizer.identification.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
@@ -20,7 +21,7 @@ STEPS = 3
 
 
 def parameter_draws(
-    fitted: FittedForm, lines: WeightedLines, radius: float, noise_factor: float, draws: int, seed: int
+    fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
 ) -> FloatArray:
     """(draws, k), in the order of `IdentifiedModel.parameters`.
 

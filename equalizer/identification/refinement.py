@@ -10,7 +10,7 @@ import numpy as np
 
 from equalizer.identification.input_matrices import by_input, input_matrices, weighted_regressors
 from equalizer.identification.modal_form import ModalForm
-from equalizer.identification.stable_poles import bounded_blocks
+from equalizer.identification.stable_poles import Radius, bounded_blocks
 from equalizer.identification.weighted_lines import WeightedLines
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
@@ -51,8 +51,8 @@ class _Point:
     cost: float
 
 
-def refine(form: ModalForm, lines: WeightedLines, radius: float, most_steps: int = 60) -> FittedForm:
-    """The nearest fit of lowest cost whose poles stay within the radius."""
+def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: int = 60) -> FittedForm:
+    """The nearest fit of lowest cost whose poles stay within the radius, of all blocks or one for each."""
     point = _point(form, lines)
     damping, growth = 1e-3, 2.0
     for _ in range(most_steps):
@@ -92,7 +92,7 @@ def _damped_step(normal: FloatArray, gradient: FloatArray, damping: float) -> Fl
     return np.asarray(-np.linalg.solve(scaled, gradient / root) / root, dtype=np.float64)
 
 
-def _moved(form: ModalForm, step: FloatArray, radius: float) -> ModalForm:
+def _moved(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
     blocks = len(form.a)
     a, b = bounded_blocks(form.a + step[:blocks], form.b + step[blocks : 2 * blocks], radius)
     return ModalForm(a, b, form.C + step[2 * blocks :].reshape(form.C.shape))

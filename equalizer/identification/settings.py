@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 WIDE_OCTAVES = 4.5
 """A band wider than this is fitted on logarithmic bins: on a linear axis its top would outnumber its bottom."""
+ORDINARY_DECAY_S = 0.5
+"""Time constant that a pole has at most unless the data ask for more. Poles that an order has to spare go to the bound
+and cost nothing there; without it they settle anywhere up to the unit circle, and ruin a simulation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,8 +14,9 @@ class IdentificationSettings:
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     """Number of states; even, because poles are fitted in pairs."""
-    longest_decay_s: float = 0.5
-    """No pole dies out slower than this. Raise it for a device that rings longer."""
+    longest_decay_s: float | None = None
+    """Time constant that no pole may exceed. None: ORDINARY_DECAY_S, and more for poles that need it (see
+    `relaxed_poles`)."""
     longer_horizons: tuple[int, ...] = (0, 2)
     """Block rows beyond the shortest useful horizon; each is a start of its own."""
     spare_horizons: tuple[int, ...] = (1, 3, 4, 6)
@@ -33,7 +37,7 @@ class IdentificationSettings:
             raise ValueError(f"band_hz is {low:g} to {high:g}; it must rise from above 0")
         if self.order < 2 or self.order % 2:
             raise ValueError(f"order is {self.order}; it must be even and at least 2, because poles come in pairs")
-        if not self.longest_decay_s > 0:
+        if self.longest_decay_s is not None and not 0 < self.longest_decay_s < float("inf"):
             raise ValueError(f"longest_decay_s is {self.longest_decay_s:g}; it must be above 0")
         if not self.longer_horizons or min(self.longer_horizons) < 0:
             raise ValueError(f"longer_horizons is {self.longer_horizons}; at least one number that is not negative")
@@ -45,6 +49,11 @@ class IdentificationSettings:
         """The band and its margin."""
         low, high = self.band_hz
         return low / (1 + self.margin), high * (1 + self.margin)
+
+    @property
+    def decay_s(self) -> float:
+        """The bound that a search begins with."""
+        return ORDINARY_DECAY_S if self.longest_decay_s is None else self.longest_decay_s
 
     @property
     def centre_hz(self) -> float:

@@ -8,20 +8,23 @@ import numpy as np
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
+Radius = float | FloatArray
+"""Of all pairs of poles, or one per pair."""
+
 
 def largest_radius(longest_decay_s: float, sample_rate_hz: float) -> float:
     """Of a pole that falls to 1/e in that time."""
     return float(np.exp(-1 / (longest_decay_s * sample_rate_hz)))
 
 
-def reflected(poles: ComplexArray | FloatArray, radius: float) -> ComplexArray:
+def reflected(poles: ComplexArray | FloatArray, radius: Radius) -> ComplexArray:
     """Unstable poles mirrored at the unit circle, then all within the radius; frequencies stay. poles: any shape."""
     size = np.abs(poles)
     wanted = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1e-300), size), radius)
     return np.asarray(poles * wanted / np.maximum(size, 1e-300), dtype=np.complex128)
 
 
-def bounded_blocks(a: FloatArray, b: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+def bounded_blocks(a: FloatArray, b: FloatArray, radius: Radius) -> tuple[FloatArray, FloatArray]:
     """The same for pole pairs a ± sqrt(b), both of shape (pairs,)."""
     root = np.sqrt(b.astype(np.complex128))
     first, second = reflected(a + root, radius), reflected(a - root, radius)

@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.units import UnknownUnitError, parse_unit
 
@@ -50,6 +51,8 @@ class IdentifiedModel:
     samples: FloatArray | None = None
     """(draws, k): draws of `parameters` from their uncertainty."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    quality: ModelQuality | None = None
+    """By what was measured; None = not known."""
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "covariance", "samples"):

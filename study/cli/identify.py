@@ -21,10 +21,12 @@ def identify(
         ),
     ] = None,
     with_spring: Annotated[
-        bool, typer.Option("--with-spring", help="Take the spring as a part of the device: for a study under it.")
+        bool, typer.Option("--with-spring", help="Take the spring as a part of the device.")
     ] = False,
-    physics: Annotated[
-        Path | None, typer.Option(help="Mechanical model whose named effects (friction) are taken off the recordings.")
+    physics: Annotated[Path | None, typer.Option(help="Mechanical model whose effects are taken off.")] = None,
+    longest_decay: Annotated[
+        float | None,
+        typer.Option(help="Longest decay of a pole, in seconds [default: 0.5, longer where the recordings show it]."),
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Folder for a page with transfer functions, bands and the choice of order.")
@@ -37,12 +39,11 @@ def identify(
     from study.workflows.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.report_identification import report_identification
 
-    plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics)
+    plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics, longest_decay)
     check_free(out)
     with bar("Identifying (%)", total=100) as show:
         device = identify_model(plan, lambda share: show(round(100 * share)))
-    said = json.dumps(summary(device), indent=2) if as_json else "\n".join((str(out), *summary_lines(device)))
-    typer.echo(said)
+    typer.echo(json.dumps(summary(device), indent=2) if as_json else "\n".join((str(out), *summary_lines(device))))
     for remark in device.remarks:
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:

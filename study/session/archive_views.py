@@ -52,6 +52,12 @@ class HomeView:
     devices: tuple[str, ...]
     models: tuple[str, ...] = ()
     """Files of identified models."""
+    qualities: tuple[tuple[str, str], ...] = ()
+    """How good they are, in a few words: (file, words)."""
+
+    def quality_of(self, model: str) -> str:
+        """Empty where it is not known."""
+        return dict(self.qualities).get(model, "")
 
 
 @dataclass(frozen=True, slots=True)

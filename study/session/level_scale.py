@@ -31,6 +31,8 @@ class EqualizedFacts:
     """Of that file."""
     levels: tuple[LevelScale, ...]
     """One per frequency that may be played."""
+    quality: str = ""
+    """Of the model, by what was measured, in words; empty in logs of earlier versions."""
 
 
 def wanted_mps2(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:

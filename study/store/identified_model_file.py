@@ -1,12 +1,14 @@
 """Identified models as HDF5: the format `hapteq-model`, version 1."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel, IdentifiedModelError
+from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.signal import FloatArray
 from study.store.file_errors import UnusableFileError
 from study.store.hdf5_attributes import numbers_attribute, text_attribute, text_or_list, texts_attribute, write_texts
@@ -34,6 +36,13 @@ LAYOUT = (
     Entry("place_m", "attribute, 3 numbers", "where in the workspace; left out = not known", False),
     Entry("covariance", "(k, k) float32 or float64", "of the k entries of A, B, C, D, each row by row", False),
     Entry("samples", "(draws, k) float32 or float64", "draws of the same entries from their uncertainty", False),
+    Entry("expected_error", "attribute, number", "of model against device, relative; not below any other", False),
+    Entry("misfit_error", "attribute, number", "against the lines it was fitted to, beyond their noise", False),
+    Entry("scatter_error", "attribute, number", "left by the noise of those lines", False),
+    Entry("held_out_error", "attribute, number", "on a record kept for a test, its noise included", False),
+    Entry("held_out_noise", "attribute, number", "of that record", False),
+    Entry("held_out_s", "attribute, number", "length of that record", False),
+    Entry("quality_remarks", "attribute, list of text", "what the errors come from", False),
     Entry("provenance", "attribute, JSON text", "versions, command, seeds, parents", False),
 )
 
@@ -70,9 +79,38 @@ def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: boo
         for name in ("A", "B", "C", "D", "covariance", "samples"):
             if getattr(model, name) is not None:
                 file.create_dataset(name, data=getattr(model, name), fletcher32=True)
+        if model.quality is not None:
+            _write_quality(file, model.quality)
         file.attrs["provenance"] = json.dumps(dict(model.provenance), allow_nan=False)
 
     write_hdf5(path, fill, overwrite=overwrite)
+
+
+QUALITY = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
+
+
+def _write_quality(file: Any, quality: ModelQuality) -> None:
+    for name in QUALITY:
+        if getattr(quality, name) is not None:
+            file.attrs[name] = getattr(quality, name)
+    write_texts(file, "quality_remarks", quality.remarks)
+
+
+def _quality(file: Any) -> ModelQuality | None:
+    """None for a file of an earlier version. Raises ValueError."""
+    if "expected_error" not in file.attrs:
+        return None
+    found = {name: numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
+    remarks = texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
+    return ModelQuality(
+        expected_error=found["expected_error"],
+        misfit_error=found.get("misfit_error", found["expected_error"]),
+        scatter_error=found.get("scatter_error"),
+        held_out_error=found.get("held_out_error"),
+        held_out_noise=found.get("held_out_noise"),
+        held_out_s=found.get("held_out_s"),
+        remarks=remarks,
+    )
 
 
 def _parts(file: Any, problems: Problems) -> dict[str, Any]:
@@ -98,6 +136,7 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
         "delay_samples": numbers("delay_samples", 1, (0.0,))[0],
         "place_m": numbers("place_m", 3) if "place_m" in file.attrs else None,
         "provenance": provenance,
+        "quality": problems.attempt(lambda: _quality(file), None),
     }
 
 

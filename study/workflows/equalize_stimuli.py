@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_quality import quality_sentence
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.equalizer import Equalizer, Identity
@@ -73,12 +74,13 @@ def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceI
     """For what `check_playable` let pass. Raises StudyError for a model that does not go with the device."""
     if model is None:
         return NOT_EQUALIZED
-    equalizer = _equalizer(read_identified_model(model), protocol, info)
+    identified = read_identified_model(model)
+    equalizer = _equalizer(identified, protocol, info)
     try:
         scales = level_scales(protocol, equalizer, info.sample_rate_hz)
     except (ValueError, ArithmeticError) as error:  # what linear algebra says of a model that is none
         raise _refused(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
-    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales)
+    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
     return Equalized(equalizer, facts, model)
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from equalizer.plant.model_quality import quality_document, quality_sentence
 from equalizer.tracking.feedforward import within_band
 from study.workflows.equalize_trajectory import EqualizedTrajectory
 
@@ -15,6 +16,8 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
     solved, bands, compensation = done.solved, done.bands, done.compensation
     found: dict[str, Any] = {
         "forces": str(done.plan.out),
+        "quality": quality_document(done.models.quality),
+        "quality_of_models": [quality_document(model.quality) for model in done.models.given],
         "band_hz": list(done.models.band_hz),
         "predicted_error": predicted_error(done),
         "left_out": solved.left_out,
@@ -66,7 +69,7 @@ def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
 
 def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
     solved = done.solved
-    lines = [*done.models.held_out, _predicted_line(done), *done.models.remarks]
+    lines = [*_quality_lines(done), *done.models.held_out, _predicted_line(done), *done.models.remarks]
     lines += _band_lines(done)
     if solved.left_out > WORTH_SAYING:
         lines.append(
@@ -81,6 +84,20 @@ def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
     lines += _physics_lines(done)
     lines.append(_spring_line(done))
     return tuple(lines)
+
+
+def _quality_lines(done: EqualizedTrajectory) -> list[str]:
+    """What was measured of the models comes before what they predict of themselves."""
+    models = done.models
+    known = models.quality
+    if len(models.given) == 1:
+        return [quality_sentence(known), *(known.remarks if known else ())]
+    where = "narrower" if models.two is not None else "nearest"
+    nearest, worst = models.nearest.quality, known
+    lines = [f"Of the {where} model: {quality_sentence(nearest)}"]
+    if worst != nearest:
+        lines.append(f"Of the worst of the {len(models.given)} models: {quality_sentence(worst)}")
+    return [*lines, *dict.fromkeys(remark for one in (nearest, worst) if one for remark in one.remarks)]
 
 
 def predicted_error(done: EqualizedTrajectory) -> float:

@@ -2,10 +2,8 @@
 
 from typing import Any
 
+from equalizer.plant.model_quality import quality_document, quality_sentence
 from study.workflows.identify_model import IdentifiedDevice
-
-POOR = 0.05
-"""Error of a prediction from which a user is told what may be behind it."""
 
 
 def summary(device: IdentifiedDevice) -> dict[str, Any]:
@@ -14,6 +12,7 @@ def summary(device: IdentifiedDevice) -> dict[str, Any]:
     low, high = model.band_hz
     return {
         "model": str(device.plan.out),
+        "quality": quality_document(model.quality),
         "order": model.order,
         "band_hz": [low, high],
         "spectral_radius": model.spectral_radius,
@@ -32,6 +31,7 @@ def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
     found = summary(device)
     low, high = found["band_hz"]
     lines = [
+        quality_sentence(device.model.quality),
         f"Order {found['order']}, {low:g} to {high:g} Hz, stable (slowest pole {found['spectral_radius']:.5f}), "
         f"from {found['lines']} lines.",
         f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
@@ -39,17 +39,4 @@ def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
     ]
     if found["freed_of"]:
         lines.append(f"The recordings were freed of {', '.join(found['freed_of'])}; play with --physics.")
-    if device.tested is None:
-        lines.append("No recording was kept for a test (role 'test'): how well the model predicts is not known.")
-    else:
-        noise = f", of which noise {100 * device.tested.noise:.2f} %" if device.tested.noise is not None else ""
-        lines.append(
-            f"Predicts the {device.tested.seconds:g} s kept for a test with an error of "
-            f"{100 * device.tested.error:.2f} % in the band{noise}."
-        )
-        if device.tested.error > max(POOR, 3 * (device.tested.noise or 0.0)):
-            lines.append(
-                "That is what a linear model of this order cannot say of this device: mostly friction, where there is "
-                "some. Clipped sensors and a moving grip look the same. Stronger sweeps suffer less from friction."
-            )
     return tuple(lines)

@@ -8,13 +8,16 @@ import numpy as np
 
 from equalizer.identification.frequency_response import FrequencyResponse
 from equalizer.identification.held_out import HeldOut, held_out
-from equalizer.identification.identify import UNEXPLAINED, Identified, identify
-from equalizer.identification.local_polynomial import smoothed
+from equalizer.identification.identify import Identified
+from equalizer.identification.identify_recordings import IdentifiedRecordings, identify_recordings
+from equalizer.identification.misfit import misfit_of_estimate
+from equalizer.identification.misfit_causes import held_out_remarks
 from equalizer.identification.refusals import IdentificationRefused
 from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import TransferEstimateError, transfer_estimate
+from equalizer.identification.transfer_estimate import TransferEstimateError
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.model_quality import ModelQuality, model_quality
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.identified_model_file import write_identified_model
@@ -26,12 +29,6 @@ from study.workflows.freed_recordings import freed_of, freed_recordings
 
 NEAR_M = 0.001
 """Places farther apart than this are two places, and a model is of one."""
-
-
-SMOOTHED = (
-    "The lines scatter more than noise explains, as on a device with friction: the fit was made to a local average "
-    "over neighbouring lines (--no-smooth fits the lines themselves)."
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +45,8 @@ class IdentifyPlan:
     trusting encoders to see what the handle does."""
     physics: Path | None = None
     """Mechanical model whose named effects are taken off the recordings: the model is then of the linear rest."""
+    longest_decay_s: float | None = None
+    """No pole dies out slower; None: the ordinary bound, and longer where the recordings ask for it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,8 +66,8 @@ class IdentifiedDevice:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Sentences."""
-        found = (*self.estimate.remarks, *self.identified.remarks)
-        return tuple(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in found)
+        known = self.model.quality.remarks if self.model.quality else ()
+        return (*known, *(_sentence(remark) for remark in self.estimate.remarks))
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
@@ -83,10 +82,10 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     if plan.physics is not None and physics is not None:
         recordings = freed_recordings(recordings, physics, plan.physics)
     try:
-        estimate = transfer_estimate(recordings)
-        fitted, identified = _fit(plan, estimate, settings, recordings, on_progress)
-        model = _at_place(plan, recordings, identified.model, physics)
+        found = identify_recordings(recordings, settings, plan.smooth, on_progress)
+        model = _at_place(plan, recordings, found.identified.model, physics)
         tested = held_out(model, recordings)
+        model = replace(model, quality=_quality(found, recordings, tested))
     except (TransferEstimateError, IdentificationRefused) as refusal:
         raise _no_model(str(refusal)) from refusal
     except np.linalg.LinAlgError as problem:
@@ -97,27 +96,20 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
     except ValueError as problem:
         raise _no_model(f"{problem}.") from problem
     write_identified_model(plan.out, model)
-    return IdentifiedDevice(plan, recordings, estimate, fitted, identified, model, tested)
+    return IdentifiedDevice(plan, recordings, found.estimate, found.fitted, found.identified, model, tested)
 
 
-def _fit(
-    plan: IdentifyPlan,
-    estimate: FrequencyResponse,
-    settings: IdentificationSettings,
-    recordings: tuple[Recording, ...],
-    on_progress: Callable[[float], None],
-) -> tuple[FrequencyResponse, Identified]:
-    """What was fitted to, and the fit."""
-    if plan.smooth is not None:
-        fitted = smoothed(estimate) if plan.smooth else estimate
-        return fitted, identify(fitted, settings, recordings, on_progress)
-    identified = identify(estimate, settings, recordings, lambda share: on_progress(share / 2))
-    if identified.cost <= UNEXPLAINED:
-        on_progress(1.0)
-        return estimate, identified
-    fitted = smoothed(estimate)
-    identified = identify(fitted, settings, recordings, lambda share: on_progress(0.5 + share / 2))
-    return fitted, replace(identified, remarks=(SMOOTHED, *identified.remarks))
+def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None) -> ModelQuality:
+    """The misfit is that of the lines themselves, even where the fit was made to local averages."""
+    identified, estimate = found.identified, found.estimate
+    misfit = misfit_of_estimate(identified.model, estimate)
+    remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
+    measured = None if tested is None else (tested.error, tested.noise, tested.seconds)
+    return model_quality(misfit.error, identified.scatter, measured, tuple(_sentence(remark) for remark in remarks))
+
+
+def _sentence(remark: str) -> str:
+    return f"{remark[:1].upper()}{remark[1:].rstrip('.')}."
 
 
 def check_free(out: Path) -> None:
@@ -127,10 +119,13 @@ def check_free(out: Path) -> None:
 
 def _settings(plan: IdentifyPlan) -> IdentificationSettings:
     try:
-        return IdentificationSettings(band_hz=plan.band_hz, order=plan.order)
+        return IdentificationSettings(plan.band_hz, plan.order, plan.longest_decay_s)
     except ValueError as problem:
         raise WrongUseError(
-            "There is no such model", f"{problem}.", "Correct --band or --order.", saved="Nothing was written."
+            "There is no such model",
+            f"{problem}.",
+            "Correct --band, --order or --longest-decay.",
+            saved="Nothing was written.",
         ) from problem
 
 

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from equalizer.plant.model_quality import quality_brief
 from study.errors import StudyError
-from study.store.identified_model_file import is_identified_model
+from study.store.identified_model_file import is_identified_model, read_identified_model
 
 
 def model_files(data: Path) -> tuple[str, ...]:
@@ -11,6 +12,14 @@ def model_files(data: Path) -> tuple[str, ...]:
     places = dict.fromkeys((data.absolute(), data.absolute().parent))
     found = [path for place in places for path in _hdf5_files(place)]
     return tuple(str(path) for path in sorted(found, key=_changed, reverse=True) if _is_model(path))
+
+
+def model_words(path: str) -> str:
+    """How good it is, in a few words."""
+    try:
+        return quality_brief(read_identified_model(Path(path)).quality)
+    except StudyError as problem:
+        return f"cannot be used: {problem.title}"
 
 
 def _hdf5_files(folder: Path) -> list[Path]:

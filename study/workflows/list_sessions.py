@@ -6,15 +6,17 @@ from study.devices.opening import DEVICES
 from study.session.archive_views import HomeView, SessionLine
 from study.session.printable import printable, printable_text
 from study.store.archive import session_folders
-from study.workflows.list_models import model_files
+from study.workflows.list_models import model_files, model_words
 from study.workflows.list_protocols import protocol_lines
 from study.workflows.session_line import session_line
 
 
 def home_view(data: Path) -> HomeView:
     """Everything on the start screen. A data folder that is not there is an empty one."""
+    models = model_files(data)
+    qualities = tuple((model, model_words(model)) for model in models)
     return HomeView(
-        printable_text(str(data)), session_lines(data), printable(protocol_lines(data)), DEVICES, model_files(data)
+        printable_text(str(data)), session_lines(data), printable(protocol_lines(data)), DEVICES, models, qualities
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_quality import ModelQuality, worst_quality
 from equalizer.plant.model_response import model_response
 from equalizer.tracking.trajectory import FORCES, TRAJECTORY
 from equalizer.tracking.two_models import TwoModels
@@ -44,6 +45,11 @@ class ModelsForPlaying:
     """Sentences: the error at places that were left out and predicted from the others."""
     sha256: str
     """Of all files, and of the place where it matters which forces they give."""
+
+    @property
+    def quality(self) -> ModelQuality | None:
+        """Of the worst of them; None where one does not say."""
+        return worst_quality(tuple(model.quality for model in self.given))
 
     @property
     def nearest(self) -> IdentifiedModel:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
 from analysis.diagnosis.real_answer import FORMAT as REAL_ANSWER_FORMAT
 from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
+from equalizer.plant.model_quality import quality_brief
 from equalizer.tracking.trajectory import TRAJECTORY
 from protocols.loading import ProtocolError, load_protocol
 from protocols.recording_protocol import RecordingProtocol
@@ -54,7 +55,7 @@ def recognise_identified_model(content: FileContent) -> str | None:
     return (
         f"identified model of order {found.order}, {found.band_hz[0]:g} to {found.band_hz[1]:g} Hz at "
         f"{found.sample_rate_hz:g} Hz, {_count(len(found.input_channels), 'input')}, "
-        f"{_count(len(found.output_channels), 'output')}, {stable}"
+        f"{_count(len(found.output_channels), 'output')}, {stable}, {quality_brief(found.quality)}"
     )
 
 

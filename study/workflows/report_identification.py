@@ -20,6 +20,8 @@ from study.workflows.identified_summary import summary_lines
 from study.workflows.identify_model import IdentifiedDevice
 from study.workflows.picture_files import write_pictures
 
+FREER = 1.5
+"""Bound over the slowest decay that was found."""
 PAGE_NAME = "report.html"
 
 
@@ -54,7 +56,9 @@ def findings(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> 
 def _order(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> OrderReport | None:
     asked = device.plan.order
     orders = sorted({order for order in (10, 14, 16, 20, 26) if order <= asked} | {asked})
-    settings = IdentificationSettings(band_hz=device.plan.band_hz, order=asked)
+    # Orders are compared under the bound that the device needs, or all of them would miss what rings.
+    needed_s = FREER * device.identified.relaxed[0].decay_s if device.identified.relaxed else None
+    settings = IdentificationSettings(device.plan.band_hz, asked, device.plan.longest_decay_s or needed_s)
     try:
         return order_report(device.fitted, settings, orders, on_progress)
     except IdentificationRefused:  # half of the lines are too few for the order: then there is nothing to compare

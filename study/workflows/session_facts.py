@@ -1,5 +1,6 @@
 """What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
 
+from equalizer.plant.model_quality import NOT_STORED
 from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
 from study.session.state import SessionState
 from study.session.void_reasons import computer_too_busy
@@ -21,6 +22,7 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("title", state.protocol.title),
         ("device", _device(opened)),
         ("equalizer", opened.equalizer),
+        ("its quality", _quality(opened)),
         ("within reach", _reach(opened)),
         ("begun", when(opened.utc)),
         (_end(state), when(_last_utc(folded)) + ahead),
@@ -45,6 +47,11 @@ def _number(state: SessionState) -> str:
     if not state.takes_part:
         return "without a place in the order of this protocol"
     return f"number {state.opened.participant_number + 1} of this protocol"
+
+
+def _quality(opened: SessionOpened) -> str:
+    """Of the model that stimuli go through."""
+    return "" if opened.equalized is None else opened.equalized.quality or NOT_STORED
 
 
 def _reach(opened: SessionOpened) -> str:

@@ -44,6 +44,7 @@ from study.workflows.conduct_session import Conducted, Participant, conduct_new,
 from study.workflows.display import PersonsHand
 from study.workflows.end_sitting import end_sitting, finish_closed
 from study.workflows.fold_session import fold_session
+from study.workflows.list_models import model_words
 from study.workflows.list_protocols import protocol_line
 from study.workflows.list_sessions import home_view
 from study.workflows.plan_sitting import plan_sitting
@@ -185,7 +186,9 @@ def _offered(wanted: ShowHome) -> HomeView:
     protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols
     devices = tuple(sorted(view.devices, key=lambda name: name != wanted.device))
     models = (wanted.model, *(name for name in view.models if name != wanted.model)) if wanted.model else view.models
-    return replace(view, protocols=protocols, devices=devices, models=models)
+    known = dict(view.qualities)
+    qualities = tuple((model, known.get(model) or model_words(model)) for model in models)
+    return replace(view, protocols=protocols, devices=devices, models=models, qualities=qualities)
 
 
 def _results(written: WrittenAnalysis) -> Results:

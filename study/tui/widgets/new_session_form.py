@@ -58,7 +58,7 @@ class NewSessionForm(Vertical):
         self._home = home
         self._offer("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
         self._offer("#device", [(_device_prompt(name), name) for name in home.devices])
-        self._offer("#model", [(_file_name(path), path) for path in home.models])
+        self._offer("#model", [(_model_prompt(path, home), path) for path in home.models])
         proposed = next_code(tuple(line.subject for line in home.sessions if line.observer is None))
         self.query_one("#code", Input).placeholder = f"code, such as {proposed}"
         self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
@@ -160,6 +160,11 @@ def _protocol_prompt(name: str, locked: bool) -> str:
 
 def _device_prompt(name: str) -> str:
     return f"{name} (nothing moves)" if name == SIMULATED else name
+
+
+def _model_prompt(path: str, home: HomeView) -> str:
+    quality = home.quality_of(path)
+    return f"{_file_name(path)} ({quality})" if quality else _file_name(path)
 
 
 def _file_name(path: str) -> str:

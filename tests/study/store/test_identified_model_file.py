@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_quality import ModelQuality
 from study.store.file_errors import AlreadyThereError, UnusableFileError
 from study.store.identified_model_file import LAYOUT, read_identified_model, write_identified_model
 
@@ -31,6 +32,7 @@ def model():
         covariance=np.eye(42),
         samples=rng.normal(size=(5, 42)),
         provenance={"seeds": {"start": 3}},
+        quality=ModelQuality(0.2, 0.1, 0.01, 0.2, 0.05, 10.0, ("The order 4 may be too low.",)),
     )
 
 
@@ -43,7 +45,7 @@ def written(tmp_path, model):
 def test_a_written_model_is_read_back_to_the_last_digit(written, model):
     read = read_identified_model(written)
     assert all(np.array_equal(getattr(read, name), getattr(model, name)) for name in MATRICES)
-    for name in (*REST, "place_m", "provenance"):
+    for name in (*REST, "place_m", "provenance", "quality"):
         assert getattr(read, name) == getattr(model, name)
 
 
@@ -54,9 +56,24 @@ def test_everything_in_the_file_is_in_its_documented_layout_and_the_other_way_ro
 
 def test_a_model_without_place_or_uncertainty_is_read(tmp_path, model):
     path = tmp_path / "bare.h5"
-    write_identified_model(path, replace(model, place_m=None, covariance=None, samples=None, provenance={}))
+    write_identified_model(
+        path, replace(model, place_m=None, covariance=None, samples=None, provenance={}, quality=None)
+    )
     read = read_identified_model(path)
-    assert (read.place_m, read.covariance, read.samples) == (None, None, None)
+    assert (read.place_m, read.covariance, read.samples, read.quality) == (None, None, None, None)
+
+
+def test_a_model_that_was_not_tested_keeps_what_is_known_of_it(tmp_path, model):
+    quality = ModelQuality(expected_error=0.03, misfit_error=0.03)
+    write_identified_model(tmp_path / "untested.h5", replace(model, quality=quality))
+    assert read_identified_model(tmp_path / "untested.h5").quality == quality
+
+
+def test_figures_of_quality_that_cannot_be_are_named(written):
+    with h5py.File(written, "r+") as file:
+        file.attrs["held_out_error"] = -0.1
+    with pytest.raises(UnusableFileError, match=r"held_out_error is -0\.1; it must be a number that is not negative"):
+        read_identified_model(written)
 
 
 def test_nothing_existing_is_overwritten_unless_asked_for(written, model):

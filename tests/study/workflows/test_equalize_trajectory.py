@@ -9,6 +9,7 @@ import pytest
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.plant.model_quality import NOT_STORED, ModelQuality
 from equalizer.signals.signal import Signal
 from equalizer.tracking.padding import band_error
 from equalizer.tracking.trajectory import Trajectory
@@ -84,7 +85,9 @@ def test_the_forces_of_a_table_make_the_device_do_it_row_by_row(plants, plan):
     assert forces.start_s == 0.5
     assert played_error(plants, plan, 0.1) < 0.01
     assert done.solved.error < 0.01
-    assert summary_lines(done)[0].endswith("N of 3 N.")
+    measured, predicted, *_ = summary_lines(done)
+    assert measured == NOT_STORED
+    assert predicted.startswith("As the model itself predicts") and predicted.endswith("N of 3 N.")
     assert "a spring that holds the handle is not counted" in summary_lines(done)[-1]
     assert summary(done)["peak_n"] <= 3.0
 
@@ -114,8 +117,8 @@ def test_what_the_cap_costs_is_said_in_one_figure(plan):
     assert summary(done)["predicted_error"] == capped["error_capped"]
     assert sum(" error " in line for line in lines) == 1
     figures = [100 * capped[f"error_{kind}"] for kind in ("capped", "free", "clipped")]
-    assert "error {:.2f} % of what is wanted".format(*figures) in lines[0]
-    assert "under the cap, {1:.2f} % without it (clipping would have given {2:.2f} %)".format(*figures) in lines[0]
+    assert "error {:.2f} % of what is wanted".format(*figures) in lines[1]
+    assert "under the cap, {1:.2f} % without it (clipping would have given {2:.2f} %)".format(*figures) in lines[1]
 
 
 @pytest.mark.parametrize("rows", [[0.0, 0.0, 0.0], [1e-7, 1e-7, 1e-7], [1.0, 0.0, 0.0]])
@@ -178,7 +181,8 @@ def test_three_places_are_checked_with_the_middle_one_held_out(plants, plan):
     blended, modal = check["blended_held_out_error"], check["modal_held_out_error"]
     better = modal is not None and modal < blended
     assert summary(done)["interpolation"] == ("modal" if better else "blended forces")
-    first, second, *_ = summary_lines(done)
+    measured, first, second, *_ = summary_lines(done)
+    assert measured == f"Of the nearest model: {NOT_STORED}"
     assert first.startswith(f"Held out (0, 0, 0) mm: error {100 * blended:.1f} % (rms over lines) with blended forces")
     assert second.startswith("As the models themselves predict: error")
     assert played_error(plants, between, 0.15) < 0.2
@@ -385,3 +389,27 @@ def test_nothing_is_overwritten_and_folders_are_not_made(plan, tmp_path):
         equalize_trajectory(plan)
     assert plan.out.read_text() == "mine"
     assert "There is no folder" in refusal(replace(plan, out=tmp_path / "no" / "forces.csv")).happened
+
+
+def test_what_was_measured_of_the_model_comes_before_what_it_predicts(plants, plan, tmp_path):
+    quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0, ("A pole sits on the bound of the decay.",))
+    write_identified_model(tmp_path / "poor.h5", model_of(plants.omega_like(), quality=quality))
+    done = equalize_trajectory(replace(plan, models=(tmp_path / "poor.h5",)))
+    first, cause, predicted, *_ = summary_lines(done)
+    assert first == "Measured on 10 s kept for a test, the model errs by 13.00 %, noise of the record 0.40 %."
+    assert cause == "A pole sits on the bound of the decay."
+    assert predicted.startswith("As the model itself predicts: error 0.")
+    assert list(summary(done))[1] == "quality"
+    assert summary(done)["quality"]["held_out_error"] == 0.13
+
+
+def test_of_several_models_the_nearest_and_the_worst_are_said(plants, plan, tmp_path):
+    near, far = ModelQuality(0.01, 0.01), ModelQuality(0.2, 0.1, None, 0.2, None, 5.0)
+    write_identified_model(tmp_path / "near.h5", model_of(plants.omega_like(), (0.0, 0.0, 0.0), quality=near))
+    write_identified_model(tmp_path / "far.h5", model_of(plants.omega_like(0.05), (0.03, 0.0, 0.0), quality=far))
+    models = (tmp_path / "near.h5", tmp_path / "far.h5")
+    done = equalize_trajectory(replace(plan, models=models, at_m=(0.005, 0.0, 0.0)))
+    first, second, *_ = summary_lines(done)
+    assert first.startswith("Of the nearest model: No recording was kept for a test")
+    assert second.startswith("Of the worst of the 2 models: Measured on 5 s kept for a test, the model errs by 20.00 %")
+    assert summary(done)["quality"]["expected_error"] == 0.2

@@ -79,12 +79,18 @@ def test_it_knows_where_it_comes_from(device):
 def test_what_is_said_is_what_was_measured(device):
     found = summary(device)
     assert found["held_out_error"] == pytest.approx(found["held_out_noise"], rel=0.2)
-    said = " ".join(summary_lines(device))
-    assert f"an error of {100 * found['held_out_error']:.2f} % in the band, of which noise" in said
-    assert "mostly friction" not in said
-    poor = replace(device, tested=replace(device.tested, error=0.2))
-    assert "mostly friction, where there is some" in " ".join(summary_lines(poor))
-    assert "Order 20, 5 to 35 Hz, stable" in said
+    first, *rest = summary_lines(device)
+    assert f"the model errs by {100 * found['held_out_error']:.2f} %, noise of the record" in first
+    assert "friction" not in first + " ".join((*rest, *device.remarks))
+    assert "Order 20, 5 to 35 Hz, stable" in " ".join(rest)
+
+
+def test_the_file_keeps_how_good_the_model_is(device):
+    quality = read_identified_model(device.plan.out).quality
+    assert quality == device.model.quality
+    assert (quality.held_out_error, quality.held_out_noise) == (device.tested.error, device.tested.noise)
+    assert quality.expected_error >= quality.held_out_error
+    assert summary(device)["quality"]["expected_error"] == quality.expected_error
 
 
 def test_the_page_shows_transfer_functions_bands_and_the_choice_of_order(device, tmp_path):

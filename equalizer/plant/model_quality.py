@@ -1,0 +1,88 @@
+"""How good an identified model is, by what was measured: kept with the model, and said before anything that the model
+predicts of itself."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+NOT_STORED = "Quality not stored: the model file is of an earlier version; identify it again to know its error."
+
+
+@dataclass(frozen=True, slots=True)
+class ModelQuality:
+    """All errors are root mean squares in the model's band, relative to the response's. Raises ValueError for figures
+    that cannot be."""
+
+    expected_error: float
+    """Of the model against the device: not smaller than any of those below, except the noise."""
+    misfit_error: float
+    """Against the lines that it was fitted to, beyond their noise."""
+    scatter_error: float | None = None
+    """That the noise of those lines leaves in a model without misfit; None = no draws were made."""
+    held_out_error: float | None = None
+    """Of its prediction of a record that the fit did not see, that record's noise included; None = there was none."""
+    held_out_noise: float | None = None
+    """Of that record; None = not known."""
+    held_out_s: float | None = None
+    """Its length."""
+    remarks: tuple[str, ...] = ()
+    """Sentences: what the error comes from, as far as it is known."""
+
+    def __post_init__(self) -> None:
+        for name in [field.name for field in fields(self) if field.name != "remarks"]:
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} is {value}; it must be a number that is not negative")
+
+    @property
+    def tested(self) -> bool:
+        return self.held_out_error is not None
+
+
+def model_quality(
+    misfit_error: float,
+    scatter_error: float | None,
+    held_out: tuple[float, float | None, float] | None,
+    remarks: tuple[str, ...] = (),
+) -> ModelQuality:
+    """held_out: error, noise, seconds. What a test shows is an upper limit of what a model may claim."""
+    own = float(np.hypot(misfit_error, scatter_error or 0.0))
+    error, noise, seconds = held_out or (None, None, None)
+    return ModelQuality(max(own, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)
+
+
+def quality_sentence(quality: ModelQuality | None) -> str:
+    """What comes before every figure that a model predicts of itself."""
+    if quality is None:
+        return NOT_STORED
+    if quality.held_out_error is None:
+        return (
+            f"No recording was kept for a test; against the lines that it was fitted to, the model errs by "
+            f"{100 * quality.expected_error:.2f} % (misfit {100 * quality.misfit_error:.2f} % beyond their noise)."
+        )
+    noise = "" if quality.held_out_noise is None else f", noise of the record {100 * quality.held_out_noise:.2f} %"
+    return (
+        f"Measured on {quality.held_out_s or 0:g} s kept for a test, the model errs by "
+        f"{100 * quality.held_out_error:.2f} %{noise}."
+    )
+
+
+def quality_document(quality: ModelQuality | None) -> dict[str, Any] | None:
+    """For a program's JSON; None = not stored."""
+    return None if quality is None else asdict(quality) | {"remarks": list(quality.remarks)}
+
+
+def quality_brief(quality: ModelQuality | None) -> str:
+    """For a list of models."""
+    if quality is None:
+        return "quality not stored"
+    if quality.held_out_error is None:
+        return f"not tested, misfit {100 * quality.misfit_error:.2g} %"
+    return f"held-out error {100 * quality.held_out_error:.2g} %"
+
+
+def worst_quality(found: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
+    """Of several models: the largest expected error, or None where one of them is not known."""
+    known = [one for one in found if one is not None]
+    return max(known, key=lambda one: one.expected_error) if len(known) == len(found) and known else None
