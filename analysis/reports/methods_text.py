@@ -138,9 +138,10 @@ def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
     if protocol.gate.radius_mm:
         sentences.append(f"A trial began with the handle within {protocol.gate.radius_mm:g} mm of its place.")
     if practice.frequencies_hz:
+        fixed = "" if practice.rove_db else "a fixed level of "
         feedback = "with" if practice.feedback == "after_answer" else "without"
         sentences.append(
-            f"Practice at {_hz(practice.frequencies_hz)} was at {levels_words(practice)}, {feedback} "
+            f"Practice at {_hz(practice.frequencies_hz)} was at {fixed}{levels_words(practice)}, {feedback} "
             f"feedback, until {practice.right_needed} of the last {practice.of_last} answers were right or "
             f"{practice.trial_limit} trials were over. It excluded nobody and enters no result."
         )
@@ -161,7 +162,7 @@ def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
 def levels_words(settings: DemoSettings | PracticeSettings) -> str:
     """The fixed level, or the range that each level was drawn from."""
     if not settings.rove_db:
-        return f"a fixed level of {settings.level_n:g} N"
+        return f"{settings.level_n:g} N"
     half = 10.0 ** (settings.rove_db / 40.0)
     return f"levels drawn evenly in dB from {settings.level_n / half:.2f} to {settings.level_n * half:.2f} N"
 
