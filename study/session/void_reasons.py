@@ -47,7 +47,7 @@ def why_too_many(reasons: tuple[str, ...]) -> str:
     """Of void trials in a row, after which a sitting ends."""
     many = f"{len(reasons)} trials in a row were void"
     if all(map(computer_too_busy, reasons)):
-        return f"{TOO_BUSY}: {many} because of it, not because of the participant"
+        return f"{TOO_BUSY}: {many} because of it, not because of the participant (the last because {reasons[-1]})"
     if all(computer_too_busy(reason) or reason == SCREEN_SILENT for reason in reasons):
         return f"{many}, the last because {reasons[-1]}: the computer may be too busy"
     return f"{many}, the last because {reasons[-1]}"

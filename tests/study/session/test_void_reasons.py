@@ -52,7 +52,8 @@ def test_a_silent_screen_is_not_the_participants_fault_either():
 
 def test_three_void_trials_end_a_sitting_for_the_reason_that_they_had():
     busy = "the computer is too busy: 3 trials in a row were void because of it, not because of the participant"
-    assert why_too_many((SCREEN_LATE, MISSED, Fault.STALLED.value)) == busy
+    assert why_too_many((SCREEN_LATE, SCREEN_LATE, MISSED)) == f"{busy} (the last because {MISSED})"
+    assert why_too_many((SCREEN_LATE, MISSED, Fault.STALLED.value)).startswith(busy)
     mixed = why_too_many((SCREEN_LATE, SCREEN_LATE, SCREEN_SILENT))
     assert mixed.endswith("the last because the screen gave no sign of life: the computer may be too busy")
     away = why_too_many((SCREEN_LATE, MISSED, "no answer within the time limit"))

@@ -68,7 +68,8 @@ def test_trials_that_a_busy_computer_spoiled_are_repeated_counted_and_told_at_th
 def test_three_in_a_row_end_the_sitting_in_words_that_fit(late_at):
     end, screen = late_at(1, 2, 3)
     assert end.left == (
-        "the computer is too busy: 3 trials in a row were void because of it, not because of the participant"
+        "the computer is too busy: 3 trials in a row were void because of it, not because of the participant "
+        f"(the last because {SCREEN_LATE})"
     )
     with pytest.raises(LeftError) as left:
         end_sitting(end, UTC)
