@@ -1,8 +1,10 @@
 """Shared by all tests: small protocols, and where shared test material lies."""
 
 import importlib.util
+import os
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -16,6 +18,21 @@ from protocols.study_protocol import StudyProtocol
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("explore", derandomize=False)
 settings.load_profile("repeatable")
+
+
+# People read times by the clock of the machine: here it stands in one place, for programs that tests start as well.
+os.environ["TZ"] = "UTC"
+time.tzset()
+
+
+@pytest.fixture
+def summer_and_winter(monkeypatch) -> Iterator[None]:
+    """The machine stands in central Europe: +01:00, in summer +02:00."""
+    monkeypatch.setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -38,7 +38,7 @@ from analysis.reports.page import Page, Section, Table, render_page
 
 
 def render_diagnosis_report(
-    found: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated_utc: str
+    found: Findings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
     """HTML. pictures: of `analysis.figures.diagnosis_pictures`, for the same findings."""
     diagnosis = found.diagnosis
@@ -62,7 +62,7 @@ def render_diagnosis_report(
             summary=answer_of(found),
             banner=_banner(found),
             sections=tuple(sections),
-            generated_utc=generated_utc,
+            generated=generated,
             provenance=provenance,
         )
     )

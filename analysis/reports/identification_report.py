@@ -49,7 +49,7 @@ def identification_pictures(found: IdentificationFindings) -> tuple[Picture, ...
 
 
 def render_identification_report(
-    found: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated_utc: str
+    found: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
     by_name = {picture.name: picture for picture in pictures}
     low, high = found.model.band_hz
@@ -72,7 +72,7 @@ def render_identification_report(
             f"{len(found.model.input_channels)} forces to {len(found.model.output_channels)} accelerations.",
             banner="",
             sections=sections,
-            generated_utc=generated_utc,
+            generated=generated,
             provenance=provenance,
         )
     )

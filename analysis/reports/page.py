@@ -37,7 +37,8 @@ class Page:
     banner: str
     """What must not be overlooked; empty = none."""
     sections: tuple[Section, ...]
-    generated_utc: str
+    generated: str
+    """When, by the clock of the place, with its offset."""
     provenance: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -41,7 +41,7 @@ def render_proof_report(
     pictures: Sequence[Picture],
     facts: ProofFacts,
     provenance: Mapping[str, str],
-    generated_utc: str,
+    generated: str,
 ) -> str:
     """HTML."""
     sections = (
@@ -59,7 +59,7 @@ def render_proof_report(
             "be. All of them are listed.",
             banner=" ".join(facts.remarks),
             sections=sections,
-            generated_utc=generated_utc,
+            generated=generated,
             provenance=provenance,
         )
     )

@@ -36,7 +36,7 @@ def render_real_report(
     injected: Sequence[InjectedOutcome],
     pictures: Mapping[tuple[str, str], Picture],
     provenance: Mapping[str, str],
-    generated_utc: str,
+    generated: str,
 ) -> str:
     """HTML. pictures: by folder and recording."""
     sections = [Section("All recordings", tables=(overview_table(answers),))]
@@ -53,7 +53,7 @@ def render_real_report(
             "physics was named. What is left, and what speaks against each answer, is said beside it.",
             banner=_banner(troubles),
             sections=tuple(sections),
-            generated_utc=generated_utc,
+            generated=generated,
             provenance=provenance,
         )
     )

@@ -35,7 +35,7 @@ def render_reproduction_report(
     reproduction: Reproduction,
     pictures: Mapping[int, Sequence[Picture]],
     provenance: Mapping[str, str],
-    generated_utc: str,
+    generated: str,
 ) -> str:
     """HTML. pictures: by the number of the published figure."""
     sections = [_overview(reproduction)]
@@ -53,7 +53,7 @@ def render_reproduction_report(
             "High Frequencies.",
             banner=BANNER,
             sections=tuple(sections),
-            generated_utc=generated_utc,
+            generated=generated,
             provenance=provenance,
         )
     )

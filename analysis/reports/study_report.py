@@ -38,7 +38,7 @@ def render_study_report(
     analysis: StudyAnalysis,
     pictures: Sequence[Picture],
     provenance: Mapping[str, str],
-    generated_utc: str,
+    generated: str,
     ellipsoids: Sequence[EllipsoidResult] = (),
 ) -> str:
     """HTML. pictures: of `analysis.figures.study_pictures`, for the same analysis and ellipsoids."""
@@ -58,7 +58,7 @@ def render_study_report(
             summary=_summary(analysis),
             banner=_BANNERS[analysis.population] if analysis.population else "",
             sections=tuple(sections),
-            generated_utc=generated_utc,
+            generated=generated,
             provenance=provenance,
         )
     )

@@ -17,7 +17,9 @@ def sessions(
     as_json: JsonOption = False,
 ) -> None:
     """List all sessions, latest first: how they stand, and how far they are."""
-    from study.tui.standing_words import standing_words, when
+    from study.local_clock import machine_zone
+    from study.session.local_time import local_time
+    from study.tui.standing_words import standing_words
     from study.workflows.list_sessions import session_lines
 
     lines = session_lines(data)
@@ -28,11 +30,11 @@ def sessions(
         typer.echo(f"No sessions in {data}. hapteq study begins one, hapteq rehearse makes simulated ones.", err=True)
         return
     longest = max(len("session"), *(len(line.name) for line in lines))
-    typer.echo(f"{'session':{longest}}  {'standing':12}  {'begun (UTC)':16}  {'runs':>5}  {'answers':>7}  protocol")
+    typer.echo(f"{'session':{longest}}  {'standing':12}  {'begun':23}  {'runs':>5}  {'answers':>7}  protocol")
     for line in lines:
-        known = line.runs > 0
+        known, begun = line.runs > 0, local_time(line.begun_utc, machine_zone)
         typer.echo(
-            f"{line.name:{longest}}  {standing_words(line.standing):12}  {when(line.begun_utc):16}  "
+            f"{line.name:{longest}}  {standing_words(line.standing):12}  {begun:23}  "
             f"{f'{line.runs_done}/{line.runs}' if known else '':>5}  {line.answers if known else '':>7}  "
             f"{line.protocol}{f' ({line.observer})' if line.observer else ''}".rstrip()
         )

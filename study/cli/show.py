@@ -30,9 +30,11 @@ def show(
         diagnosis = diagnosis_view(Path(what))
         _say([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
         return
+    from study.local_clock import machine_zone
+    from study.session.local_time import in_utc
     from study.workflows.view_session import session_view
 
-    session = session_view(_folder(what, data))
+    session = session_view(_folder(what, data), in_utc if as_json else machine_zone)
     _say([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
 
 

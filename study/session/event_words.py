@@ -28,22 +28,25 @@ from study.session.events import (
     TrialPresented,
     TrialSpoiled,
 )
+from study.session.local_time import Zone, in_utc, local_parts
 
 _Key = tuple[int, int, int]
 
 
-def log_in_words(events: Iterable[Event]) -> tuple[str, ...]:
-    """One line per event, oldest first: its time (UTC) and a sentence; a line with the date wherever it changes."""
+def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
+    """One line per event, oldest first: its local time and a sentence; a line wherever date or offset change."""
     events = tuple(events)
     counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
     presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
     lines: list[str] = []
-    day = ""
+    said = ""
     for event in events:
-        if event.utc[:10] != day:
-            day = event.utc[:10]
-            lines.append(f"{day} (times are UTC)")
-        lines.append(f"{event.utc[11:19]}  {_sentence(event, presented)}")
+        date, time, offset = local_parts(event.utc, zone)
+        day = f"{date} (times are UTC {offset})" if offset else ""
+        if day and day != said:
+            said = day
+            lines.append(day)
+        lines.append(f"{time or date}  {_sentence(event, presented)}")
     return tuple(lines)
 
 

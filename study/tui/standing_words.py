@@ -45,11 +45,6 @@ def describe(line: SessionLine) -> str:
             return f"{line.name} cannot be read. {line.remark}".rstrip()
 
 
-def when(utc: str) -> str:
-    """To the minute."""
-    return utc[:16].replace("T", " ")
-
-
 def _who(line: SessionLine) -> str:
     return f"{line.name}{f' (simulated: {line.observer})' if line.observer else ''}"
 

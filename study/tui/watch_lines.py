@@ -4,10 +4,10 @@ from study.session.watch_view import ClosedTrial, WatchView
 from study.tui.watch_words import (
     SYMBOLS,
     catch_words,
+    clock_time,
     device_words,
     dose_words,
     handle_words,
-    local_time,
     reversals,
     run_name,
     sensor_words,
@@ -54,7 +54,7 @@ def status(view: WatchView) -> list[str]:
         if run.reversals_needed:
             lines[-1] += f", {reversals(run)} reversals"
     lines += [f"Last       {_trial_line(trial)}" for trial in view.last[:3]]
-    lines += [f"Note       {local_time(note.utc)} {note.who}: {note.text}" for note in view.notes[:3]]
+    lines += [f"Note       {clock_time(note.utc)} {note.who}: {note.text}" for note in view.notes[:3]]
     return lines
 
 

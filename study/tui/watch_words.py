@@ -1,7 +1,7 @@
 """What a watcher reads, in words: shared by the screen and by the lines of `hapteq watch --plain`."""
 
-from datetime import datetime
-
+from study.local_clock import machine_zone
+from study.session.local_time import local_parts
 from study.session.watch_view import ClosedTrial, Exposure, Standing, WatchedRun, WatchView
 
 SYMBOLS: dict[Standing, str] = {
@@ -16,9 +16,10 @@ SYMBOLS: dict[Standing, str] = {
 }
 
 
-def local_time(utc: str) -> str:
-    """Hours, minutes and seconds on this computer's clock; empty where there is no time."""
-    return datetime.fromisoformat(utc).astimezone().strftime("%H:%M:%S") if utc else ""
+def clock_time(utc: str) -> str:
+    """On this computer's clock, without the date: "14:05:10 +01:00"; empty where there is no time."""
+    date, time, offset = local_parts(utc, machine_zone)
+    return f"{time} {offset}" if offset else date
 
 
 def duration(seconds: float) -> str:

@@ -12,8 +12,8 @@ from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.threshold_table import ThresholdTable
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from study.devices.clock import RealClock
 from study.errors import StudyError
+from study.local_clock import local_now
 from study.store.file_errors import CannotWriteError
 from study.store.json_document import write_json
 from study.store.privacy import close_to_others, make_folder
@@ -143,7 +143,7 @@ def _write(
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figures, pictures)
-    page = render_study_report(analysis, pictures, _shown(provenance, collected), RealClock().utc(), shapes)
+    page = render_study_report(analysis, pictures, _shown(provenance, collected), local_now(), shapes)
     write_text(out / "report.html", page, overwrite=True)
 
 

@@ -12,6 +12,8 @@ from analysis.diagnosis.real_answer import RealAnswer
 from analysis.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
+from study.local_clock import machine_zone
+from study.session.local_time import local_time
 from study.store.file_errors import CannotWriteError
 from study.store.mechanical_model_file import write_mechanical_model
 from study.store.new_folder import new_folder
@@ -63,7 +65,9 @@ def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None =
         answers = _answers(plan, found, kept, on_progress, time)
         injected = _injected(plan, found, answers, on_progress)
         on_progress("writing the page", 0.98)
-        return write_real(plan.out, RealResults(answers, found.troubles, injected), time.utc())
+        return write_real(
+            plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
+        )
     except (KeyboardInterrupt, LeftError) as interruption:
         raise LeftError(
             "Interrupted",

@@ -14,7 +14,7 @@ from equalizer.identification.order_report import OrderReport, order_report
 from equalizer.identification.refusals import IdentificationRefused
 from equalizer.identification.resonances import find_resonances
 from equalizer.identification.settings import IdentificationSettings
-from study.devices.clock import RealClock
+from study.local_clock import local_now
 from study.store.text_file import write_text
 from study.workflows.identified_summary import summary_lines
 from study.workflows.identify_model import IdentifiedDevice
@@ -31,7 +31,7 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
     pictures = identification_pictures(found)
     write_pictures(folder / "figures", pictures)
     on_progress(0.95)
-    page = render_identification_report(found, pictures, _shown(device), RealClock().utc())
+    page = render_identification_report(found, pictures, _shown(device), local_now())
     write_text(folder / PAGE_NAME, page, overwrite=True)
     on_progress(1.0)
     return folder / PAGE_NAME

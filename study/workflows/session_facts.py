@@ -2,6 +2,7 @@
 
 from equalizer.plant.model_quality import NOT_STORED
 from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
+from study.session.local_time import Zone, local_time
 from study.session.state import SessionState
 from study.session.void_reasons import computer_too_busy
 from study.workflows.fold_session import FoldedSession
@@ -9,7 +10,7 @@ from study.workflows.fold_session import FoldedSession
 _HASH_DIGITS = 12
 
 
-def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
+def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
     state, events = folded.state, folded.contents.events
     opened = state.opened
     who = f"simulated ({opened.observer})" if opened.observer else "a person"
@@ -24,8 +25,8 @@ def session_facts(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         ("equalizer", opened.equalizer),
         ("its quality", _quality(opened)),
         ("within reach", _reach(opened)),
-        ("begun", when(opened.utc)),
-        (_end(state), when(_last_utc(folded)) + ahead),
+        ("begun", local_time(opened.utc, zone, "seconds")),
+        (_end(state), local_time(_last_utc(folded), zone, "seconds") + ahead),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
         ("answers", _answers(folded)),
@@ -101,7 +102,3 @@ def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
         if isinstance(event, FormFilled) and event.form == "debrief":
             facts += [("said", f"{q.question} {event.answers[k]}") for k, q in questions.items() if k in event.answers]
     return tuple(facts)
-
-
-def when(utc: str) -> str:
-    return f"{utc[:19].replace('T', ' ')} UTC"

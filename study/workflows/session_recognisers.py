@@ -6,8 +6,10 @@ from pathlib import Path
 from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
 from study.errors import StudyError
+from study.local_clock import machine_zone
 from study.session.events import SESSION_FORMAT, TrialMeasured
 from study.session.live import Live
+from study.session.local_time import local_time
 from study.store.archive import SessionFolder
 from study.store.event_log import LOG_NAME
 from study.store.file_errors import UnusableFileError
@@ -77,7 +79,7 @@ def recognise_lock(content: FileContent) -> str | None:
         lock = lock_from_json(content.text or "")
     except LockError as error:
         raise UnusableFileError(content.path, "protocol lock", (str(error),)) from error
-    return f"lock of protocol '{lock.name}', {lock.locked_utc}"
+    return f"lock of protocol '{lock.name}', {local_time(lock.locked_utc, machine_zone)}"
 
 
 def _checked(folder: SessionFolder, path: Path) -> str:
@@ -131,7 +133,9 @@ def _described(folded: FoldedSession) -> str:
     state = folded.state
     who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end = state.sitting.turned_away or ("finished" if state.closed else "not finished")
-    steps = "".join(f". Before {step.utc}: {step.sentence}" for step in state.sitting.clock_steps).rstrip(".")
+    steps = "".join(
+        f". Before {local_time(step.utc, machine_zone)}: {step.sentence}" for step in state.sitting.clock_steps
+    ).rstrip(".")
     sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
     kind = f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"
     return f"{kind}; log {folded.contents.chain.in_words()}{sealed}{steps}"

@@ -10,13 +10,14 @@ from protocols.trial import Phase
 from study.errors import StudyError
 from study.session.archive_views import SessionLine, SessionView, Staircase
 from study.session.event_words import log_in_words
+from study.session.local_time import Zone, in_utc, local_time
 from study.session.printable import printable
 from study.session.state import SessionState
 from study.store.archive import SessionFolder
 from study.store.event_log import readable_events
 from study.workflows.analysis_files import ANALYSIS_NAME
 from study.workflows.fold_session import FoldedSession, fold_session
-from study.workflows.session_facts import session_facts, when
+from study.workflows.session_facts import session_facts
 from study.workflows.session_line import line_of, session_line, with_writer
 from study.workflows.session_results import due_results
 
@@ -26,27 +27,30 @@ if TYPE_CHECKING:
 THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark")
 
 
-def session_view(path: Path) -> SessionView:
-    """path: the session's folder. Damage is a view too: what can be read, and a warning that says what cannot."""
+def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
+    """path: the session's folder. Damage is a view too: what can be read, and a warning that says what cannot.
+
+    zone: of the times in it, which are text; `study.local_clock.machine_zone` for a person.
+    """
     folder = SessionFolder(path.absolute())
     try:
         folded = None if folder.withdrawn else fold_session(folder)
     except StudyError as problem:
-        return printable(_damaged(folder, problem))
-    return printable(_bare(folder, session_line(folder)) if folded is None else _whole(folder, folded))
+        return printable(_damaged(folder, problem, zone))
+    return printable(_bare(folder, session_line(folder)) if folded is None else _whole(folder, folded, zone))
 
 
-def _whole(folder: SessionFolder, folded: FoldedSession) -> SessionView:
+def _whole(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionView:
     state = folded.state
     analysis, problem = _analysis(state)
-    clock = (f"Before {when(step.utc)}: {step.sentence}" for step in state.sitting.clock_steps)
+    clock = (f"Before {local_time(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps)
     return SessionView(
         line=with_writer(line_of(state, folder), folder),
-        facts=session_facts(folded),
+        facts=session_facts(folded, zone),
         thresholds=_threshold_rows(state, analysis),
         warnings=(*_log_remarks(folder, folded), *clock, *problem, *(analysis.warnings if analysis else ())),
         staircases=_staircases(state, analysis),
-        events=log_in_words(folded.contents.events),
+        events=log_in_words(folded.contents.events, zone),
         report=_report(folder),
         figures=_figures(folder),
     )
@@ -65,7 +69,7 @@ def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...
     return tuple(text for holds, text in said if holds)
 
 
-def _damaged(folder: SessionFolder, problem: StudyError) -> SessionView:
+def _damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
     line = session_line(folder)
     if line.standing != "unreadable":  # it looked whole at a glance, and is not
         line = SessionLine(
@@ -73,7 +77,8 @@ def _damaged(folder: SessionFolder, problem: StudyError) -> SessionView:
             line.answers, 0, line.runs, "unreadable", problem.happened,
         )  # fmt: skip
     said = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
-    return _bare(folder, line, warnings=(f"{problem.title}.", *said), events=log_in_words(readable_events(folder.log)))
+    events = log_in_words(readable_events(folder.log), zone)
+    return _bare(folder, line, warnings=(f"{problem.title}.", *said), events=events)
 
 
 def _bare(

@@ -7,7 +7,7 @@ from pathlib import Path
 from analysis.diagnosis.findings import Findings
 from analysis.figures.diagnosis_pictures import diagnosis_pictures
 from analysis.reports.diagnosis_report import render_diagnosis_report
-from study.devices.clock import RealClock
+from study.local_clock import local_now
 from study.store.diagnosis_file import write_diagnosis
 from study.store.mechanical_model_file import write_mechanical_model
 from study.store.provenance import Provenance, gather_provenance
@@ -25,7 +25,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     write_mechanical_model(folder / MODEL_NAME, improved)
     pictures = diagnosis_pictures(findings)
     write_pictures(folder / "figures", pictures)
-    page = render_diagnosis_report(findings, pictures, _shown(origin), RealClock().utc())
+    page = render_diagnosis_report(findings, pictures, _shown(origin), local_now())
     write_text(folder / PAGE_NAME, page)
 
 

@@ -11,7 +11,7 @@ from analysis.figures.proof_pictures import proof_pictures
 from analysis.proof.outcome import Outcome
 from analysis.proof.score import main_error
 from analysis.reports.proof_report import ProofFacts, render_proof_report
-from study.devices.clock import RealClock
+from study.local_clock import local_now
 from study.store.csv_rows import rows_to_csv
 from study.store.json_document import read_json, write_json
 from study.store.provenance import command_line, gather_provenance, versions
@@ -87,7 +87,7 @@ def write_proof(proof: Proof) -> None:
         seeds(proof), proof.seal, at, proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
     )
     page = render_proof_report(
-        proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, RealClock().utc()
+        proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, local_now()
     )
     write_text(folder / PAGE, page, overwrite=True)
 

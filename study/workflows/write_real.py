@@ -63,7 +63,7 @@ class WrittenReal:
     table: Path
 
 
-def write_real(out: Path, results: RealResults, generated_utc: str) -> WrittenReal:
+def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
     """What is there from an earlier run is replaced. Raises CannotWriteError."""
     answers = results.answers
     pictures = {(one.folder, one.recording): real_picture(one) for one in answers}
@@ -78,7 +78,7 @@ def write_real(out: Path, results: RealResults, generated_utc: str) -> WrittenRe
         write_text(
             out / INJECTED_NAME, rows_to_csv([_injected(one) for one in results.injected], InjectedRow), overwrite=True
         )
-    page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated_utc)
+    page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated)
     write_text(out / PAGE_NAME, page, overwrite=True)
     return WrittenReal(results, out / PAGE_NAME, out / TABLE_NAME)
 

@@ -13,7 +13,7 @@ from analysis.reproduction.played_response import played_row
 from analysis.reproduction.response_findings import band_findings, response_findings
 from analysis.reproduction.study_findings import direction_limit_hz, study_findings
 from equalizer.identification.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, FrequencyBand, frequency_bands
-from study.devices.clock import RealClock
+from study.local_clock import local_now
 from study.store.provenance import Provenance, gather_provenance
 from study.store.reproduction_file import REPRODUCTION_NAME, write_reproduction
 from study.store.text_file import write_text
@@ -52,7 +52,7 @@ def write_reproduction_folder(
     )
     document, report = plan.out / REPRODUCTION_NAME, plan.out / PAGE_NAME
     write_reproduction(document, reproduction, origin)
-    page = render_reproduction_report(reproduction, pictures, _shown(origin), RealClock().utc())
+    page = render_reproduction_report(reproduction, pictures, _shown(origin), local_now())
     write_text(report, page, overwrite=True)
     on_share(1.0)
     return WrittenReproduction(reproduction, overview_lines(reproduction), document, report)

@@ -27,6 +27,8 @@ def impurities(source: str) -> list[str]:
             found.append(f"line {node.lineno}: {node.func.id}()")
         if isinstance(node, ast.Attribute) and node.attr in FORBIDDEN_ATTRIBUTES:
             found.append(f"line {node.lineno}: .{node.attr}")
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "astimezone":
+            found += [] if node.args else [f"line {node.lineno}: .astimezone() reads the zone of the machine"]
         modules = []
         if isinstance(node, ast.Import):
             modules = [alias.name for alias in node.names]
@@ -43,7 +45,15 @@ def test_a_pure_module_touches_no_file_no_clock_and_no_screen(path):
 
 @pytest.mark.parametrize(
     "source",
-    ["open('a')", "from pathlib import Path", "import time", "x.read_text()", "print(1)", "import importlib.util"],
+    [
+        "open('a')",
+        "from pathlib import Path",
+        "import time",
+        "x.read_text()",
+        "print(1)",
+        "import importlib.util",
+        "t.astimezone()",
+    ],
 )
 def test_the_checker_sees_what_it_should(source):
     assert impurities(source)

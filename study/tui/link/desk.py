@@ -9,6 +9,7 @@ from pathlib import Path
 from study.devices.clock import RealClock
 from study.devices.device import Device
 from study.errors import WrongUseError
+from study.local_clock import machine_zone
 from study.session.archive_views import HomeView
 from study.store.archive import SessionFolder, find_session
 from study.store.privacy import left_open
@@ -80,7 +81,7 @@ class Desk:
             case Analyze(session=session):
                 self._link.send(Preparing("Making the tables and the report."))
                 write_results(SessionFolder(Path(session)))
-                self._link.send(Session(session_view(Path(session))))
+                self._link.send(Session(session_view(Path(session), machine_zone)))
             case Withdraw(session=session):
                 self._withdraw(SessionFolder(Path(session)))
             case Diagnose():
@@ -167,7 +168,7 @@ def _looked_up(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Sessio
         case ShowHome():
             return Home(_offered(command))
         case ShowSession(path=path):
-            return Session(session_view(Path(path)))
+            return Session(session_view(Path(path), machine_zone))
         case ShowDiagnosis(path=path):
             return _diagnosis(Path(path))
 

@@ -7,11 +7,13 @@ from textual.content import Content
 from textual.message import Message
 from textual.widgets import DataTable
 
+from study.local_clock import machine_zone
 from study.session.archive_views import SessionLine
+from study.session.local_time import local_time
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
-from study.tui.standing_words import STYLES, describe, standing_words, when
+from study.tui.standing_words import STYLES, describe, standing_words
 
-COLUMNS = (("Standing", 12), ("Begun (UTC)", 16), ("Runs", 5), ("Answers", 7), ("Protocol", 40))
+COLUMNS = (("Standing", 12), ("Begun", 23), ("Runs", 5), ("Answers", 7), ("Protocol", 40))
 """With their widths in cells, so that nothing has to be measured in a long list. The session's name comes first."""
 _NAME = "Session"
 
@@ -111,7 +113,7 @@ def _row(line: SessionLine) -> tuple[Content | str, ...]:
     return (
         Content(line.name),
         Content.styled(standing_words(line.standing), STYLES[line.standing]),
-        when(line.begun_utc),
+        local_time(line.begun_utc, machine_zone),
         f"{line.runs_done}/{line.runs}" if known else "",
         f"{line.answers:>7}" if known else "",
         Content(line.protocol),

@@ -8,10 +8,10 @@ from study.session.watch_view import Alarm, ClosedTrial, RunStatus, WatchedRun, 
 from study.tui.watch_words import (
     SYMBOLS,
     catch_words,
+    clock_time,
     device_words,
     dose_words,
     handle_words,
-    local_time,
     reversals,
     run_name,
     sensor_words,
@@ -47,7 +47,7 @@ def standing_line(view: WatchView) -> Content:
 
 def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
     loud = [
-        Content.assemble((f"▲ {alarm.sentence}", "bold $text-error"), (f"  since {local_time(alarm.since)}", ""))
+        Content.assemble((f"▲ {alarm.sentence}", "bold $text-error"), (f"  since {clock_time(alarm.since)}", ""))
         for alarm in unseen
     ]
     quiet = [Content.styled(f"  seen: {alarm.sentence}", MUTED) for alarm in seen]
@@ -90,14 +90,14 @@ def details(view: WatchView) -> Content:
     answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
     parts: list[Piece] = [
         *_section("Session", [f"{view.subject}, {who}, {answers}", view.protocol, f"Device: {view.device}"]),
-        *_section("Forms", [f"{local_time(f.utc)}  {f.form}: {_passed(f.passed)}" for f in view.forms]),
+        *_section("Forms", [f"{clock_time(f.utc)}  {f.form}: {_passed(f.passed)}" for f in view.forms]),
         *_section(
             "Practice",
             [f"{p.frequency_hz:g} Hz: {p.right} right of {p.of}, {_passed(p.passed)}" for p in view.practice],
         ),
         *_section(
             "Notes",
-            [f"{local_time(n.utc)}  {'ADVERSE ' if n.adverse else ''}{n.who}: {n.text}" for n in view.notes],
+            [f"{clock_time(n.utc)}  {'ADVERSE ' if n.adverse else ''}{n.who}: {n.text}" for n in view.notes],
         ),
     ]
     return Content.assemble(*parts)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -127,3 +128,15 @@ def test_a_file_that_is_no_diagnosis_is_an_error_with_words(run, tmp_path):
     code, out, err = run("show", tmp_path / "x.json")
     assert (code, out) == (1, "")
     assert "x.json" in err
+
+
+def test_a_person_reads_local_times_and_a_script_reads_utc(run, taken, tmp_path, summer_and_winter):
+    data = Path(shutil.copytree(taken, tmp_path / "data"))
+    begun = datetime.fromisoformat(json.loads(run("sessions", "--data", data, "--json")[1])[0]["begun_utc"])
+    local = begun.astimezone()
+    assert f"{local:%Y-%m-%d %H:%M} +0{local.utcoffset().seconds // 3600}:00" in run("sessions", "--data", data)[1]
+    said = run("show", "P01_001", "--data", data, "--log")[1]
+    assert f"{local:%Y-%m-%d %H:%M:%S} +0" in said
+    assert f"{local:%H:%M:%S}  Session P01_001 began" in said
+    facts = dict(json.loads(run("show", "P01_001", "--data", data, "--json")[1])["facts"])
+    assert facts["begun"] == f"{begun:%Y-%m-%d %H:%M:%S} +00:00"

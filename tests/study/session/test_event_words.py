@@ -1,6 +1,7 @@
 """The log in words: a sentence for each kind of fact, without health and without open directions."""
 
 import typing
+from datetime import timedelta, timezone
 
 import pytest
 
@@ -142,7 +143,25 @@ def test_a_detection_trial_has_an_interval():
 def test_each_day_has_a_line_of_its_own():
     later = SessionClosed("2026-05-05T10:00:00+00:00", "completed")
     dates = [line for line in log_in_words((OPENED, MEASURED, later)) if "times are UTC" in line]
-    assert dates == ["2026-05-04 (times are UTC)", "2026-05-05 (times are UTC)"]
+    assert dates == ["2026-05-04 (times are UTC +00:00)", "2026-05-05 (times are UTC +00:00)"]
+
+
+def test_times_are_those_of_the_place_and_a_change_of_its_clock_has_a_line_of_its_own():
+    def zone(time):
+        """Clocks go back at 01:00 UTC."""
+        return time.astimezone(timezone(timedelta(hours=2 if time.hour < 1 else 1)))
+
+    told = [RestTaken(f"2026-10-25T{utc}:00.000+00:00", 0, 0, 60.0) for utc in ("00:30", "01:30")]
+    lines = log_in_words(told, zone)
+    assert [line[:8] for line in lines] == ["2026-10-", "02:30:00", "2026-10-", "02:30:00"]
+    assert [lines[0][11:], lines[2][11:]] == ["(times are UTC +02:00)", "(times are UTC +01:00)"]
+
+
+def test_a_time_that_cannot_be_converted_stays_as_it_is():
+    def none(time):
+        raise OverflowError
+
+    assert log_in_words([DemoFinished(UTC)], none) == (f"{UTC}  The demonstration is over.",)
 
 
 def test_control_characters_of_a_note_do_not_reach_the_terminal():

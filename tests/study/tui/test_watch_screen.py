@@ -295,7 +295,7 @@ def test_an_alarm_rings_until_it_is_seen_and_stays_on_the_screen(seated):
             await seat.show(view(alarms=(ALARM,), activity_s=float(look)))  # news keep coming
         assert len(seat.bells) == 3
         assert "ALARM: press a when you have seen it" in seat.text
-        assert "▲ The acceleration sensor is clipped: it reads too little. since 10:17:00" in seat.text
+        assert "▲ The acceleration sensor is clipped: it reads too little. since 10:17:00 +00:00" in seat.text
         await seat.press("a")
         assert "1 alarm seen." in seat.lines[1]
         await seat.pass_time(0.3 * RING_EVERY_S)
@@ -334,7 +334,7 @@ def test_details_show_forms_practice_and_notes(seated):
         assert "consent" not in seat.text
         await seat.press("d")
         for part in (
-            "09:40:00 consent: passed",
+            "09:40:00 +00:00 consent: passed",
             "45 Hz: 3 right of 5, NOT passed",
             "Asks for a lower chair",
             "a person",
@@ -348,7 +348,7 @@ def test_details_show_forms_practice_and_notes(seated):
 
 def test_a_wide_screen_shows_the_details_beside(seated):
     async def story(seat):
-        assert "10:01:00 experimenter: Asks for a" in seat.text
+        assert "10:01:00 +00:00 experimenter: Asks" in seat.text
         assert "the handle" in seat.text
 
     seated(story, size=(132, 40))

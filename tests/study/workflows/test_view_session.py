@@ -152,4 +152,4 @@ def test_whatever_happens_to_the_bytes_of_a_log_it_can_be_looked_at(session, see
 
 def test_a_simulated_session_that_ends_in_the_future_says_why(taken):
     finished = dict(session_view(taken).facts)["finished"]
-    assert finished.endswith("UTC, in simulated time, which runs ahead of the clock")
+    assert finished.endswith("+00:00, in simulated time, which runs ahead of the clock")
