@@ -57,6 +57,9 @@ def test_a_yes_typed_fast_into_the_exclusions_is_not_lost(sitting):
     terminal, log = sitting
     shown(terminal, "Is it too late today")
     terminal.type("1\r2\r1\r2\r\r")
+    # A yes ends the sitting, so it is asked once more.
+    shown(terminal, "Is that right?")
+    terminal.type("1\r\r")
     assert filled(log, "exclusion", terminal)["passed"] is False
 
 
