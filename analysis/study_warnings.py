@@ -177,7 +177,12 @@ def _flagged(trials: Iterable[Trial]) -> str:
 
 def _unmeasured(trials: Iterable[Trial]) -> str:
     count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
-    return f"{count} counted trial{'s' if count != 1 else ''} without a measured acceleration." * bool(count)
+    if not count:
+        return ""
+    return (
+        f"{count} counted trial{'s' if count != 1 else ''} without a measured acceleration: answered before a full "
+        "period of the steady stimulus was recorded, or the recording was lost. The answers count."
+    )
 
 
 def _lapsing(catches: Sequence[CatchTally]) -> str:

@@ -18,7 +18,7 @@ class TrialStatus(Enum):
     FLAGGED = "flagged"
     """Counts, but something about the stimulus is worth a look (a lean on the spring, late ticks)."""
     UNMEASURED = "unmeasured"
-    """Counts; its recording was lost (the program died after the answer was on disk)."""
+    """Counts; answered before a full period of the steady stimulus was recorded, or its recording was lost."""
     SPOILED = "spoiled"
     """Void: presented again as the next attempt of the same trial."""
     OPEN = "open"

@@ -17,6 +17,9 @@ from study.session.sitting_events import FormFilled, NoteTaken
 from study.session.state import SessionState
 from study.session.watch_view import FormLine, NoteLine
 
+NO_STEADY_PART = "no steady part to measure, or too little of it"
+"""A flag of logs before version 1.1: on nearly every trial, and no fault. Later logs have the status `unmeasured`."""
+
 
 @dataclass(frozen=True, slots=True)
 class Watched:
@@ -56,7 +59,7 @@ def follow(watched: Watched, event: Event) -> Watched:
         case TrialPresented():
             return replace(after, remarks=(*watched.remarks, ""))
         case TrialMeasured():
-            return _remarked(after, ", ".join(event.flags))
+            return _remarked(after, ", ".join(flag for flag in event.flags if flag != NO_STEADY_PART))
         case TrialSpoiled():
             return _remarked(after, event.reason)
         case FormFilled():

@@ -2,12 +2,14 @@
 
 from study.session.watch_view import ClosedTrial, WatchView
 from study.tui.watch_words import (
+    NOT_MEASURED,
     SYMBOLS,
     catch_words,
     clock_time,
     device_words,
     dose_words,
     handle_words,
+    not_measured,
     reversals,
     run_name,
     sensor_words,
@@ -54,6 +56,8 @@ def status(view: WatchView) -> list[str]:
         if run.reversals_needed:
             lines[-1] += f", {reversals(run)} reversals"
     lines += [f"Last       {_trial_line(trial)}" for trial in view.last[:3]]
+    if any(map(not_measured, view.last[:3])):
+        lines.append(f"           not measured: {NOT_MEASURED}")
     lines += [f"Note       {clock_time(note.utc)} {note.who}: {note.text}" for note in view.notes[:3]]
     return lines
 
@@ -74,6 +78,8 @@ def _trial_line(trial: ClosedTrial) -> str:
         parts.append(f"{trial.response_time_s:.1f} s")
     if trial.delivered_mps2 is not None:
         parts.append(f"{trial.delivered_mps2:.1f} m/s², {trial.off_axis_mps2 or 0.0:.1f} across")
+    elif not_measured(trial):
+        parts.append("not measured")
     if trial.reversal:
         parts.append("reversal")
     return ", ".join([*parts, *([trial.remark] if trial.remark else [])])

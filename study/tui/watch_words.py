@@ -16,6 +16,11 @@ SYMBOLS: dict[Standing, str] = {
 }
 
 
+NOT_MEASURED_MARK = "n.m."
+NOT_MEASURED = "answered too early to measure; counts"
+"""Fits beside the mark in a terminal of 80 columns."""
+
+
 def clock_time(utc: str) -> str:
     """On this computer's clock, without the date: "14:05:10 +01:00"; empty where there is no time."""
     date, time, offset = local_parts(utc, machine_zone)
@@ -74,6 +79,11 @@ def verdict(trial: ClosedTrial) -> str:
     if trial.correct:
         return "right"
     return "LAPSE" if trial.phase == "catch" else "wrong"
+
+
+def not_measured(trial: ClosedTrial) -> bool:
+    """Whether it counts without a measured acceleration."""
+    return trial.correct is not None and trial.delivered_mps2 is None
 
 
 def time_words(exposure: Exposure) -> str:

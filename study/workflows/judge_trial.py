@@ -18,7 +18,7 @@ class Judgement:
     """Of a void trial."""
 
 
-def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_whole: bool) -> Judgement:
+def judge(health: Health, settings: MeasurementSettings, felt_whole: bool) -> Judgement:
     """felt_whole: whether the stimulus was whole when the answer came; what stops it afterwards is only flagged."""
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
@@ -32,7 +32,6 @@ def judge(health: Health, measured: bool, settings: MeasurementSettings, felt_wh
         (health.total_clipped > 0, "leaned on the spring: stimulus reduced at the total cap"),
         (health.slew_limited > 0, "slew limited"),
         (health.sensor_clipped > 0, "accelerometer clipped"),
-        (not measured, "no steady part to measure, or too little of it"),
     )
     return Judgement("", tuple(text for seen, text in observed if seen))
 

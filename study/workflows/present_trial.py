@@ -46,7 +46,7 @@ def _close(state: SessionState, present: Present, played: Played, felt_whole: bo
     correct = state.answered is not None and state.answered.answer == present.label
     vector = direction_vector(state.protocol.directions, present.direction)
     values = delivered(played.recording, vector, present.frequency_hz) if played.recording else None
-    verdict = judge(played.health, values is not None, state.protocol.measurement, felt_whole)
+    verdict = judge(played.health, state.protocol.measurement, felt_whole)
     fault = played.health.fault
     leave = reason_to_leave(fault)
     if verdict.spoiled:

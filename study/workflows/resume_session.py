@@ -151,7 +151,7 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
     health = known_again(logged) if logged is not None else None
     verdict = Judgement("", ())
     if health is not None and logged is not None:
-        verdict = judge(health, True, state.protocol.measurement, logged.felt_whole)
+        verdict = judge(health, state.protocol.measurement, logged.felt_whole)
     missed_ticks = health.missed_ticks if health is not None else None
     vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
     if verdict.spoiled:

@@ -103,7 +103,8 @@ def measured(present: Present, outcome: Outcome, state: SessionState, sitting: S
         run=present.run,
         trial=present.trial,
         attempt=present.attempt,
-        status="flagged" if outcome.flags else "ok",
+        # Without a steady part there is nothing to measure, which is no fault: most quick answers come before it.
+        status="flagged" if outcome.flags else "unmeasured" if values is None else "ok",
         flags=outcome.flags,
         recording=saved.name if saved else None,
         sha256=saved.sha256 if saved else None,

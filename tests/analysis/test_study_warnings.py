@@ -88,7 +88,8 @@ def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):
     assert warnings([*able, spoiled], protocol) == (
         "1 spoiled presentation, played again; the answers do not count.",
         "1 trial flagged: counted, but the stimulus is worth a look.",
-        "1 counted trial without a measured acceleration.",
+        "1 counted trial without a measured acceleration: answered before a full period of the steady stimulus was "
+        "recorded, or the recording was lost. The answers count.",
     )
 
 

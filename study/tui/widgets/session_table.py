@@ -11,7 +11,7 @@ from study.local_clock import machine_zone
 from study.session.archive_views import SessionLine
 from study.session.local_time import local_time
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
-from study.tui.standing_words import STYLES, describe, standing_words
+from study.tui.standing_words import STYLES, standing_words
 
 COLUMNS = (("Standing", 12), ("Begun", 23), ("Runs", 5), ("Answers", 7), ("Protocol", 40))
 """With their widths in cells, so that nothing has to be measured in a long list. The session's name comes first."""
@@ -78,29 +78,17 @@ class SessionTable(DataTable[Content | str]):
             self.post_message(SessionWanted(self._chosen.path))
 
     def action_resume(self) -> None:
-        line = self._chosen
-        if line is None:
-            return
-        if line.standing == "unfinished":
-            self.post_message(ResumeWanted(line.path))
-        else:
-            self.notify(f"Nothing to resume. {describe(line)}", severity="warning")
+        if self._chosen is not None:
+            self.post_message(ResumeWanted(self._chosen.path))
 
     def action_watch(self) -> None:
-        line = self._chosen
-        if line is None:
-            return
-        if line.standing == "running":
-            self.post_message(WatchWanted(line.path))
-        else:
-            self.notify(f"Nothing to watch. {describe(line)}", severity="warning")
+        if self._chosen is not None:
+            self.post_message(WatchWanted(self._chosen.path))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Greyed out in the footer where the session under the cursor does not allow it."""
+        """Not in the footer where it does nothing for the session under the cursor."""
         wanted = {"resume": "unfinished", "watch": "running"}.get(action)
-        if wanted is not None and (self._chosen is None or self._chosen.standing != wanted):
-            return None
-        return True
+        return wanted is None or (self._chosen is not None and self._chosen.standing == wanted)
 
     def _tell(self) -> None:
         self.refresh_bindings()

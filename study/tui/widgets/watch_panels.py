@@ -6,12 +6,15 @@ from textual.content import Content
 
 from study.session.watch_view import Alarm, ClosedTrial, RunStatus, WatchedRun, WatchView
 from study.tui.watch_words import (
+    NOT_MEASURED,
+    NOT_MEASURED_MARK,
     SYMBOLS,
     catch_words,
     clock_time,
     device_words,
     dose_words,
     handle_words,
+    not_measured,
     reversals,
     run_name,
     sensor_words,
@@ -67,7 +70,11 @@ def trials_lines(view: WatchView, rows: int, columns: int) -> Content:
     trial = view.open_trial
     if trial is not None:
         lines.append(Content(f"{trial.trial + 1:>5} {trial.level_n:5.3g}  hidden until it is answered"))
-    lines += [_trial_line(row, columns) for row in view.last[: max(0, rows - len(lines))]]
+    room = max(0, rows - len(lines))
+    legend = [Content.styled(f"{NOT_MEASURED_MARK} {NOT_MEASURED}", MUTED)]
+    explained = room > 1 and any(map(not_measured, view.last[: room - 1]))
+    lines += [_trial_line(row, columns) for row in view.last[: room - explained]]
+    lines += legend * explained
     return Content("\n").join(lines)
 
 
@@ -127,10 +134,11 @@ def _trial_line(trial: ClosedTrial, columns: int) -> Content:
     word = verdict(trial)
     number = f"{trial.trial + 1}{'+' * min(trial.attempt, 2)}"
     left = f"{number:>5} {trial.level_n:5.3g} {_or_dash(trial.shown, 5)} {_or_dash(trial.answer, 4)} "
-    right = f"{_number(trial.response_time_s, 4)} {_number(trial.delivered_mps2, 4)} {_number(trial.off_axis_mps2, 4)}"
+    delivered = NOT_MEASURED_MARK if not_measured(trial) else _number(trial.delivered_mps2, 4)
+    right = f"{_number(trial.response_time_s, 4)} {delivered} {_number(trial.off_axis_mps2, 4)}"
     reversed_here = "↺" if trial.reversal else " "
     room = columns - len(left) - len(right) - 9
-    remark = trial.remark or ("" if trial.status in ("ok", "spoiled") else trial.status)
+    remark = trial.remark or ("measuring" if trial.status == "measuring" else "")
     if trial.phase == "catch":
         remark = f"catch {remark}".rstrip()
     shortened = remark if len(remark) <= room else f"{remark[: room - 1]}…"

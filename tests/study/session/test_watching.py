@@ -27,7 +27,7 @@ from study.session.events import (
 from study.session.live import Live
 from study.session.machine import Finish, Rest, next_action
 from study.session.void_reasons import SCREEN_LATE
-from study.session.watched import Watched, begin_watching, follow
+from study.session.watched import NO_STEADY_PART, Watched, begin_watching, follow
 from study.session.watching import Beside, watch_view
 
 BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)
@@ -242,6 +242,11 @@ def test_delivered_and_off_axis_acceleration_and_flags_are_shown(story):
     seen = story.answer(True, status="flagged", flags=("leaning on the spring", "late")).view().last[0]
     assert (seen.delivered_mps2, seen.off_axis_mps2) == (4.0, 3.0)
     assert (seen.status, seen.remark) == ("flagged", "leaning on the spring, late")
+
+
+def test_a_flag_that_older_logs_have_on_nearly_every_trial_is_not_shown(story):
+    seen = story.answer(True, status="flagged", flags=("late", NO_STEADY_PART)).view().last[0]
+    assert seen.remark == "late"
 
 
 def test_catch_trials_are_counted_and_are_no_points(with_parts):

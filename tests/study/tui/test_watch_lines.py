@@ -1,5 +1,6 @@
 """A followed session as lines of text."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -9,25 +10,30 @@ from study.tui.watch_lines import changes, status
 from study.tui.watch_words import duration
 from study.workflows.watch_session import follow
 
+TEXT = (
+    'name = "small"\nkind = "study"\ntitle = "A small study"\n[stimulus]\nfrequencies_hz = [25.0]\n'
+    "[staircase]\nstart_n = 1.0\ncap_n = 3.0\nup_after_wrong = 1\ndown_after_right = 3\n"
+    "steps = [{ step_db = 4.0, reversals = 3 }]\nreversals = 3\naveraged_reversals = 2\n[directions]\n"
+    "[safety]\nstimulus_cap_n = 3.0\ntotal_cap_n = 4.5\n"
+)
 
-@pytest.fixture(scope="module")
-def views(tmp_path_factory):
-    """After each line of a whole session."""
+
+def taken(data, text):
     from protocols.loading import load_protocol
     from study.devices.clock import VirtualClock
     from study.workflows.conduct_session import conduct_new
     from study.workflows.open_session import SessionPlan
     from study.workflows.simulated_participant import simulated_participant
 
-    data = tmp_path_factory.mktemp("data")
-    text = (
-        'name = "small"\nkind = "study"\ntitle = "A small study"\n[stimulus]\nfrequencies_hz = [25.0]\n'
-        "[staircase]\nstart_n = 1.0\ncap_n = 3.0\nup_after_wrong = 1\ndown_after_right = 3\n"
-        "steps = [{ step_db = 4.0, reversals = 3 }]\nreversals = 3\naveraged_reversals = 2\n[directions]\n"
-        "[safety]\nstimulus_cap_n = 3.0\ntotal_cap_n = 4.5\n"
-    )
     plan = SessionPlan(load_protocol(text, "small"), text, False, "S1", "scripted", 3, data)
-    whole = conduct_new(plan, "simulated", simulated_participant("scripted", 3, VirtualClock())).folder
+    return conduct_new(plan, "simulated", simulated_participant("scripted", 3, VirtualClock())).folder
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory):
+    """After each line of a whole session."""
+    data = tmp_path_factory.mktemp("data")
+    whole = taken(data, TEXT)
     growing = data / "copy" / whole.name
     growing.mkdir(parents=True)
     follower, seen = follow(growing), []
@@ -82,3 +88,13 @@ def test_the_status_names_all_that_matters(views):
 )
 def test_durations_are_rounded_down(seconds, words):
     assert duration(seconds) == words
+
+
+def test_too_little_to_measure_is_no_note_on_each_trial(tmp_path):
+    """The participant answers while the stimulus still fades in."""
+    text = TEXT.replace("[25.0]\n", "[25.0]\nfade_in_s = 2.0\n")
+    view = follow(taken(tmp_path, text).path).look(datetime.now(UTC).isoformat())
+    early = tuple(trial for trial in view.last if trial.status == "unmeasured")
+    assert early
+    assert {(trial.remark, trial.delivered_mps2) for trial in early} == {("", None)}
+    assert sum("answered too early to measure" in line for line in status(replace(view, last=early))) == 1

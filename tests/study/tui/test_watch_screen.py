@@ -409,3 +409,14 @@ def test_what_the_screen_says(seated, changes, words):
         assert words in seat.text
 
     seated(story, view(**changes))
+
+
+def test_what_was_not_measured_is_a_mark_with_one_explanation(seated):
+    async def story(seat):
+        assert seat.text.count("n.m. answered too early to measure; counts") == 1
+        assert seat.text.count("n.m.") > 3
+        assert "unmeasured" not in seat.text
+
+    rows = tuple(replace(trial, status="unmeasured", delivered_mps2=None) for trial in view().last)
+    for size in ((80, 24), (132, 40)):
+        seated(story, view(last=rows), size)

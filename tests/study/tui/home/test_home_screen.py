@@ -187,6 +187,15 @@ def test_what_it_does_not_allow_asks_for_nothing(on_screen, home, row, key):
     assert on_screen(HomeScreen(home), story).asked == []
 
 
+@pytest.mark.parametrize(("row", "offered"), [(0, {"Watch"}), (1, set()), (2, {"Resume"}), (3, set()), (4, set())])
+def test_keys_that_do_nothing_for_the_session_under_the_cursor_are_not_named(on_screen, home, row, offered):
+    async def story(sight):
+        await sight.press("f3", *["down"] * row)
+        assert {"Resume", "Watch"}.intersection(sight.lines[-1].split()) == offered
+
+    on_screen(HomeScreen(home), story)
+
+
 def test_the_session_under_the_cursor_is_told_in_a_sentence(on_screen, home):
     async def story(sight):
         await sight.press("f3", "down")
