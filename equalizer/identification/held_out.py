@@ -65,9 +65,11 @@ def _compared(model: IdentifiedModel, recording: Recording, segment: Segment) ->
     _check(model, recording)
     rate_hz = recording.sample_rate_hz
     start = max(0, segment.start - _lead(model))
+    gaps = np.flatnonzero(~np.isfinite(recording.command.samples[start : segment.start]).all(axis=1))
+    start += int(gaps[-1]) + 1 if len(gaps) else 0
     commands = recording.command.samples[start : segment.stop]
     response = recording.response.samples[start : segment.stop]
-    if not (np.isfinite(commands).all() and np.isfinite(response).all()):
+    if not (np.isfinite(commands).all() and np.isfinite(response[segment.start - start :]).all()):
         raise ValueError(f"samples {start} to {segment.stop} hold missing values; a test segment needs all of them")
     predicted = simulate(model, commands)
     last = _last_whole_part(segment) - start

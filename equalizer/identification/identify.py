@@ -169,7 +169,7 @@ def _identified(
         chosen=chosen,
         relaxed=slow,
         bound_costs=after.bound_costs,
-        remarks=(*fit_remarks(cost, misfit, slow, after.bound_costs, settings), *_outside_remark(chosen)),
+        remarks=(*fit_remarks(cost, misfit, slow, after.bound_costs, settings), *outside_remark(chosen)),
     )
 
 
@@ -192,7 +192,8 @@ def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> 
             )
 
 
-def _outside_remark(chosen: Candidate) -> list[str]:
+def outside_remark(chosen: Candidate) -> list[str]:
+    """Empty where the model stays small outside its band."""
     if chosen.sane:
         return []
     return [

@@ -4,10 +4,12 @@ estimate, or where the lines scatter more than their noise."""
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from equalizer.identification.experiments import periodic_looks
 from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.identify import Identified, identify
+from equalizer.identification.identify import Identified, identify, outside_remark
 from equalizer.identification.local_polynomial import smoothed
-from equalizer.identification.misfit_causes import UNEXPLAINED
+from equalizer.identification.misfit import misfit_of_estimate
+from equalizer.identification.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.settings import IdentificationSettings
 from equalizer.identification.settled_recordings import settled, slow_part
 from equalizer.identification.stable_poles import largest_radius
@@ -21,8 +23,8 @@ MOST_ROUNDS = 8
 SETTLED = 1e-4
 """Relative change of the slowest decay from round to round that is not worth another one."""
 SMOOTHED = (
-    "The lines scatter more than noise explains, as on a device with friction: the fit was made to a local average "
-    "over neighbouring lines (--no-smooth fits the lines themselves)."
+    "The lines differ from the model by more than their noise: the fit was made to a local average over neighbouring "
+    "lines (--no-smooth fits the lines themselves)."
 )
 
 
@@ -43,8 +45,23 @@ def identify_recordings(
     """smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, for they would
     blunt what it stands for; None: where the lines scatter more than their noise. `on_progress` is told the share
     done. Raises TransferEstimateError, IdentificationRefused."""
-    tell = on_progress or (lambda _: None)
     estimate = transfer_estimate(recordings)
+    looked_twice = _looked_twice(recordings)
+    if not looked_twice:
+        settings = replace(settings, longest_decay_s=settings.decay_s)
+    found = _fitted(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
+    if looked_twice and found.fitted is found.estimate:
+        return found
+    return _with_causes(found, settings, looked_twice)
+
+
+def _fitted(
+    estimate: FrequencyResponse,
+    recordings: tuple[Recording, ...],
+    settings: IdentificationSettings,
+    smooth: bool | None,
+    tell: Callable[[float], None],
+) -> IdentifiedRecordings:
     if smooth and settings.longest_decay_s is not None:
         return _smooth(estimate, recordings, settings, None, tell)
     identified = identify(estimate, settings, recordings, lambda share: tell(share / 2))
@@ -53,6 +70,29 @@ def identify_recordings(
         tell(1.0)
         return IdentifiedRecordings(estimate, estimate, identified)
     return _smooth(estimate, recordings, settings, identified, lambda share: tell(0.5 + share / 2))
+
+
+def _with_causes(
+    found: IdentifiedRecordings, settings: IdentificationSettings, looked_twice: bool
+) -> IdentifiedRecordings:
+    """What a fit to averages leaves always runs smoothly, for neighbours share their lines: only the lines tell."""
+    identified, averaged = found.identified, found.fitted is not found.estimate
+    misfit = misfit_of_estimate(identified.model, found.estimate) if averaged else identified.misfit
+    misfit = misfit if looked_twice else replace(misfit, smooth=None)
+    cost = misfit.cost if averaged else identified.cost
+    causes = fit_remarks(cost, misfit, identified.relaxed, identified.bound_costs, settings)
+    remarks = (*([SMOOTHED] if averaged else []), *causes, *outside_remark(identified.chosen))
+    return replace(found, identified=replace(identified, misfit=misfit, remarks=remarks))
+
+
+def _looked_twice(recordings: Sequence[Recording]) -> bool:
+    """Whether every experiment has two counted periods.
+
+    In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
+    relaxed on their evidence. Noise that is judged by the scatter of the lines does not tell what a misfit is, either.
+    """
+    looks = periodic_looks(recordings)
+    return bool(looks.experiments) and all(experiment.looks > 1 for experiment in looks.experiments)
 
 
 def _settled(
@@ -90,4 +130,6 @@ def _smooth(
         held = replace(settings, longest_decay_s=settings.decay_s)
         identified = identify(fitted, held, recordings, tell)
     tell(1.0)
-    return IdentifiedRecordings(estimate, fitted, replace(identified, remarks=(SMOOTHED, *identified.remarks)))
+    # Averaged lines do not tell what the bound costs, either.
+    bound_costs = known is not None and known.bound_costs
+    return IdentifiedRecordings(estimate, fitted, replace(identified, bound_costs=bound_costs))

@@ -18,9 +18,12 @@ NOISE_TRUSTED = 1.1
 class Misfit:
     error: float
     """Root mean square of model - estimate beyond the noise, relative to the response's; 0 where only noise is left."""
+    cost: float
+    """Squared difference over noise variance, mean over all entries of the lines: about 1 at the noise."""
     smooth: float | None
     """Correlation of what is left beyond the noise between neighbouring lines: near 1 for a linear answer that the
-    model lacks, near 0 for lines that scatter; None where only noise is left."""
+    model lacks, near 0 for lines that scatter; None where only noise is left, or where the noise itself was judged
+    by the scatter of the lines."""
 
 
 def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray) -> Misfit:
@@ -35,7 +38,7 @@ def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray) -
     if power > NOISE_TRUSTED * weighted.size and len(weighted) > 1:
         both = float((weighted[1:] * weighted[:-1].conj()).real.sum()) * len(weighted) / (len(weighted) - 1)
         smooth = both / (power - weighted.size)
-    return Misfit(float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300))), smooth)
+    return Misfit(float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300))), power / max(weighted.size, 1), smooth)
 
 
 def misfit_of_estimate(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:

@@ -35,14 +35,20 @@ def fit_remarks(
     if bound_costs:
         found.append(
             f"a pole sits on the bound of the decay, {bound_s:g} s, and without it the fit would improve beyond "
-            "noise: something rings longer; raise --longest-decay, or leave it out"
+            "noise: something rings longer, or the transient of a start is in a sweep without two counted periods; "
+            "record three periods of every sweep, or raise --longest-decay"
         )
     if cost > UNEXPLAINED and not bound_costs:
         left = f"the model leaves {np.sqrt(cost):.2g} times the noise"
-        if misfit.smooth is not None and misfit.smooth >= SMOOTH:
+        if misfit.smooth is None:
+            found.append(
+                f"{left}: the order {order} may be too low, or the device is not linear, as with friction; without two "
+                "counted periods of every sweep the lines do not tell which"
+            )
+        elif misfit.smooth >= SMOOTH:
             found.append(
                 f"{left}, and what is left runs smoothly from line to line, as a linear answer does: the order {order} "
-                "may be too low"
+                "may be too low; weak friction can do this too, and then a higher order does not help"
             )
         else:
             found.append(

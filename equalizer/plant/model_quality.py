@@ -84,5 +84,5 @@ def quality_brief(quality: ModelQuality | None) -> str:
 
 def worst_quality(found: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
     """Of several models: the largest expected error, or None where one of them is not known."""
-    known = [one for one in found if one is not None]
-    return max(known, key=lambda one: one.expected_error) if len(known) == len(found) and known else None
+    known = [quality for quality in found if quality is not None]
+    return max(known, key=lambda quality: quality.expected_error) if len(known) == len(found) and known else None

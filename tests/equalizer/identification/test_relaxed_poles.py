@@ -29,7 +29,7 @@ def device_of(plants, dampings, seed):
     ("dampings", "seed"),
     [
         ((0.01, 0.06, 0.05), 1),
-        ((0.02, 0.003, 0.05), 2),
+        pytest.param((0.02, 0.003, 0.05), 2, marks=pytest.mark.slow),
         pytest.param((0.06, 0.05, 0.001), 3, marks=pytest.mark.slow),
         pytest.param((0.001, 0.002, 0.003), 4, marks=pytest.mark.slow),
         pytest.param((0.005, 0.01, 0.002), 5, marks=pytest.mark.slow),
