@@ -83,8 +83,9 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=60,
-            description="A position that has not changed for so long is stale where the spring pulls with more than "
-            "friction_n: a hand that holds against a pull trembles by more than the resolution. Default 1.",
+            description="Where the spring pulls with more than friction_n at a position that does not change, half of "
+            "this later the pull is taken back within the other half. A hand that rests on the spring then gives way; "
+            "a position that has not changed even so is stale. Default 1.",
         ),
     ] = 1.0
 

@@ -5,7 +5,7 @@
     STIMULUS_CAP, FEEDBACK_CAP, TOTAL_CAP, SLEW_STEP, WATCHDOG_TICKS, LET_GO_TICKS,
     # What a reading may be: see `protocols.plausibility`.
     WORKSPACE, LONGEST_JUMP, FASTEST_STEP, ACCELERATION, ACCELERATION_SHARE, RESOLUTION, FRICTION,
-    STALE_TICKS, STILL_TICKS, SETTINGS_SIZE,
+    STALE_TICKS, EASE_TICKS, SETTINGS_SIZE,
 ) = range(23)  # fmt: skip
 """Cells of `settings`, fixed from opening to closing. SLEW_STEP in N per tick, FASTEST_STEP in m per tick,
 LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goes in one tick."""
@@ -23,13 +23,15 @@ LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goe
     TICKS, MISSED, STIMULUS_CLIPPED, FEEDBACK_CLIPPED, TOTAL_CLIPPED, SLEW_LIMITED, SENSOR_CLIPS, PEAK, RECORDED,
     # Of the readings: ticks since the one before, that one's tick and time, N of spring and damper together.
     ELAPSED, READ_AT, READ_AT_S, PULL, SHAKING, UNCHANGED,
+    # Share of PULL that was taken back from a position that stands still: now, and when the position last changed.
+    EASED, EASED_BEFORE,
     # Vectors: the place of their first component.
     FORCE, _FY, _FZ, EXCITATION, _EY, _EZ, LAST_POSITION, _XY, _XZ, VELOCITY, _VY, _VZ, LET_GO_FROM, _LY, _LZ,
     # LAST_STEP in m per tick; where the reading last changed; the motion that is expected meanwhile, m.
     LAST_STEP, _SY, _SZ, CHANGED, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
     LEAST, _AY, _AZ, MOST, _BY, _BZ,
     STATE_SIZE,
-) = range(74)  # fmt: skip
+) = range(76)  # fmt: skip
 """Cells of `state`."""
 
 STILL, PLAYING, RELEASING, LETTING_GO = range(4)

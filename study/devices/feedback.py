@@ -7,13 +7,17 @@ from equalizer.signals.signal import FloatArray
 from study.devices.cells import (
     CENTRE_X,
     DAMPING,
+    EASE_TICKS,
+    EASED,
     ELAPSED,
     FEEDBACK_CAP,
     FEEDBACK_CLIPPED,
+    FRICTION,
     LAST_POSITION,
     PULL,
     STIFFNESS,
     TICK_S,
+    UNCHANGED,
     VELOCITY,
     VELOCITY_SHARE,
 )
@@ -35,8 +39,20 @@ def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray
 
 
 @part
+def _ease(state: FloatArray, settings: FloatArray) -> None:
+    """A pull at a position that stands still is taken back slowly: dry friction holds a hand at rest as still as an
+    encoder that is frozen. A hand then gives way, and is seen; an encoder that says nothing even so is stale. What was
+    taken back stays so until the end of the hold."""
+    if state[UNCHANGED] >= settings[EASE_TICKS] and state[PULL] > settings[FRICTION]:
+        state[EASED] = min(1.0, state[EASED] + 1.0 / settings[EASE_TICKS])
+
+
+@part
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
-    """The spring, the damper and both together are each within FEEDBACK_CAP."""
+    """The spring, the damper and both together are each within FEEDBACK_CAP.
+
+    PULL is what they are before any easing.
+    """
     _track_velocity(state, settings, reading)
     cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
     x = stiffness * (reading[0] - settings[CENTRE_X])
@@ -48,8 +64,10 @@ def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, g
     x, y, z = spring * x + damper * u, spring * y + damper * v, spring * z + damper * w
     both = norm_of(x, y, z)
     kept = kept_share(both, cap)
-    force[0] -= gain * (kept * x)
-    force[1] -= gain * (kept * y)
-    force[2] -= gain * (kept * z)
     state[PULL] = abs(gain) * kept * both
+    _ease(state, settings)
+    share = gain * (1.0 - state[EASED])
+    force[0] -= share * (kept * x)
+    force[1] -= share * (kept * y)
+    force[2] -= share * (kept * z)
     state[FEEDBACK_CLIPPED] += max(of_spring, of_damper, both) > cap * BEYOND

@@ -188,4 +188,5 @@ def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz
     packed[cells.RESOLUTION] = bounds.resolution_m
     packed[cells.FRICTION] = bounds.friction_n
     packed[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
-    packed[cells.STILL_TICKS] = math.ceil(bounds.still_s * rate_hz)
+    # So long until the spring gives way to a position that stands still, and so long until it has.
+    packed[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))

@@ -11,6 +11,8 @@ from study.devices.cells import (
     ACCELERATION,
     ACCELERATION_SHARE,
     CHANGED,
+    EASED,
+    EASED_BEFORE,
     ELAPSED,
     EXCITATION,
     EXPECTED,
@@ -33,7 +35,6 @@ from study.devices.cells import (
     SHAKING,
     STALE,
     STALE_TICKS,
-    STILL_TICKS,
     TICK_S,
     UNCHANGED,
     WORKSPACE,
@@ -83,7 +84,15 @@ def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -
     for i in range(3):
         state[CHANGED + i] = reading[i]
         state[LEAST + i] = state[MOST + i] = state[EXPECTED + i]
+    state[EASED_BEFORE] = state[EASED]
     return True
+
+
+@part
+def _gave_way(state: FloatArray, settings: FloatArray, way: float) -> bool:
+    """Whether so much of the spring's pull was taken back that it must have moved even a gripped handle."""
+    taken_back = (state[EASED] - state[EASED_BEFORE]) * state[PULL]
+    return bool(taken_back > settings[FRICTION] + GRIPPED_N_PER_M * way)
 
 
 @part
@@ -94,9 +103,8 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
         return False
     state[UNCHANGED] += 1.0
     expected = max(state[MOST] - state[LEAST], state[MOST + 1] - state[LEAST + 1], state[MOST + 2] - state[LEAST + 2])
-    if state[UNCHANGED] >= settings[STALE_TICKS] and expected > STEPS_OF_RESOLUTION * settings[RESOLUTION]:
-        return True
-    return bool(state[UNCHANGED] >= settings[STILL_TICKS] and state[PULL] > settings[FRICTION])
+    way = STEPS_OF_RESOLUTION * settings[RESOLUTION]
+    return bool(state[UNCHANGED] >= settings[STALE_TICKS] and (expected > way or _gave_way(state, settings, way)))
 
 
 @part

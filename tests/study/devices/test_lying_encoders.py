@@ -93,7 +93,7 @@ MUTATIONS = {
         feedback, "stiffness * (reading[0]", "2.0 * stiffness * (reading[0]", "",
     ),
     "the spring pushes": (
-        feedback, "force[0] -= gain * (kept * x)", "force[0] += gain * (kept * x)", "spring: pushes",
+        feedback, "force[0] -= share * (kept * x)", "force[0] += share * (kept * x)", "spring: pushes",
     ),
     "three times the feedback's cap": (
         feedback, "cap, stiffness, damping = settings[FEEDBACK_CAP]",

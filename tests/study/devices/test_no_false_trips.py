@@ -79,6 +79,22 @@ def play_all(rigs, ticks: int, seconds: float) -> int:
     return seed
 
 
+@pytest.mark.parametrize(("lean_m", "frequency_hz", "level_n"), [(0.006, 10, 0.0), (0.0099, 40, 0.1), (0.02, 10, 0.0)])
+def test_a_hand_that_leans_on_the_spring_and_rests_is_believed(rigs, lean_m, frequency_hz, level_n):
+    """Dry friction holds it: the encoders say the same for seconds, while the spring pulls with up to 1.5 N."""
+    limits = replace(rigs.LIMITS, longest_hold_s=60.0, watchdog_s=5.0)
+    rig = RIGS_BY_NAME["simulated"](replace(rigs.SETTINGS, place_m=(lean_m, 0.0, 0.0)), 3)
+    governor = Governor(rig.info, replace(rigs.SETTINGS, limits=limits, spring_damping_n_s_per_m=0.0))
+    runner = CompiledRunner(rig, governor, 5000)
+    wave = np.sin(2 * np.pi * frequency_hz * np.arange(1000) / 1000)[:, None] * np.array([0.0, 0.7, 0.7]) * level_n
+    governor.begin_hold(replace(rigs.sine(), loop=rigs.force(wave)))
+    for _ in range(15):
+        governor.sign_of_life()
+        runner.run(1000)
+    assert governor.fault is Fault.NONE
+    assert governor.moving
+
+
 def test_no_honest_reading_ends_a_trial(rigs):
     assert play_all(rigs, 200_000, seconds=1.0) >= len(FREQUENCIES_HZ) * len(LEVELS_N)
 
