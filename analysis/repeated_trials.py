@@ -1,8 +1,9 @@
 """Who made presentations void often: by asking for them again, by pauses, by leaving, by answers outside the time.
 
-A second look helps whoever looks again when unsure. Under the first rules of a session, which drew a new stimulus,
-it moved thresholds by up to -2 dB; now that the same stimulus comes again it is a flag, because a longer look at an
-untimed stimulus gives as much.
+A second look helps a participant who looks again when unsure. Under the first rules of a session, which drew a new
+stimulus, it moved thresholds by up to -2 dB. Now the same stimulus comes again and the repeat key is limited; pauses
+and leaving are not, and without a limit second looks moved simulated thresholds by -1.9 to -4.8 dB. So a flag means
+that a threshold may be too low, not only that trials took longer.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +30,8 @@ def repeat_warning(trials: Sequence[Trial]) -> str:
         return ""
     return (
         f"Trials were often made void at will ({OFTEN_WORDS}: asked for again, paused, left, answered outside the "
-        f"time), which gives a second look at what was unsure: {listed([*people, *runs])}."
+        f"time). Each gives another look at what was unsure, so that thresholds may be too low by some dB: "
+        f"{listed([*people, *runs])}."
     )
 
 
