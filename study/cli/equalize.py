@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.seed import checked_seed
 
 if TYPE_CHECKING:
     from study.workflows.equalize_trajectory import EqualizePlan
@@ -37,7 +38,7 @@ def equalize(
     earlier: Annotated[
         Path | None, typer.Option("--from", help="Forces of an earlier run with --repeat, to go on from.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated device's noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Seed of the simulated device's noise.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Turn wanted accelerations (time_s,ax,ay,az) into forces (time_s,fx,fy,fz), row by row.

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from study.cli.seed import checked_seed
+
 app = typer.Typer(
     help="A blind test on your own device: draw what is changed, seal it, score it (docs/kit.md).",
     no_args_is_help=True,
@@ -18,7 +20,9 @@ LabelsArgument = Annotated[Path, typer.Argument(metavar="LABELS.csv", help="The 
 def draw(
     out: Annotated[Path, typer.Option(help="The table to write, LABELS.csv; for the one who changes the device.")],
     repeats: Annotated[int, typer.Option(min=1, max=20, help="Of each change; nothing is changed twice as often.")] = 2,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the order [default: one that nobody knows].")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, callback=checked_seed, help="Of the order [default: one that nobody knows].")
+    ] = None,
 ) -> None:
     """Draw the order of the changes. Whoever diagnoses must not see it."""
     from analysis.proof.lab_kit import CHANGES

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.seed import checked_seed
 
 
 def real(
@@ -23,7 +24,7 @@ def real(
             min=0, max=10_000, help="So many faults of sensor or clock are injected under a seal, and looked for."
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draws of these faults.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Of the draws of these faults.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.

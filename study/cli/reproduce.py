@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.seed import checked_seed
 
 
 def reproduce(
@@ -13,7 +14,9 @@ def reproduce(
         "reproduction"
     ),
     subjects: Annotated[int, typer.Option(min=2, max=1000, help="How many simulated participants.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the participants and of the sensor's noise.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, callback=checked_seed, help="Seed of the participants and of the sensor's noise.")
+    ] = 1,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
     as_json: JsonOption = False,
 ) -> None:

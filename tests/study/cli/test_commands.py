@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from study.cli.main import main
+from study.errors import ExitCode
 from study.store.protocol_files import shipped_protocols
 
 
@@ -364,3 +365,11 @@ def test_a_session_that_is_being_written_is_not_withdrawn(run, data):
     assert code == 1
     assert "Another program is writing to P01_001" in err
     assert (data / "P01_001" / "trials.csv").exists()
+
+
+@pytest.mark.parametrize("command", ["study", "rehearse", "noise OUT.wav"])
+def test_a_seed_that_no_file_holds_is_refused_before_anything_is_done(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command.split(), "--seed", str(2**128)]) == ExitCode.WRONG_USE
+    assert "This seed is too large" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
