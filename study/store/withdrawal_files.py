@@ -112,4 +112,6 @@ def _of(name: Any, subject: str) -> bool:
 
 def _inside(name: str) -> bool:
     path = PurePosixPath(name)
-    return bool(path.parts) and not path.is_absolute() and ".." not in path.parts
+    if not path.parts or path.is_absolute() or ".." in path.parts:
+        return False
+    return FOLDER.fullmatch(path.parts[0]) is None  # what is in a session goes with it, or is another's

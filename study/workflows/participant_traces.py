@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.store.archive import FOLDER, SessionFolder
+from study.store.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
 from study.store.real_folder import is_real_file, is_real_folder
 from study.store.regular_file import open_regular, read_regular
+from study.store.session_lock import LOCK_NAME
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 from study.store.withdrawal_files import read_tombstone
 from study.store.written_elsewhere import WRITTEN_ELSEWHERE
@@ -46,7 +47,8 @@ def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Trace
     for path in sorted(data.iterdir()):
         match = FOLDER.fullmatch(path.name)
         if match is not None and match["subject"] == subject:
-            if is_session_of(path, subject) or (path.name in proved and is_real_folder(path)):
+            # A log that came into the folder since is not erased for what the folder was.
+            if is_session_of(path, subject) or (path.name in proved and _was_session(path)):
                 sessions.append(path.name)
             else:
                 doubtful.append(_no_session(path, subject))
@@ -71,9 +73,17 @@ def is_session_of(path: Path, subject: str) -> bool:
     if not is_real_folder(path):
         return False
     folder = SessionFolder(path)
-    if _opening(folder) == (path.name, subject):
-        return True
+    if (opening := _opening(folder)) is not None:
+        return opening == (path.name, subject)
     return is_real_file(folder.tombstone) and read_tombstone(folder).get("session") == path.name
+
+
+def _was_session(path: Path) -> bool:
+    """Its log, which goes last, is erased, and nothing else has come into the folder since."""
+    if not is_real_folder(path):
+        return False
+    names = {inner.name for inner in path.iterdir() if PART.fullmatch(inner.name) is None}
+    return names <= {LOCK_NAME, TOMBSTONE_NAME}
 
 
 def analysis_names(folder: Path, subject: str) -> bool | None:

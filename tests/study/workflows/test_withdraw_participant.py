@@ -214,6 +214,22 @@ def test_an_intent_leads_nowhere_else(data, elsewhere):
     assert not (data / "analysis").exists()
 
 
+def test_a_log_of_another_in_a_folder_that_was_the_participants_is_not_erased(data, elsewhere):
+    shutil.rmtree(data / "P01_002")
+    shutil.copytree(data / "P02_001", data / "P01_002")
+    tombstone = {"format": "hapteq-tombstone", "version": 1, "session": "P01_002", "withdrawn_utc": UTC}
+    (data / "P01_002" / "withdrawn.json").write_text(json.dumps(tombstone))
+    (data / "P01_003").mkdir()
+    (data / "P01_003" / "mine.txt").write_text("not of a session")
+    sessions = {"P01_002": None, "P01_003": None}
+    left = {"subject": "P01", "withdrawn_utc": UTC, "sessions": sessions, "derived": ["P02_001/events.jsonl"]}
+    document = {"format": "hapteq-withdrawal", "version": 1, **left}
+    (data / "P01.withdrawal.json").write_text(json.dumps(document))
+    erase(data)
+    assert (data / "P01_002" / "events.jsonl").read_bytes() == (data / "P02_001" / "events.jsonl").read_bytes()
+    assert (data / "P01_003" / "mine.txt").exists()
+
+
 def test_what_an_earlier_version_left_half_erased_is_said_and_erased(data):
     """It wrote the tombstone first, and said that nothing was left but it."""
     left = {"format": "hapteq-tombstone", "version": 1, "session": "P01_001", "withdrawn_utc": UTC, "begun": None}
