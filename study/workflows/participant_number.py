@@ -1,5 +1,6 @@
 """Which participant of a protocol somebody is: chooses the row of a balanced order, and who has swapped labels."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -16,6 +17,10 @@ from study.store.withdrawal_files import Begun, begun_of_tombstone, read_intent
 from study.workflows.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
+NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
+"""In the first line, and in that of the place; the last that is there holds."""
+PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
+OF_A_PERSON = b'"observer":null'
 PRESENTED = b'"event":"trial_presented"'
 
 
@@ -24,7 +29,7 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
 
     Those who take part count: a person who refused, was excluded, or left before the place was taken has none.
     People and simulated participants are counted apart. Withdrawn ones keep their number, so that no row of a
-    balanced order is given twice; folders that cannot be read are passed over.
+    balanced order is given twice, and so do those whose log was damaged, as far as anything is left of it.
     """
     numbers = []
     for folder in session_folders(data):
@@ -50,8 +55,22 @@ def begun_in(folder: SessionFolder) -> Begun | None:
             return None
         name = tomllib.loads(opening.protocol_text).get("name", "")
     except (StudyError, OSError, TypeError, ValueError, RecursionError):
-        return None
+        return _begun_in_damaged(folder)
     return Begun(name, opening.observer is not None, _place(folder, opening))
+
+
+def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
+    """By what is left of a damaged log: a place that is held too long costs a row of the balanced order, a place that
+    is given twice costs its balance."""
+    try:
+        content = read_regular(folder.log)
+    except OSError:
+        return None
+    opening = content.partition(b"\n")[0]
+    name, numbers = PROTOCOL_NAME.search(opening), NUMBER.findall(content)
+    if name is None or not numbers:
+        return None
+    return Begun(name[1].decode(errors="replace"), OF_A_PERSON not in opening, int(numbers[-1]))
 
 
 def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:

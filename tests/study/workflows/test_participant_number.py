@@ -55,3 +55,14 @@ def test_a_damaged_older_session_does_not_keep_anybody_out(number, sitter):
     log.write_text("not a log\n")
     assert number("P01") == 0
     assert participant_number(sitter.data, "P02", "small", simulated=True) == 1
+
+
+def test_a_place_is_not_given_again_where_the_first_line_was_damaged(number, sitter):
+    assert [number("P01"), number("P02")] == [0, 1]
+    log = sitter.data / "P02_001" / "events.jsonl"
+    whole = log.read_bytes()
+    for old, new in ((b'"seed":', b'"sead":'), (b"{", b"["), (b'"subject":"P', b'"subject":"\xff'), (b'"seed":', b"")):
+        log.write_bytes(whole.replace(old, new, 1))
+        assert participant_number(sitter.data, "P03", "small", simulated=True) == 2, new
+        assert participant_number(sitter.data, "P03", "small", simulated=False) == 0
+        assert participant_number(sitter.data, "P03", "practice", simulated=True) == 0
