@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+from study.errors import StudyError
+from study.store.json_document import read_json
+from study.store.provenance import sha256_of
 from study.store.real_folder import is_real_folder
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 
@@ -11,7 +14,20 @@ ANALYSIS_NAME = "analysis"
 OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
 """Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""
 
-OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, "anova.json", "report.html")
+STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
+OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
+
+
+def is_analysis_of(out: Path, log: Path) -> bool:
+    """Whether the analysis in `out` is whole, its page being the last that is written, and of the log as it is now."""
+    if not (out / PAGE_NAME).is_file():
+        return False
+    try:
+        origin = read_json(out / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
+        parents = origin.get("parents") if isinstance(origin, dict) else None
+        return isinstance(parents, list) and {"file": log.name, "sha256": sha256_of(log)} in parents
+    except StudyError:
+        return False
 
 
 def written_by_analysis(out: Path) -> tuple[Path, ...]:

@@ -1,5 +1,6 @@
 """From a folder of sessions to thresholds.csv, detection.csv, anova.json, figures and one report."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from study.store.recording_file import read_recording
 from study.store.text_file import write_text
 from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.written_elsewhere import note_written
-from study.workflows.analysis_files import written_by_analysis
+from study.workflows.analysis_files import PAGE_NAME, written_by_analysis
 from study.workflows.collect_sessions import Collected, collect_sessions
 from study.workflows.picture_files import write_pictures
 from study.workflows.written_analysis import WrittenAnalysis
@@ -57,7 +58,7 @@ def analyze_data(
         thresholds=analysis.thresholds,
         table=tuple(text_table(analysis)),
         warnings=(*collected.finished, *collected.left_out, *analysis.warnings),
-        report=out / "report.html",
+        report=out / PAGE_NAME,
     )
 
 
@@ -131,8 +132,11 @@ def _write(
     figures = out / "figures"
     try:
         make_folder(figures)
+        if figures.is_symlink():
+            raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
+        # The report is the last that is written: as long as it is not there, all else may be half of the new.
         for stale in written_by_analysis(out):
-            if stale.parent == figures or stale.name == DETECTION_NAME:
+            if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
                 stale.unlink()
     except OSError as problem:
         raise CannotWriteError(figures, problem) from problem
@@ -144,7 +148,7 @@ def _write(
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figures, pictures)
     page = render_study_report(analysis, pictures, _shown(provenance, collected), local_now(), shapes)
-    write_text(out / "report.html", page, overwrite=True)
+    write_text(out / PAGE_NAME, page, overwrite=True)
 
 
 def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:

@@ -8,6 +8,7 @@ from study.session.counted import answers_are
 from study.session.void_reasons import TOO_BUSY
 from study.store.archive import SessionFolder
 from study.store.session_lock import locked
+from study.workflows.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.conduct_session import Conducted
 from study.workflows.fold_session import FoldedSession
 from study.workflows.prepare_sitting import does_not_take_part
@@ -38,7 +39,7 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
     if folded.state.turned_away_for_good:
         finish_tables(folder, folded)
         raise does_not_take_part(folded.state)
-    report = () if (folder.path / REPORT_NAME).exists() else (REPORT_NAME,)
+    report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
     due = (*due_results(folder, folded), *report)
     if not due:
         raise already_finished(folded.state, folder)

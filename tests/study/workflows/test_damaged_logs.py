@@ -13,14 +13,17 @@ import pytest
 
 from study.errors import StudyError
 from study.store.archive import SessionFolder
-from study.store.event_log import mend, read_log
+from study.store.event_log import LOG_NAME, mend, read_log
+from study.store.file_errors import CannotWriteError
+from study.store.json_document import write_json
 from study.store.log_seal import SEAL_NAME
+from study.store.provenance import sha256_of
 from study.workflows.collect_sessions import collect_sessions
 from study.workflows.end_sitting import finish_closed
 from study.workflows.fold_session import fold_session
 from study.workflows.participant_number import begun_in
 from study.workflows.session_line import session_line
-from study.workflows.session_results import due_results, write_tables
+from study.workflows.session_results import due_results, write_results, write_tables
 from study.workflows.validate import validate_file
 from study.workflows.view_session import session_view
 from study.workflows.watch_session import follow
@@ -149,6 +152,27 @@ def test_a_finished_session_is_finished_by_resume_and_then_said_to_be(session):
     assert "written now, because missing or out of date: seal.json, analysis/report.html" in written.warnings[0]
     with pytest.raises(StudyError, match="This session is finished"):
         finish_closed(folder, fold_session(folder))
+
+
+def test_a_report_from_before_the_end_is_written_again_by_resume(session):
+    folder = SessionFolder(session)
+    statistics, sha256 = session / "analysis" / "anova.json", sha256_of(folder.log)
+    statistics.parent.mkdir(exist_ok=True)
+    (statistics.parent / "report.html").write_text("of the log as it was in the middle")
+    write_json(statistics, "hapteq-anova", 1, {"provenance": {"parents": [{"file": LOG_NAME, "sha256": "0" * 64}]}})
+    assert "analysis/report.html" in finish_closed(folder, fold_session(folder)).warnings[0]
+    assert sha256 in statistics.read_text()
+
+
+def test_figures_that_are_a_link_are_not_written_through(session, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (session / "analysis").mkdir(exist_ok=True)
+    shutil.rmtree(session / "analysis" / "figures", ignore_errors=True)
+    (session / "analysis" / "figures").symlink_to(elsewhere)
+    with pytest.raises(CannotWriteError, match="link"):
+        write_results(SessionFolder(session))
+    assert list(elsewhere.iterdir()) == []
 
 
 def test_a_changed_table_and_a_changed_summary_are_named(session):
