@@ -58,7 +58,7 @@ def gather_provenance(
         protocol_hash=protocol_hash,
         seeds=seeds,
         settings=settings,
-        parents=tuple(Parent(path.name, sha256_of(path)) for path in parents),
+        parents=tuple(Parent(as_text(path.name), sha256_of(path)) for path in parents),
     )
 
 
@@ -70,6 +70,12 @@ def versions() -> dict[str, str]:
 def command_line(arguments: Sequence[str]) -> tuple[str, ...]:
     """File names only: paths tell about a machine and its owner, and mean nothing elsewhere."""
     return tuple(_without_folders(argument) for argument in arguments)
+
+
+def as_text(name: str) -> str:
+    """A file name may hold bytes that are not UTF-8, which Python carries as half characters: no text file takes
+    these."""
+    return name.encode(errors="replace").decode()
 
 
 def sha256_of(path: Path) -> str:
@@ -90,4 +96,5 @@ def _version(package: str) -> str:
 
 def _without_folders(argument: str) -> str:
     option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
-    return option + equals + (PurePath(value).name if "/" in value or "\\" in value else value)
+    name = PurePath(value).name if "/" in value or "\\" in value else value
+    return as_text(option + equals + name)

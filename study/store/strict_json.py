@@ -9,10 +9,11 @@ _LONGEST_NUMBER = 40
 """Digits of a whole number: seeds may have 128 bits."""
 
 
-def load_json(text: str | bytes) -> Any:
-    """Raises ValueError with a sentence fragment, and nothing else."""
+def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
+    """with_nan: numbers that are not known are NaN there. Raises ValueError with a sentence fragment, and nothing
+    else."""
     try:
-        found = json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
+        found = json.loads(text, parse_constant=None if with_nan else _refuse, parse_float=_finite, parse_int=_whole)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     _check(found)

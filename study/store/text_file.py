@@ -16,5 +16,6 @@ def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:
 
 
 def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Line ends are written as they are, so that a file is the same on every system."""
-    write_atomically(path, text.encode("utf-8"), overwrite=overwrite)
+    """Line ends are written as they are, so that a file is the same on every system. Half characters (of a file name
+    that is not UTF-8, say) become question marks."""
+    write_atomically(path, text.encode("utf-8", errors="replace"), overwrite=overwrite)

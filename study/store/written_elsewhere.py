@@ -1,12 +1,14 @@
 """Which folders outside a data folder hold numbers of its participants: noted, so that a withdrawal can name them."""
 
+import os
 from contextlib import suppress
 from pathlib import Path
 
 from study.store.archive import FOLDER
-from study.store.file_errors import CannotReadError, CannotWriteError
+from study.store.atomic_write import write_atomically
+from study.store.file_errors import CannotWriteError
 from study.store.real_folder import is_real_file
-from study.store.text_file import read_text, write_text
+from study.store.regular_file import DOCUMENT_BYTES, read_regular
 
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"
 
@@ -24,8 +26,8 @@ def note_written(source: Path, out: Path) -> None:
     if found or out in known:
         return
     text = "".join(f"{path}\n" for path in (*known, out))
-    with suppress(CannotWriteError):
-        write_text(data / WRITTEN_ELSEWHERE, text, overwrite=True)
+    with suppress(CannotWriteError):  # names as the system has them, which need not be UTF-8
+        write_atomically(data / WRITTEN_ELSEWHERE, os.fsencode(text), overwrite=True)
 
 
 def written_elsewhere(data: Path) -> tuple[Path, ...]:
@@ -34,6 +36,6 @@ def written_elsewhere(data: Path) -> tuple[Path, ...]:
     if not is_real_file(note):
         return ()
     try:
-        return tuple(Path(line) for line in read_text(note).splitlines() if line)
-    except CannotReadError:
+        return tuple(Path(line) for line in os.fsdecode(read_regular(note, DOCUMENT_BYTES)).split("\n") if line)
+    except OSError:
         return ()

@@ -20,6 +20,7 @@ import analysis.diagnosis
 import equalizer
 import study
 from study.store.provenance import sha256_of
+from study.store.strict_json import load_json
 from study.store.text_file import read_text, write_text
 from study.workflows.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS
 
@@ -115,7 +116,7 @@ def _diagnosed(place: Path) -> dict[str, Any]:
     from study.store.mechanical_model_file import read_mechanical_model
     from study.store.recording_file import read_recording
 
-    asked = json.loads(read_text(place / SETTINGS))
+    asked = load_json(read_text(place / SETTINGS))
     recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
     clean = tuple(read_recording(path) for path in sorted(place.glob(f"{CLEAN}/*.h5")))
     settings = DiagnosisSettings(

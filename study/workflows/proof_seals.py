@@ -1,7 +1,6 @@
 """The seals of a proof: every label's hash, written before anything is answered, and compared ever after."""
 
 import hashlib
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ from study.errors import StudyError
 from study.store.file_errors import UnusableFileError
 from study.store.json_document import parse_json
 from study.store.provenance import sha256_of
+from study.store.strict_json import load_json
 from study.store.text_file import read_text, write_text
 from study.workflows.proof_folder import ANSWER, DIED, ProofFolder
 
@@ -50,7 +50,7 @@ def label_at(path: Path) -> dict[str, Any]:
 def answer_at(place: Path) -> dict[str, Any]:
     """An error that is not known is NaN there. Raises StudyError."""
     try:
-        said = json.loads(read_text(place / ANSWER))
+        said = load_json(read_text(place / ANSWER), with_nan=True)
     except ValueError as problem:
         raise UnusableFileError(place / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)) from problem
     if not isinstance(said, dict):

@@ -8,11 +8,14 @@ from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
 from analysis.proof.controlled import Controlled, controlled
 from study.challenge.controls import CONTROLS, Asked, Control
 from study.challenge.rig import Rig
+from study.errors import StudyError
 from study.store.mechanical_model_file import write_mechanical_model
 from study.store.recording_file import write_recording
+from study.store.strict_json import load_json
 from study.store.text_file import read_text, write_text
 from study.workflows.ask_engine import ask_engine, forget_recording, is_answered
-from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder
+from study.workflows.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.workflows.proof_seals import answer_at
 
 SHORT = Rig((0,), 1000, 3, steps=80)
 
@@ -49,14 +52,25 @@ def run_controls(
 def _given(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[str, ...]:
     """Writes what is not written yet; the settings come last."""
     known = folder.path / f"{control.name.replace(' ', '-')}.json"
-    if known.exists():
-        return tuple(json.loads(read_text(known)))
+    begun = f"{CONTROLS.index(control):02d}"
+    if (written := _names(known, begun)) is not None:
+        return written
     asked = control.draw(seed, rig)
-    names = tuple(f"{CONTROLS.index(control):02d}{number}" for number in range(len(asked)))
+    names = tuple(f"{begun}{number}" for number in range(len(asked)))
     for name, one in zip(names, asked, strict=True):
         _write(folder.open / name, one)
-    write_text(known, json.dumps(names) + "\n")
+    write_text(known, json.dumps(names) + "\n", overwrite=True)
     return names
+
+
+def _names(known: Path, begun: str) -> tuple[str, ...] | None:
+    """None where they are not written yet, or are not those that this program writes: they are then drawn again."""
+    try:
+        names = load_json(read_text(known))
+    except (StudyError, ValueError):
+        return None
+    ours = isinstance(names, list) and names == [f"{begun}{number}" for number in range(len(names))]
+    return tuple(names) if ours and names else None
 
 
 def _write(place: Path, one: Asked) -> None:
@@ -67,5 +81,5 @@ def _write(place: Path, one: Asked) -> None:
 
 
 def _said(place: Path) -> Diagnosis | None:
-    answer = json.loads(read_text(place / ANSWER))
+    answer = answer_at(place)
     return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])

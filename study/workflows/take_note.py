@@ -8,6 +8,7 @@ from study.store.archive import SessionFolder
 from study.store.event_log import EventLog, mend
 from study.store.log_seal import seal_log
 from study.store.log_writer import somebody_writes
+from study.store.provenance import as_text
 from study.store.session_lock import locked
 from study.workflows.ask_session import ask_session
 from study.workflows.fold_session import fold_session
@@ -20,6 +21,13 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     """
     if not note.text.strip():
         raise StudyError("There is nothing to note", "The text is empty.", "Give a sentence.")
+    if note.text != as_text(note.text):
+        raise StudyError(
+            "This note cannot be written",
+            "Its text holds bytes that are not UTF-8.",
+            "Type it again.",
+            saved="Nothing was changed.",
+        )
     if somebody_writes(folder.log):
         return ask_session(folder, note, clock)
     with locked(folder.path):

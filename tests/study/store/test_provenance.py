@@ -1,10 +1,13 @@
 import hashlib
 import json
+import os
 
 import pytest
 
 from study.store.file_errors import CannotReadError
+from study.store.json_document import read_json, write_json
 from study.store.provenance import PACKAGES, command_line, gather_provenance, sha256_of, versions
+from study.store.written_elsewhere import note_written, written_elsewhere
 
 
 def test_parents_are_named_without_their_folder_and_with_their_content(tmp_path):
@@ -40,3 +43,22 @@ def test_the_command_line_keeps_options_and_loses_folders():
 def test_a_parent_that_is_not_there_is_named(tmp_path):
     with pytest.raises(CannotReadError, match="There is no file"):
         sha256_of(tmp_path / "none")
+
+
+def test_file_names_that_are_not_utf8_do_not_stop_what_is_written(tmp_path):
+    name = os.fsdecode(b"caf\xe9")
+    path = tmp_path / f"{name}.h5"
+    path.write_bytes(b"x")
+    assert command_line(("/bin/hapteq", f"/data/{name}", name, f"--out={name}"))[1:] == ("caf?", "caf?", "--out=caf?")
+    origin = gather_provenance(parents=[path])
+    assert origin.parents[0].file == "caf?.h5"
+    write_json(tmp_path / "a.json", "some", 1, {"about": name}, origin)
+    assert read_json(tmp_path / "a.json", "some", 1)["about"] == "caf?"
+
+
+def test_copies_are_found_again_whatever_their_names_are(tmp_path):
+    outs = [tmp_path / "out" / name for name in ("plain", "line\u2028end", os.fsdecode(b"caf\xe9"))]
+    (tmp_path / "data").mkdir()
+    for out in outs:
+        note_written(tmp_path / "data", out)
+    assert written_elsewhere(tmp_path / "data") == tuple(outs)

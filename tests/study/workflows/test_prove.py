@@ -1,6 +1,7 @@
 """A bank from start to end on short recordings: sealed first, answered apart, revealed, and gone on with."""
 
 import json
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,7 +11,9 @@ import pytest
 
 from study.challenge.draw_bank import draw
 from study.errors import LeftError, StudyError
+from study.store.file_errors import UnusableFileError
 from study.workflows.proof_folder import ANSWER, RECORDING, ProofFolder, opened
+from study.workflows.proof_seals import answer_at
 from study.workflows.proof_summary import proof_lines, summary
 from study.workflows.prove import Wishes, prove
 from study.workflows.reveal_cases import reveal_cases
@@ -187,3 +190,11 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
 
 def test_the_short_bank_is_of_this_kind():
     assert {draw(SEED, number, True).rig.period for number in range(3)} == {1000}
+
+
+def test_an_answer_that_is_nested_without_end_is_named(tmp_path):
+    (tmp_path / ANSWER).write_text("[" * 100_000)
+    with pytest.raises(UnusableFileError, match="nested"):
+        answer_at(tmp_path)
+    (tmp_path / ANSWER).write_text('{"error": NaN}')
+    assert math.isnan(answer_at(tmp_path)["error"])

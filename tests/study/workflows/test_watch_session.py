@@ -295,3 +295,7 @@ def test_a_torn_line_is_kept_as_a_note_before_the_note(sitter):
 def test_an_empty_note_is_none(whole):
     with pytest.raises(StudyError, match="There is nothing to note"):
         take_note(whole, replace(NOTE, text="  "), RealClock())
+    before = whole.log.read_bytes()
+    with pytest.raises(StudyError, match="not UTF-8"):
+        take_note(whole, replace(NOTE, text=os.fsdecode(b"caf\xe9")), RealClock())
+    assert whole.log.read_bytes() == before
