@@ -61,7 +61,7 @@ def test_trials_that_a_busy_computer_spoiled_are_repeated_counted_and_told_at_th
     (told,) = screen.told
     assert told.startswith("The computer was too busy: 2 trials were void because of it in this sitting and repeated.")
     assert [note.text for note in of(end, NoteTaken)] == [told]
-    facts = dict(session_facts(fold_session(end.folder)))
+    facts = dict(session_facts(fold_session(end.folder), lambda moment: moment))
     assert facts["answers"].endswith("and 2 void presentations, 2 of them because the computer was too busy")
 
 

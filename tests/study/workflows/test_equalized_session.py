@@ -75,7 +75,7 @@ def test_a_level_is_the_highest_force_where_the_safety_cap_lies_above_that_of_th
 
 
 def test_what_is_within_reach_is_shown(conducted):
-    facts = dict(session_facts(fold_session(conducted.folder)))
+    facts = dict(session_facts(fold_session(conducted.folder), lambda moment: moment))
     reach = {scale.frequency_hz: scale.reachable_mps2 for scale in conducted.state.opened.equalized.levels}
     assert f"{reach[35.0]:.1f} m/s² at 35 Hz" in facts["within reach"]
     assert facts["equalizer"] == "identified model, order 3, 4 to 50 Hz"
