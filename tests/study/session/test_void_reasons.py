@@ -32,7 +32,7 @@ def test_a_silent_screen_is_put_down_to_the_computer_only_where_something_shows_
 
 
 def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol):
-    late = judge(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), True, small_protocol.measurement, True)
+    late = judge(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), small_protocol.measurement, True)
     assert late.spoiled == MISSED
     for reason in (SCREEN_LATE, Fault.STALLED.value, late.spoiled):
         assert computer_too_busy(reason)
