@@ -10,7 +10,9 @@ class Said:
         self._parts: dict[str, list[str]] = {}
 
     def add(self, part: str, sentence: str) -> None:
-        self._parts.setdefault(sentence, []).append(part)
+        parts = self._parts.setdefault(sentence, [])
+        if part not in parts:  # channels of one name, in several roles
+            parts.append(part)
 
     def sentences(self, every_part: Sequence[str]) -> tuple[str, ...]:
         """every_part: labels of all parts, to tell what holds for all of them."""

@@ -12,6 +12,8 @@ from study.workflows.validate import validate_file
 ACTUATOR = "vibration_actuator"
 EXPECTED = {
     # (folder, name): rate, samples, command unit, response channels and unit, segments, hold
+    ("bldc_motor", "bldc_motor_holding"): (1.0, 31666, "A", 1, "rad", 3, "linear"),
+    ("bldc_motor", "bldc_motor_running"): (1000.0, 15000, "A", 1, "rad/s", 2, "linear"),
     ("emps", "emps"): (1000.0, 2 * 24841, "N", 1, "m", 2, "zero-order"),
     ("f16_gvt", "f16_gvt"): (400.0, 7 * 24576, "N", 3, "m/s^2", 7, "band-limited"),
     ("f16_gvt", "f16_gvt_sweeps"): (400.0, 2 * 108477, "N", 3, "m/s^2", 2, "band-limited"),
@@ -19,9 +21,14 @@ EXPECTED = {
     ("haptic_paddle", "haptic_paddle_steps"): (2857.14, 89992, "N m", 1, "rad", 9, "zero-order"),
     ("haptic_paddle", "haptic_paddle_sensors"): (952.381, 11522, "rad", 1, "V", 2, "band-limited"),
     ("rack_drive", "rack_drive"): (2000.0, 1078, "m/s", 1, "N", 1, "linear"),
+    ("rotary_beam", "rotary_beam"): (500.0, 2500, "V", 2, "rad", 2, "zero-order"),
+    ("shaker_damper", "shaker_damper_a"): (100.0, 15010, "m", 1, "N", 10, "linear"),
+    ("shaker_damper", "shaker_damper_b"): (100.0, 12008, "m", 1, "N", 8, "linear"),
+    ("shaker_damper", "shaker_damper_c"): (100.0, 13509, "m", 1, "N", 9, "linear"),
     ("silverbox", "silverbox"): (610.3515625, 90421, "V", 1, "V", 10, "band-limited"),
     ("silverbox", "silverbox_growing_noise"): (610.3515625, 40575, "V", 1, "V", 2, "band-limited"),
     ("silverbox", "silverbox_schroeder"): (610.3515625, 131072, "V", 1, "V", 4, "band-limited"),
+    ("two_motor_drive", "two_motor_drive"): (1000.0, 240000, "N m", 1, "rad/s", 12, "zero-order"),
     (ACTUATOR, f"{ACTUATOR}_clip_condition1_clip"): (8820.0, 15876, "V", 1, "m/s^2", 1, "band-limited"),
     (ACTUATOR, f"{ACTUATOR}_clip_condition2_clip"): (8820.0, 15876, "V", 1, "m/s^2", 1, "band-limited"),
     (ACTUATOR, f"{ACTUATOR}_noise_condition1_noise"): (8820.0, 17640, "V", 1, "m/s^2", 2, "band-limited"),
@@ -136,3 +143,31 @@ def test_what_the_import_of_the_rack_did_is_said(imported, shared):
     logged = np.load(shared / "recordings" / "rack_drive" / "rack_drive.npz")
     stroke_m = -np.sum(logged["drive_speed_rpm"]) * 20 / 1000 / 60 / 1500
     assert found.recording.position.samples[-1, 0] == pytest.approx(stroke_m, rel=1e-3)
+
+
+def test_the_motors_current_is_what_its_speed_loop_makes_of_the_reference(imported):
+    found = imported("bldc_motor", "bldc_motor_running").recording
+    current, decided = found.command.samples[2:, 0], found.excitation.samples[2:, 0]
+    rest = current - (decided - 0.087 * found.response.samples[:-2, 0])
+    assert np.std(rest) < 0.1 * np.std(current)
+
+
+def test_the_beams_voltage_follows_the_angle_that_is_still_missing(imported):
+    found = imported("rotary_beam", "rotary_beam").recording
+    missing = found.excitation.samples[:, 0] - 9.5 * found.response.samples[:, 0]
+    slow = np.abs(missing) < 0.5
+    assert np.abs(found.command.samples[slow, 0]).mean() < 0.5
+    assert np.corrcoef(missing, found.command.samples[:, 0])[0, 1] > 0.5
+
+
+def test_odd_tests_of_the_shaken_device_are_fitted_and_even_ones_test(imported):
+    for setting in "abc":
+        segments = imported("shaker_damper", f"shaker_damper_{setting}").recording.segments
+        assert [segment.role for segment in segments] == [
+            ("fit", "test")[number % 2] for number in range(len(segments))
+        ]
+
+
+def test_repeats_of_the_two_motors_are_fitted_kept_and_tested(imported):
+    segments = imported("two_motor_drive", "two_motor_drive").recording.segments
+    assert [segment.role for segment in segments] == ["fit", "", "test"] * 4
