@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.document import NextExperiment, Rival
-from analysis.diagnosis.findings import BlackBox, Findings
+from analysis.diagnosis.result.findings import BlackBox, Findings
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect

@@ -3,23 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from analysis.diagnosis.assemble_findings import assembled
-from analysis.diagnosis.choose_measure import measure_of
-from analysis.diagnosis.clean_floor import CleanFloor
-from analysis.diagnosis.explain import Progress
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.impact_wording import IMPACTS_COMPARED
-from analysis.diagnosis.impacts import rattling
-from analysis.diagnosis.learn_clean_floor import learned_from
-from analysis.diagnosis.observed_parts import names_of_parts
-from analysis.diagnosis.patience import Patience, always
-from analysis.diagnosis.rivalry import Arena
-from analysis.diagnosis.screening import Mapper
-from analysis.diagnosis.search import Searched, searched
-from analysis.diagnosis.search_beside_sound import searched_beside_sound
-from analysis.diagnosis.seen_directly import seen_directly
-from analysis.diagnosis.tuning import tuning_of
-from analysis.diagnosis.verdict import judge
+from analysis.diagnosis.data.observed_parts import names_of_parts
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.result.assemble_findings import assembled
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
+from analysis.diagnosis.search.explain import Progress
+from analysis.diagnosis.search.impacts import rattling
+from analysis.diagnosis.search.learn_clean_floor import learned_from
+from analysis.diagnosis.search.patience import Patience, always
+from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.screening import Mapper
+from analysis.diagnosis.search.search import Searched, searched
+from analysis.diagnosis.search.search_beside_sound import searched_beside_sound
+from analysis.diagnosis.search.seen_directly import seen_directly
+from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

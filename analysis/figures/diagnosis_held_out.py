@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.diagnosis.findings import Course
+from analysis.diagnosis.result.findings import Course
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED, RETUNED, STAGES, Stage, ratio_ticks
 from analysis.figures.picture import Picture

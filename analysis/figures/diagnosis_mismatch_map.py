@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from analysis.diagnosis.mismatch_cells import MismatchCell
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.figures.diagnosis_style import STAGES, Stage
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, new_figure, say_nothing_to_draw

@@ -1,7 +1,7 @@
 """All figures of one diagnosis, in the order of the report."""
 
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.remainder_spectrum import remainder_spectra
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
 from analysis.figures.diagnosis_held_out import held_out_picture
 from analysis.figures.diagnosis_mismatch_map import mismatch_map_pictures
 from analysis.figures.diagnosis_remainder import remainder_picture

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from analysis.diagnosis.remainder_spectrum import RemainderSpectrum
+from analysis.diagnosis.result.remainder_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import written
 from analysis.figures.diagnosis_style import AFTER, RETUNED, power_of_ten
 from analysis.figures.picture import Picture

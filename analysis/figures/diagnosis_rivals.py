@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.explain import Explanation
-from analysis.diagnosis.hypothesis import Claim
-from analysis.diagnosis.rivalry import Contender
-from analysis.diagnosis.standing import Standing
+from analysis.diagnosis.errors.hypothesis import Claim
+from analysis.diagnosis.errors.standing import Standing
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.rivalry import Contender
 from analysis.figures.diagnosis_style import AFTER, RETUNED, ratio_ticks
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_nothing_to_draw

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.findings import Signature
+from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes, say_nothing_to_draw

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.diagnosis.distortion import Distortion, Kind
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.level_trends import PRESENT, LevelTrend, level_trends
+from analysis.diagnosis.localisation.distortion import Distortion, Kind
+from analysis.diagnosis.localisation.level_trends import PRESENT, LevelTrend, level_trends
+from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.unit_wording import share_text
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, listed

@@ -1,9 +1,9 @@
 """How a diagnosis was made, in words, with its own numbers."""
 
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.mismatch_cells import LEVEL, Margin
-from analysis.diagnosis.observed import FLOOR
-from analysis.diagnosis.output_error import BOUND
+from analysis.diagnosis.data.observed import FLOOR
+from analysis.diagnosis.errors.output_error import BOUND
+from analysis.diagnosis.localisation.mismatch_cells import LEVEL, Margin
+from analysis.diagnosis.result.findings import Findings
 from analysis.wording import listed
 
 _FREE = (

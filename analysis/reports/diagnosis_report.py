@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.localisation_words import localisation_sentences
-from analysis.diagnosis.plausibility import implausible_sentences
-from analysis.diagnosis.retuned_numbers import doubtful_sentences, retuned_sentence
-from analysis.diagnosis.wording import (
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.result.localisation_words import localisation_sentences
+from analysis.diagnosis.result.plausibility import implausible_sentences
+from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.wording import (
     answer_of,
     black_box_beats,
     black_box_sentence,

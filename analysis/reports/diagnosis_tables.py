@@ -5,10 +5,10 @@ from typing import Literal
 
 from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.retuned_numbers import all_numbers
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.result.retuned_numbers import all_numbers
+from analysis.diagnosis.result.wording import capital, ended, error_text
 from analysis.diagnosis.unit_wording import probability_text, share_text, value_text
-from analysis.diagnosis.wording import capital, ended, error_text
 from analysis.reports.page import Table
 from analysis.wording import NONE, p_value
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.real_answer import OwnNumber, PairOutcome, RealAnswer
+from analysis.diagnosis.result.real_answer import OwnNumber, PairOutcome, RealAnswer
+from analysis.diagnosis.result.wording import error_text
 from analysis.diagnosis.unit_wording import value_text
-from analysis.diagnosis.wording import error_text
 from analysis.figures.picture import Picture
 from analysis.figures.real_held_out import error_rows
 from analysis.proof.injected import InjectedOutcome

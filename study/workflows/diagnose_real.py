@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.answer_of_findings import answer_of_findings, named_sentences
-from analysis.diagnosis.belonging import NothingToDiagnose, require_model_of, require_something
+from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of, require_something
+from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.explain import Progress
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.force_driven import all_force_driven
-from analysis.diagnosis.learn_clean_floor import NothingLearned
-from analysis.diagnosis.patience import Patience
-from analysis.diagnosis.played_errors import PlayedError, played_error
-from analysis.diagnosis.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
-from analysis.diagnosis.verdict import EXPLAINED
+from analysis.diagnosis.errors.played_errors import PlayedError, played_error
+from analysis.diagnosis.result.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.result.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
+from analysis.diagnosis.search.explain import Progress
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned
+from analysis.diagnosis.search.patience import Patience
+from analysis.diagnosis.search.verdict import EXPLAINED
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError

@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.explain import Progress
-from analysis.diagnosis.findings import Findings
-from analysis.diagnosis.learn_clean_floor import NothingLearned
-from analysis.diagnosis.screening import Mapper
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.search.explain import Progress
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned
+from analysis.diagnosis.search.screening import Mapper
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording

@@ -3,7 +3,7 @@
 from typing import Any
 
 from analysis.diagnosis.document import FORMAT, VERSION, Errors, diagnosis_to_json
-from analysis.diagnosis.wording import error_text, summary_lines
+from analysis.diagnosis.result.wording import error_text, summary_lines
 from study.workflows.diagnose_recordings import DiagnosedRecordings
 from study.workflows.write_diagnosis import MODEL_NAME, PAGE_NAME
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.belonging import (
+from analysis.diagnosis.data.belonging import (
     NothingToDiagnose,
     require_alike,
     require_different,
     require_model_of,
     require_something,
 )
-from analysis.diagnosis.carried_weight import weighted
-from analysis.diagnosis.force_driven import all_force_driven
-from analysis.diagnosis.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.wording import listed
 from equalizer.identification.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.diagnosis.experiment_menu import Experiment, experiment_menu
+from analysis.diagnosis.result.experiment_menu import Experiment, experiment_menu
 from analysis.proof.follow_up import FollowUp
 from analysis.proof.outcome import Outcome
 from study.challenge.drive_plan import RATE_HZ

@@ -12,7 +12,8 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter
 
-from analysis.diagnosis import document, real_answer
+from analysis.diagnosis import document
+from analysis.diagnosis.result import real_answer
 from analysis.reproduction import document as reproduction_document
 from analysis.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.choose_measure import measure_of
-from analysis.diagnosis.explain import retuned_alone
-from analysis.diagnosis.observed_parts import part_of
-from analysis.diagnosis.played_errors import played_error
-from analysis.diagnosis.real_answer import RealAnswer
-from analysis.diagnosis.rivalry import Arena
-from analysis.diagnosis.standing import rms_over
-from analysis.diagnosis.tuning import tuning_of
+from analysis.diagnosis.data.observed_parts import part_of
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.played_errors import played_error
+from analysis.diagnosis.errors.standing import rms_over
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.diagnosis.search.explain import retuned_alone
+from analysis.diagnosis.search.rivalry import Arena
 from analysis.proof.injected import DETECTABLE, InjectedOutcome, outcome_of
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.real_answer import RealAnswer
+from analysis.diagnosis.result.real_answer import RealAnswer
 from study.errors import StudyError
 from study.store.provenance import Provenance, gather_provenance
 from study.store.real_answer_file import read_answer_and_origin

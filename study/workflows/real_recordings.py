@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 
-from analysis.diagnosis.real_answer import RealAnswer
+from analysis.diagnosis.result.real_answer import RealAnswer
 from analysis.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError

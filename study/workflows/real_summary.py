@@ -1,7 +1,7 @@
 """What is said of a folder of real recordings at the end, in lines."""
 
-from analysis.diagnosis.real_answer import RealAnswer
-from analysis.diagnosis.wording import error_text
+from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.diagnosis.result.wording import error_text
 from analysis.proof.injected import injected_figures
 from analysis.reports.injected_section import figure_text
 from analysis.reports.real_report import VERDICT_WORDS

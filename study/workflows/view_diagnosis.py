@@ -4,7 +4,7 @@ from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.wording import (
+from analysis.diagnosis.result.wording import (
     effect_sentence,
     inseparable_sentence,
     remainder_sentence,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from analysis.diagnosis.findings import Findings
+from analysis.diagnosis.result.findings import Findings
 from analysis.figures.diagnosis_pictures import diagnosis_pictures
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from study.local_clock import local_now

@@ -93,9 +93,9 @@ def device() -> Callable[..., InventedDevice]:
 def arena_of(diagnosed) -> Callable[..., Any]:
     """What the engine's parts share, over the recording of a small simulated device; see `tests/diagnosed.py`. Imported
     late: it compiles."""
-    from analysis.diagnosis.choose_measure import measure_of
-    from analysis.diagnosis.rivalry import Arena
-    from analysis.diagnosis.tuning import tuning_of
+    from analysis.diagnosis.errors.choose_measure import measure_of
+    from analysis.diagnosis.errors.tuning import tuning_of
+    from analysis.diagnosis.search.rivalry import Arena
 
     def arena(effects=(), given=None, axes=1, seed=4):
         recording = diagnosed.recorded(axes, effects, seed)
@@ -110,10 +110,10 @@ def arena_of(diagnosed) -> Callable[..., Any]:
 def standing_at() -> Callable[..., Any]:
     """A contender with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
     one."""
-    from analysis.diagnosis.hypothesis import NOTHING, Claim, claimed, together
-    from analysis.diagnosis.output_error import Fitted
-    from analysis.diagnosis.rivalry import Contender
-    from analysis.diagnosis.standing import Standing
+    from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
+    from analysis.diagnosis.errors.output_error import Fitted
+    from analysis.diagnosis.errors.standing import Standing
+    from analysis.diagnosis.search.rivalry import Contender
     from equalizer.effects.catalogue import EFFECTS
 
     def contender(seen, *names, test=None, sites=(0,)):

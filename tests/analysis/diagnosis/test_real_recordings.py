@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.diagnosis.choose_measure import measure_of
+from analysis.diagnosis.data.force_driven import force_driven
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.force_driven import force_driven
-from analysis.diagnosis.rigid_model import rigid_model
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.rigid_model import rigid_model
 from study.workflows.import_recording import read_foreign
 
 FRICTION = {"coulomb_friction", "asymmetric_friction", "stribeck_friction"}

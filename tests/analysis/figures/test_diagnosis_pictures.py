@@ -7,8 +7,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.text import Annotation
 
-from analysis.diagnosis.mismatch_cells import MismatchCell
-from analysis.diagnosis.remainder_spectrum import remainder_spectra
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
+from analysis.diagnosis.result.remainder_spectrum import remainder_spectra
 from analysis.figures.diagnosis_held_out import draw_held_out, telling_excerpt
 from analysis.figures.diagnosis_mismatch_map import draw_mismatch_map, mismatch_map_pictures
 from analysis.figures.diagnosis_remainder import draw_remainder

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.document import Errors, Estimate, Fit, Mismatch, Rival
-from analysis.diagnosis.findings import BlackBox
-from analysis.diagnosis.plausibility import implausible_sentences
-from analysis.diagnosis.wording import moved_of, summary_lines
+from analysis.diagnosis.result.findings import BlackBox
+from analysis.diagnosis.result.plausibility import implausible_sentences
+from analysis.diagnosis.result.wording import moved_of, summary_lines
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.diagnosis_tables import channel_table, mismatch_table, parameter_table, retuned_table, rival_table

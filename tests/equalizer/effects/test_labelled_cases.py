@@ -6,13 +6,13 @@ import json
 import numpy as np
 import pytest
 
-from analysis.diagnosis.candidates import candidates
-from analysis.diagnosis.free_simulation import FreeSimulation
-from analysis.diagnosis.gather_evidence import gather_evidence
-from analysis.diagnosis.hypothesis import NOTHING
-from analysis.diagnosis.observed import observed
-from analysis.diagnosis.output_error import evaluated, fit, sensitivity
-from analysis.diagnosis.tuning import tuning_of
+from analysis.diagnosis.data.observed import observed
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.search.candidates import candidates
 from equalizer.effects.catalogue import EFFECTS
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.learn_clean_floor import NothingLearned
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.errors import LeftError, StudyError, WrongUseError
 from study.store.diagnosis_file import read_diagnosis

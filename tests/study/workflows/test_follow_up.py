@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from analysis.diagnosis.experiment_menu import experiment_menu
+from analysis.diagnosis.result.experiment_menu import experiment_menu
 from analysis.proof.follow_up import FollowUp, follow_up_figures
 from study.challenge.draw_bank import draw
 from study.errors import StudyError

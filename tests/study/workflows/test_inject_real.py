@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.played_errors import played_error
+from analysis.diagnosis.errors.played_errors import played_error
 from equalizer.effects.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording, Segment

@@ -1,0 +1,57 @@
+"""The motion that a recording holds, as positions of the driven axes' own outputs, and its noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from equalizer.effects.sensor_path import before_low_pass
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredMotion:
+    position: FloatArray
+    """(n, m), finite, of the rows of the model's first m outputs."""
+    noise: FloatArray
+    """(lines, m): density of its noise, as `ChannelNoise.density`; NaN where unknown."""
+
+
+def has_motion(recording: Recording, model: MechanicalModel) -> bool:
+    """Whether positions or velocities of every driven axis were measured: accelerations tell nothing of slow forces."""
+    return model.outputs >= model.inputs and (
+        _has_position(recording, model) or DERIVATIVE_OF_QUANTITY[model.quantity] < 2
+    )
+
+
+def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFloor) -> MeasuredMotion:
+    """The position where it was measured, else the response; see `has_motion`."""
+    m, rate_hz = model.inputs, recording.sample_rate_hz
+    if _has_position(recording, model):
+        assert recording.position is not None
+        noise = floor.position if floor.position is not None else floor.response
+        return MeasuredMotion(_filled(recording.position.samples[:, :m]), noise.density[:, :m])
+    samples = before_low_pass(_filled(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
+    density = floor.response.density[:, :m]
+    if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
+        return MeasuredMotion(samples, density)
+    slowest = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
+    moved = cumulative_trapezoid(samples, dx=1 / rate_hz, axis=0, initial=0.0)
+    return MeasuredMotion(moved, density / (2 * np.pi * slowest) ** 2)
+
+
+def _has_position(recording: Recording, model: MechanicalModel) -> bool:
+    return recording.position is not None and recording.position.samples.shape[1] == model.outputs
+
+
+def _filled(samples: FloatArray) -> FloatArray:
+    """Straight across what is missing."""
+    whole, places = np.array(samples), np.arange(len(samples))
+    for column in whole.T:
+        known = np.isfinite(column)
+        if known.any() and not known.all():
+            column[:] = np.interp(places, places[known], column[known])
+    return whole

@@ -1,0 +1,116 @@
+"""How a model's bodies moved, from what was measured: states, and the force along each axis that the model lacks.
+
+A Kalman smoother; the missing force is taken for a random walk (a latent force, Alvarez and others 2009; Rogers and
+Friis 2021). Unlike deconvolution it bears plants that drift.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.smoother_kernel import smooth
+from equalizer.effects.sensor_path import before_low_pass
+from equalizer.plant.linear_simulation import LinearSteps, linear_steps
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+EXPECTED = 0.1
+"""Rms by which a missing force may change, as a share of the command's,"""
+CHANGES_S = 0.005
+"""within such a time."""
+_LEAK = 1e-5
+"""Share of the state that is forgotten per sample: where sensors see no drift, a filter without it does not exist."""
+_STIRRED = 1e-12
+"""Variance that all states gain per sample, in their own size: an equation of exact states has no stable solution."""
+_DOUBLINGS = 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmoothedMotion:
+    states: FloatArray
+    """(n, 2 coordinates): positions, then velocities, just before each command is written."""
+    axis_position: FloatArray
+    """(n, m)"""
+    axis_velocity: FloatArray
+    missing_force: FloatArray
+    """(n, m), N"""
+
+
+def smoothed_motion(model: MechanicalModel, record: Observed, forces: FloatArray, unit: FloatArray) -> SmoothedMotion:
+    """forces: (n, m), what enters along the axes over each sample's time, effects included. unit: (c,), standard
+    deviations of the measured channels. Raises numpy.linalg.LinAlgError where no filter exists."""
+    rate_hz, m = record.recording.sample_rate_hz, model.inputs
+    steps, size = linear_steps(model, 1 / rate_hz), 2 * model.coordinates
+    advance = np.eye(size + m)
+    advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
+    advance *= 1 - _LEAK
+    look, direct = _looks(steps, record.measured.shape[1])
+    expected = EXPECTED * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
+    walk = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
+    gain, back = _gains(advance, look / unit[:, None], walk, _large(steps, expected))
+    gain = gain / unit[None, :]
+    seen = _without_direct(model, record, forces, direct)
+    pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
+    out = np.zeros((len(forces), size + m))
+    first = seen[np.isfinite(seen).all(axis=1)][:1]
+    if len(first):
+        out[0] = np.linalg.pinv(look, rcond=1e-6) @ first[0]
+    smooth(
+        advance, look, np.ascontiguousarray(gain), back, np.ascontiguousarray(pushed), np.ascontiguousarray(seen), out
+    )
+    moved = out[:, :size] @ steps.motion[: 2 * m].T
+    return SmoothedMotion(out[:, :size], moved[:, :m], moved[:, m:], out[:, size:])
+
+
+def _looks(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
+    """(c, s + m) of the state and the missing force; (c, m) of the force that acted just before."""
+    p, m = len(steps.position), steps.by_axis_force.shape[1]
+    of_state = np.vstack([steps.response, steps.position])[:channels]
+    of_force = np.vstack([steps.response_by_axis_force, np.zeros((p, m))])[:channels]
+    return np.ascontiguousarray(np.hstack([of_state, of_force])), of_force
+
+
+def _without_direct(model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray) -> FloatArray:
+    seen, p = np.array(record.measured), model.outputs
+    if model.sensor.bandwidth_hz > 0:
+        seen[:, :p] = before_low_pass(seen[:, :p], record.recording.sample_rate_hz, model.sensor.bandwidth_hz)
+    seen[1:] -= forces[:-1] @ direct.T
+    return seen
+
+
+def _large(steps: LinearSteps, expected: FloatArray) -> FloatArray:
+    """(s + m,): how far the expected force takes each state while it changes."""
+    n = len(steps.advance) // 2
+    fast = np.abs(steps.by_axis_force[n:]) @ expected / steps.step_s * CHANGES_S
+    fast = np.maximum(fast, 1e-6 * fast.max())
+    return np.concatenate([fast * CHANGES_S, fast, expected])
+
+
+def _gains(advance: FloatArray, look: FloatArray, walk: FloatArray, large: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of the filter, (s, c), and of the way back, (s, s). look: of channels in units of their noise. Solved in units in
+    which the states are alike large."""
+    eye = np.eye(len(look))
+    scaled, seeing = advance * large[None, :] / large[:, None], look * large[None, :]
+    stirred = np.diag(walk / large**2) + _STIRRED * np.eye(len(advance))
+    foreseen = _steady_covariance(scaled, seeing, stirred)
+    gain = np.linalg.solve(seeing @ foreseen @ seeing.T + eye, seeing @ foreseen).T
+    found = foreseen - gain @ seeing @ foreseen
+    back = np.linalg.lstsq(foreseen, scaled @ found, rcond=1e-13)[0].T
+    return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
+
+
+def _steady_covariance(advance: FloatArray, seeing: FloatArray, stirred: FloatArray) -> FloatArray:
+    """Of what is foreseen, by doubling the time that the filter has run (Anderson 1978; noise of the channels is 1).
+    Raises numpy.linalg.LinAlgError where it does not settle."""
+    along, told, found = advance.T, seeing.T @ seeing, stirred
+    for _ in range(_DOUBLINGS):
+        through = np.linalg.solve(np.eye(len(along)) + told @ found, np.hstack([along, told]))
+        one, other = through[:, : len(along)], through[:, len(along) :]
+        more = along.T @ found @ one
+        along, told, found = along @ one, told + along @ other @ along.T, found + (more + more.T) / 2
+        if not np.isfinite(found).all():
+            break
+        if np.abs(more).max() <= 1e-10 * np.abs(found).max():
+            return np.asarray(found)
+    raise np.linalg.LinAlgError("a filter for the motion does not settle")

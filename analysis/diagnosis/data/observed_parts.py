@@ -1,0 +1,113 @@
+"""Recordings as they are compared: cut where one part of them ends and the next, made after a pause, begins."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import KEPT_BACK, Mask, Observed, measured_of, roles
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+MOST_PERIODS = 4
+"""Of a segment, that decisions are made by: more of them repeat what is known, and take time."""
+LEAST_SAMPLES = 32
+"""Of a part that is worth comparing."""
+
+
+def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
+    """One per part of each recording. responses: how many position channels belong to the model's outputs.
+
+    Roles are those of the whole: where any recording has something to test, no other gives some of itself; where all
+    is marked as test, nothing is.
+    """
+    marked = [segment.role for one in recordings for segment in one.segments]
+    if marked and all(role == "test" for role in marked):
+        recordings = [_unmarked(one) for one in recordings]
+    tested = any(segment.role == "test" for one in recordings for segment in one.segments)
+    found: list[Observed] = []
+    for one in recordings:
+        measured, known = measured_of(one, responses)
+        fit, choose, test = roles(one.segments, len(one), tested)
+        masks = (*_without_repeats(fit & known, choose & known, ~_repeated(one)), test & known)
+        for start, stop in parts_of(one):
+            cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
+            part = part_of(one, start, stop)
+            found.append(Observed(part, part.command.samples, measured[start:stop], *cut))
+    return tuple(found)
+
+
+def samples_to_fit(recordings: Sequence[Recording]) -> int:
+    """With a response, and a position where it has one per response channel."""
+    return sum(int(one.fit.sum()) for one in observed_parts(recordings, len(recordings[0].response.channels)))
+
+
+def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
+    """Where all that was to choose by is missing or only repeats what was fitted to, the last quarter of what is left
+    is."""
+    if (choose & new).any() or not (fit & new).any():
+        return fit & new, choose & new
+    places = np.flatnonzero(fit & new)
+    last = places[int((1 - KEPT_BACK) * len(places)) :]
+    chosen: Mask = np.zeros(len(fit), dtype=np.bool_)
+    chosen[last] = True
+    return fit & new & ~chosen, chosen
+
+
+def _repeated(recording: Recording) -> Mask:
+    """(n,): what comes after enough periods of a segment."""
+    mask = np.zeros(len(recording), dtype=np.bool_)
+    for segment in recording.segments:
+        if segment.period > 0:
+            mask[segment.start + MOST_PERIODS * segment.period : segment.stop] = True
+    return mask
+
+
+def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
+    """First sample and the one after the last of each part; the whole where `meta` names no parts."""
+    named = recording.meta.get("parts")
+    parts = [
+        (int(one["start"]), int(one["stop"]))
+        for one in (named if isinstance(named, Sequence) and not isinstance(named, str) else ())
+        if isinstance(one, dict) and "start" in one and "stop" in one
+    ]
+    inside = [(start, stop) for start, stop in parts if start >= 0 and stop <= len(recording)]
+    return tuple(one for one in inside if one[1] - one[0] >= LEAST_SAMPLES) or ((0, len(recording)),)
+
+
+def part_of(recording: Recording, start: int, stop: int) -> Recording:
+    """Samples start to stop, with the segments that lie in them."""
+    if (start, stop) == (0, len(recording)):
+        return recording
+    segments = [_moved(one, start, stop) for one in recording.segments if one.stop > start and one.start < stop]
+    return replace(
+        recording,
+        command=recording.command.part(start, stop),
+        response=recording.response.part(start, stop),
+        position=_part(recording.position, start, stop),
+        excitation=_part(recording.excitation, start, stop),
+        time_s=None if recording.time_s is None else recording.time_s[start:stop],
+        segments=tuple(segments),
+    )
+
+
+def _part(signal: Signal | None, start: int, stop: int) -> Signal | None:
+    return None if signal is None else signal.part(start, stop)
+
+
+def _moved(segment: Segment, start: int, stop: int) -> Segment:
+    return replace(segment, start=max(segment.start, start) - start, stop=min(segment.stop, stop) - start)
+
+
+def _unmarked(recording: Recording) -> Recording:
+    return replace(recording, segments=tuple(replace(one, role="") for one in recording.segments))
+
+
+def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
+    """As `observed_parts` has them: of the recording, and which part where there are several."""
+    found: list[str] = []
+    for number, one in enumerate(recordings):
+        own = names[number] if number < len(names) else f"recording {number + 1}"
+        count = len(parts_of(one))
+        found += [own] if count == 1 else [f"{own}, part {part + 1}" for part in range(count)]
+    return tuple(found)

@@ -1,0 +1,8 @@
+"""How far a model with effects is from what was measured, and the fit that makes that distance small.
+
+In this order: `choose_measure` picks one of the error measures (`free_simulation`, `windows`, `predicted_force`;
+`band_power` for impacts, `coloured_measure` beside clean recordings) behind `error_measure`; `tuning` holds the model's
+own open numbers and `hypothesis` those of added effects; `output_error` fits both by least squares; `standing` and
+`intervals` say how good the fit is; `gather_evidence` turns what it leaves into a missing force (`unexplained_motion`,
+`missing_force`, `transfer`).
+"""

@@ -1,0 +1,114 @@
+"""What can be predicted of impacts: not when they come, but how strong each channel is in each band of each segment.
+
+The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two motions of a device
+that rattles, apart at first by less than any sensor sees, agree in it to a few per cent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.signal import welch
+
+from analysis.diagnosis.data.observed import Mask
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.standing import Standing
+from equalizer.signals.signal import FloatArray
+
+WINDOW_S, OCTAVES = 1.0, 0.5
+LOWEST, HIGHEST = 2.0, 0.48
+"""Edges of the bands: over a window's own line, and over the rate."""
+LONGEST_S, LEAST = 8.0, 256
+"""Of a stretch without segments, and samples of any stretch."""
+HEARD = 4.0
+"""Times the noise's power, from which a band counts."""
+PARTS = ("fit", "choose", "test")
+Residuals = tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Samples of one record that count for one purpose."""
+
+    record: int
+    first: int
+    last: int
+    part: str
+
+
+@dataclass(frozen=True, eq=False)
+class BandPower:
+    measure: ErrorMeasure
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        return tuple(
+            Stretch(number, first, last, part)
+            for number, record in enumerate(self.measure.records)
+            for first, last in self._spans(number)
+            for part in PARTS
+            for first, last in _inside(getattr(record, part), first, last)
+        )
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """(stretches, bands, c): logarithm of the amplitude; NaN where noise drowns it."""
+        power = self._power([record.measured for record in self.measure.records])
+        with np.errstate(divide="ignore"):
+            return np.where(power > HEARD * self._noise, 0.5 * np.log(power), np.nan)
+
+    def predicted(self, residuals: Residuals) -> FloatArray:
+        """The same of what a model foresees, to which noise adds."""
+        unit = self.measure.unit
+        courses = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
+        return np.asarray(0.5 * np.log(self._power(courses) + self._noise))
+
+    def misfits(self, off: FloatArray) -> Standing:
+        """off: a difference of such logarithms. Its rms by channel, for each purpose; NaN where nothing counts."""
+        seen = np.where(np.isnan(self.measured), np.nan, off)
+        return Standing(*(_rms(seen[[one.part == part for one in self.stretches]]) for part in PARTS))
+
+    @cached_property
+    def _edges(self) -> FloatArray:
+        """(bands + 1,), Hz"""
+        rate_hz = self.measure.records[0].recording.sample_rate_hz
+        count = int(np.log2(HIGHEST * rate_hz * WINDOW_S / LOWEST) / OCTAVES)
+        return np.asarray(LOWEST / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(count, 1) + 1)))
+
+    @property
+    def _noise(self) -> FloatArray:
+        rate_hz = self.measure.records[0].recording.sample_rate_hz
+        return np.asarray(self.measure.noise**2 / (rate_hz / 2))
+
+    def _power(self, courses: Sequence[FloatArray]) -> FloatArray:
+        """(stretches, bands, c): mean density."""
+        rate_hz = self.measure.records[0].recording.sample_rate_hz
+        rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
+        for row, one in zip(rows, self.stretches, strict=True):
+            window = min(int(WINDOW_S * rate_hz), one.last - one.first)
+            lines, density = welch(courses[one.record][one.first : one.last], rate_hz, nperseg=window, axis=0)
+            firsts = np.searchsorted(lines, self._edges)
+            for band, (low, high) in enumerate(pairwise(firsts)):
+                row[band] = density[low : max(high, low + 1)].mean(axis=0)
+        return rows
+
+    def _spans(self, number: int) -> list[tuple[int, int]]:
+        record = self.measure.records[number]
+        segments = [(one.start, one.stop) for one in record.recording.segments if one.kind != "rest"]
+        length, longest = len(record.measured), int(LONGEST_S * record.recording.sample_rate_hz)
+        return segments or [(first, min(first + longest, length)) for first in range(0, length, longest)]
+
+
+def _inside(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
+    """The longest run of samples that count, between the two."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[first:last].astype(np.int8), [0]]))).reshape(-1, 2)
+    runs = [(first + int(a), first + int(b)) for a, b in edges if b - a >= LEAST]
+    return [max(runs, key=lambda run: run[1] - run[0])] if runs else []
+
+
+def _rms(off: FloatArray) -> FloatArray:
+    count = np.sum(np.isfinite(off), axis=(0, 1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt(np.nansum(off**2, axis=(0, 1)) / count))

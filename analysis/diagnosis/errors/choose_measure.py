@@ -1,0 +1,208 @@
+"""Which error measure suits recordings and a model, by a stated rule.
+
+Free simulation, from rest by the commands alone, is the strictest: nothing measured helps it. It cannot be asked of
+
+* a plant in closed loop that does not hold itself: the command then contains what the controller did about the very
+  physics that is missing. Where positions or velocities were measured, forces are compared instead: the one that
+  entered against the one that the model needs along the measured motion; where only accelerations were, windows;
+* a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
+  error grows without end. It is simulated in windows of 1 s, each from a state estimated from the measured motion, or,
+  where no state can be estimated, compared by forces;
+* a recording that does not begin at rest: what its beginning left behind dies out, so its first seconds are left out;
+  where that would be more than a quarter of it, windows, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.data.noise_floor import NoiseFloor, noise_floor
+from analysis.diagnosis.data.observed import Observed, noise_in_units
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.rounding import rounding_step
+from analysis.diagnosis.effect_words import EFFECT_WORDS
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.force_views import force_views
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from analysis.diagnosis.errors.windows import windows_of
+from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.placing import placed_effects
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+Measure = Literal["free simulation", "windows", "predicted force"]
+
+DIES_OUT = 1 / 3
+"""Share of the longest record within which a plant that holds itself comes to rest."""
+DITHER = 0.02
+"""Steps of a converter: with less noise than that before it, repeats do not show it."""
+GONE, SPARED = 5.0, 0.25
+"""Time constants after which a motion is gone, and the share of a recording that may be left out until then."""
+UNKNOWN_NOISE = 1e-3
+"""Share of the signal that is taken for noise where a recording cannot tell."""
+AT_REST = 0.5
+"""Of a channel's rms, what it may start with, and of its usual changes,"""
+RESTING_S = 0.02
+"""what it may change by in the first such time: an offset alone is no motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    measure: Measure
+    why: str
+    """A sentence for the reader; empty for a free simulation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen:
+    measure: ErrorMeasure
+    floors: tuple[NoiseFloor, ...]
+    """Of what is compared, per record of the measure."""
+    remarks: tuple[str, ...]
+
+
+def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: Sequence[Recording] = ()) -> Chosen:
+    """The error measure that the rule chooses, of every part of the recordings. beside: others that must be measured
+    alike, and are not part of it."""
+    records, others = (
+        tuple(_settled(one, model) for one in observed_parts(these, model.outputs)) if these else ()
+        for these in (recordings, beside)
+    )
+    floors = tuple(noise_floor(one.recording) for one in records)
+    noise = _noise(floors, records)
+    unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
+    choice = choose_measure((*records, *others), model)
+    known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
+    if choice.measure == "free simulation":
+        return Chosen(FreeSimulation(records, unit, noise, known=known), floors, remarks)
+    if choice.measure == "windows":
+        try:
+            windows = replace(windows_of(records, model, (unit, noise)), known=known)
+            return Chosen(windows, floors, remarks)
+        except np.linalg.LinAlgError:
+            if not all(has_motion(one.recording, model) for one in records):
+                return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
+    views = force_views(records, model, floors)
+    said = f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
+    return Chosen(replace(views.measure, known=known), views.floors, (*remarks, said))
+
+
+def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
+    if not known:
+        return ()
+    kinds = ", ".join(dict.fromkeys(EFFECT_WORDS[one.effect.name].noun for one in known))
+    return (f"The model names effects of its own, which are part of every simulation: {kinds}.",)
+
+
+def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
+    """The rule of this module's first lines."""
+    longest_s = max(len(one.command) / one.recording.sample_rate_hz for one in records)
+    holds, motion = holds_itself(model, longest_s), all(has_motion(one.recording, model) for one in records)
+    if any(one.recording.meta.get("imposed") for one in records):
+        return Choice("predicted force", IMPOSED)
+    if not holds and any(in_closed_loop(one.recording) for one in records):
+        return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
+    if not holds:
+        return Choice("windows", DRIFTS)
+    if any(_begins_moving(one) and _settling(one, model) > SPARED * len(one.command) for one in records):
+        return Choice("windows", NOT_AT_REST)
+    return Choice("free simulation", "")
+
+
+def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
+    """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
+    return _slowest(model) * DIES_OUT * longest_s > 1
+
+
+def _settled(record: Observed, model: MechanicalModel) -> Observed:
+    """Without the beginning, where that is in motion and short."""
+    after = _settling(record, model)
+    if after > SPARED * len(record.command) or not _begins_moving(record):
+        return record
+    later = np.arange(len(record.command)) >= after
+    return replace(record, fit=record.fit & later, choose=record.choose & later, test=record.test & later)
+
+
+def _settling(record: Observed, model: MechanicalModel) -> float:
+    """Samples until what was at first is gone."""
+    slowest = _slowest(model)
+    return GONE / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
+
+
+def _slowest(model: MechanicalModel) -> float:
+    """Rate at which the slowest motion dies out, 1/s; below zero for one that grows."""
+    n = model.coordinates
+    motion = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
+        ]
+    )
+    return -float(np.linalg.eigvals(motion).real.max())
+
+
+IMPOSED = (
+    "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
+    "with the measured one."
+)
+CLOSED_LOOP = (
+    "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "
+    "drift; the force that the model needs along the measured motion is compared with the one that entered."
+)
+CLOSED_LOOP_WINDOWS = (
+    "The command hangs on the response and the model does not hold itself; it is simulated in windows of 1 s, each "
+    "from a state estimated from the measured motion."
+)
+DRIFTS = (
+    "The model integrates freely, so that small errors would grow without end; it is simulated in windows of 1 s, each "
+    "from a state estimated from the measured motion."
+)
+NOT_AT_REST = (
+    "The recording does not begin at rest; the model is simulated in windows of 1 s, each from a state estimated from "
+    "the measured motion."
+)
+NO_STATE = (
+    "The model integrates freely and the sensors do not show its state, so it was simulated from rest; errors grow "
+    "with time."
+)
+
+
+def _begins_moving(record: Observed) -> bool:
+    first = max(int(RESTING_S * record.recording.sample_rate_hz), 4)
+    known = record.measured[np.isfinite(record.measured).all(axis=1)]
+    if len(known) < 4 * first:
+        return False
+    means = known[: len(known) // first * first].reshape(-1, first, known.shape[1]).mean(axis=1)
+    changes = np.diff(means, axis=0)
+    away = np.abs(means[0]) > AT_REST * known.std(axis=0)
+    moves = np.abs(changes[0]) > AT_REST * np.sqrt(np.mean(changes**2, axis=0))
+    return bool(np.any(away & moves))
+
+
+def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
+    """(c,): the quietest recording's, rms."""
+    count = records[0].measured.shape[1]
+    rows = [
+        np.concatenate([_unrounded(f, one), f.position_rms if f.position_rms is not None else []])[:count]
+        for f, one in zip(floors, records, strict=True)
+    ]
+    signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
+    quietest = np.fmin.reduce(rows)
+    return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE * signal))
+
+
+def _unrounded(floor: NoiseFloor, record: Observed) -> FloatArray:
+    """(p,): the response's rms noise before a converter rounded it, for that is physics that a model may lack; what
+    rounds a position is known of every encoder. Of repeats alone: elsewhere rounding and noise cannot be told apart."""
+    noise = floor.response_rms
+    if floor.how != "repeats":
+        return noise
+    steps = np.array([rounding_step(record.measured[:, c]) for c in range(len(noise))])
+    left = np.asarray(np.sqrt(np.maximum(noise**2 - steps**2 / 12, 0.0)))
+    return np.where(left > DITHER * steps, left, noise)

@@ -1,0 +1,68 @@
+"""An error measure whose noise has the colour of what a sound device differs by from its model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.residual_colour import Colour
+from equalizer.effects.effect import Effect, PlacedEffect
+from equalizer.effects.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColouredMeasure:
+    """Residuals are those of `plain` without the colour, and count from where all that they hang on is known."""
+
+    plain: ErrorMeasure
+    colour: Colour
+    unit: FloatArray
+    noise: FloatArray
+    """(c,): rms of what is left of a sound device's differences without their colour, in each channel's own unit."""
+    least: float = 0.0
+
+    @property
+    def name(self) -> str:
+        return self.plain.name
+
+    @property
+    def records(self) -> tuple[Observed, ...]:
+        return self.plain.records
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, plain=self.plain.with_records(records))
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+
+    def shortened(self) -> Self:
+        return replace(self, plain=self.plain.shortened())
+
+    def tells(self, effect: Effect) -> bool:
+        return self.plain.tells(effect)
+
+    def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        left = self.plain.residuals(model, effects)
+        return tuple(self.colour.taken_off(one * self.plain.unit) / self.unit for one in left)
+
+    def evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
+    ) -> tuple[Evidence, ...]:
+        """With the colour, as estimators of starting values look at courses."""
+        return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
+
+
+def coloured(plain: ErrorMeasure, colour: Colour, noise: FloatArray) -> ColouredMeasure:
+    """noise: (c,), see `ColouredMeasure`."""
+    warm = [_counted(one, colour) for one in plain.records]
+    return ColouredMeasure(plain.with_records(tuple(warm)), colour, noise, noise)
+
+
+def _counted(record: Observed, colour: Colour) -> Observed:
+    warm = colour.warm(record.measured)
+    return replace(record, fit=record.fit & warm, choose=record.choose & warm, test=record.test & warm)

@@ -1,0 +1,74 @@
+"""The measured course against a simulated one that knows the commands alone."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.unexplained_motion import evidence_of
+from equalizer.effects.effect import Effect, PlacedEffect
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.simulator import Played, Seen, simulate_mechanism, simulate_response
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeSimulation:
+    """From rest at the first sample."""
+
+    records: tuple[Observed, ...]
+    unit: FloatArray
+    noise: FloatArray
+    """(c,): rms"""
+    name: str = "free simulation"
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
+    least: float = 0.0
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+
+    def shortened(self) -> "FreeSimulation":
+        kept = [one for one in self.records if (one.fit | one.choose).any()]
+        return replace(self, records=tuple(one.shortened() for one in kept))
+
+    def tells(self, effect: Effect) -> bool:
+        return True
+
+    def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        return tuple(
+            (one.measured - channels(self._played(model, effects, one, simulate_response), one.measured.shape[1]))
+            / self.unit
+            for one in self.records
+        )
+
+    def _played(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, simulate: Callable[..., Played]
+    ) -> Played:
+        signals, p = record.recording, model.outputs
+        position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
+        seen = Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording))
+        model = carrying(model, signals)
+        return simulate(model, record.command, signals.sample_rate_hz, (*self.known, *effects), signals.hold, seen)
+
+    def evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
+    ) -> tuple[Evidence, ...]:
+        found = []
+        for record, left in zip(self.records, residuals, strict=True):
+            played = self._played(model, effects, record, simulate_mechanism)
+            there = carrying(model, record.recording)
+            found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
+        return tuple(found)
+
+
+def channels(played: Played, count: int) -> FloatArray:
+    """(n, c): the response and, where there are so many channels, the position."""
+    return np.hstack([played.response, played.position])[:, :count]

@@ -1,0 +1,54 @@
+"""How sure a fit is of its numbers: covariances that hold where errors are neither white nor of the assumed strength.
+
+The sandwich of Huber (1967) and White (1980), its middle summed over stretches longer than the errors remember.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, fitting, own_columns
+from analysis.diagnosis.errors.tuning import Tuning
+from equalizer.signals.signal import FloatArray
+
+STRETCH_S = 0.5
+AT_AN_END = 1e-6
+"""Of a coordinate, where a move makes a difference by about 1."""
+
+
+def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray:
+    """(t + numbers,), of deviations and of the hypothesis's point; 0 where a number stands at an end of its range: it
+    is held there."""
+    errors = fitting(measure, fitted.residuals)
+    own = own_columns(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
+    columns = np.vstack([known.columns, own])
+    pulls = _stretches(measure, columns, errors)
+    middle = pulls @ pulls.T
+    t = len(fitted.deviations)
+    information = columns @ columns.T
+    # The calibration is an observation of its own, one standard deviation wide.
+    information[:t, :t] += np.eye(t)
+    middle[:t, :t] += np.eye(t)
+    scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
+
+
+def _at_an_end(hypothesis: Hypothesis) -> npt.NDArray[np.bool_]:
+    ends = [number.bounds for number in hypothesis.numbers]
+    held = [np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(hypothesis.point, ends, strict=True)]
+    return np.array(held, dtype=np.bool_)
+
+
+def _stretches(measure: ErrorMeasure, columns: FloatArray, errors: FloatArray) -> FloatArray:
+    """(numbers, stretches): each column's pull, stretch by stretch."""
+    pulls, first = [], 0
+    for record in measure.records:
+        width = record.measured.shape[1] * max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
+        last = first + int(record.fit.sum()) * record.measured.shape[1]
+        for begin in range(first, last, width):
+            part = slice(begin, min(begin + width, last))
+            pulls.append(columns[:, part] @ errors[part])
+        first = last
+    return np.array(pulls).T.reshape(len(columns), -1)

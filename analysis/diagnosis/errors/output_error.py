@@ -1,0 +1,177 @@
+"""Least squares on the error measure: a model's open numbers, held by their calibration, and a hypothesis's numbers.
+
+Gauss and Newton's steps inside bounds. What the model's own numbers do is computed once and kept; what a hypothesis's
+numbers do, at each step.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.growth import runs_away
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.tuning import Tuning
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.signal import FloatArray
+
+BOUND = 4.0
+"""Standard deviations of the calibration within which the model's own numbers may be re-tuned."""
+MOVED = 0.1
+"""Standard deviations that a number is moved by to see what it does."""
+LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
+"""Of a hypothesis's number, by its scale: a factor of e, so many times its start, none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensitivity:
+    """What the model's numbers do to the residuals of the fitting samples."""
+
+    at: FloatArray
+    """(t,): deviations where it was taken,"""
+    columns: FloatArray
+    """(t, samples): change of prediction per standard deviation, and"""
+    squares: FloatArray
+    """(t, t): their products."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    hypothesis: Hypothesis
+    deviations: FloatArray
+    """(t,), of the model's own numbers, in standard deviations."""
+    residuals: tuple[FloatArray, ...]
+    """Per record (n, c), in units of the noise."""
+    cost: float
+    """Mean square over the fitting samples, with the calibration's pull."""
+
+
+def fitting(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
+    """The residuals of the samples that are fitted to, in one row."""
+    parts = [each[record.fit].ravel() for each, record in zip(residuals, measure.records, strict=True)]
+    return np.concatenate(parts)
+
+
+def sensitivity(
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    at: FloatArray,
+    hypothesis: Hypothesis,
+    map_: object = map,
+    beside: tuple[FloatArray, Sequence[int]] | None = None,
+) -> Sensitivity:
+    """By moving each number. map_: `map`, or one that works in parallel. beside: columns that are known, and the
+    numbers whose columns are not."""
+    base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
+
+    def moved(number: int) -> FloatArray:
+        for move in (MOVED, -MOVED):
+            there = at.copy()
+            there[number] += move
+            try:
+                change = base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))
+            except (MechanicalModelError, np.linalg.LinAlgError):
+                continue
+            if np.isfinite(change).all():
+                return np.asarray(change / move)
+        # Neither way is a model: the number stays where it is.
+        return np.zeros_like(base)
+
+    known, numbers = (np.zeros((len(at), len(base))), range(len(at))) if beside is None else beside
+    columns = known.copy()
+    columns[numbers] = np.array(list(map_(moved, numbers))).reshape(len(numbers), len(base))  # type: ignore[operator]
+    return Sensitivity(at, columns, columns @ columns.T)
+
+
+def fit(measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int) -> Fitted:
+    """Better than the start, or the start. known: of the model's numbers, taken anywhere near."""
+    best = start
+    for _ in range(rounds):
+        better = _stepped(measure, tuning, best, known)
+        if better is None:
+            return best
+        gained = best.cost - better.cost
+        best = better
+        if gained < 1e-4 * best.cost:
+            break
+    return best
+
+
+def evaluated(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
+    residuals = measure.residuals(tuning.tuned(deviations), hypothesis.placed())
+    return Fitted(hypothesis, deviations, residuals, _cost(fitting(measure, residuals), deviations))
+
+
+def _cost(errors: FloatArray, deviations: FloatArray) -> float:
+    cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
+    return cost if np.isfinite(cost) else np.inf
+
+
+def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity) -> Fitted | None:
+    errors = fitting(measure, from_.residuals)
+    own = own_columns(measure, tuning, from_, errors)
+    t = len(from_.deviations)
+    cross = known.columns @ own.T
+    products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
+    pull = np.concatenate([known.columns @ errors - from_.deviations, own @ errors])
+    if not (np.isfinite(products).all() and np.isfinite(pull).all()):
+        # Some number moved the model to where it runs away.
+        return None
+    now = np.concatenate([from_.deviations, from_.hypothesis.point])
+    low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
+    longest = _longest(from_.hypothesis)
+    low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
+    for damping in (1e-9, 1e-3, 0.1, 3.0):
+        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, low, high)
+        there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
+        try:
+            if runs_away(tuning.tuned(from_.deviations + step[:t]), _longest_s(measure)):
+                continue
+            tried = evaluated(measure, tuning, from_.deviations + step[:t], there)
+        except (MechanicalModelError, np.linalg.LinAlgError):
+            continue
+        if tried.cost < from_.cost * (1 - 1e-9):
+            return tried
+    return None
+
+
+def _longest_s(measure: ErrorMeasure) -> float:
+    return max(len(one.command) / one.recording.sample_rate_hz for one in measure.records)
+
+
+def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
+    """(numbers, samples): what the hypothesis's numbers do to the prediction."""
+    model: MechanicalModel = tuning.tuned(from_.deviations)
+    moves = [number.move for number in from_.hypothesis.numbers]
+    columns = np.empty((len(moves), len(errors)))
+    for number, move in enumerate(moves):
+        point = from_.hypothesis.point.copy()
+        point[number] += move
+        columns[number] = (errors - fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))) / move
+    return columns
+
+
+def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
+    own = np.array([number.bounds for number in hypothesis.numbers]).reshape(-1, 2)
+    return np.concatenate([np.full(tuned, -BOUND), own[:, 0]]), np.concatenate([np.full(tuned, BOUND), own[:, 1]])
+
+
+def _longest(hypothesis: Hypothesis) -> FloatArray:
+    return np.array([LARGEST_STEPS[number.parameter.scale] for number in hypothesis.numbers])
+
+
+def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Least squares within bounds: what presses against one is held there, and let go where it pulls back."""
+    step, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
+    for _ in range(2 * len(pull) + 2):
+        free = ~held
+        wanted = step.copy()
+        rest = pull[free] - products[np.ix_(free, held)] @ step[held]
+        wanted[free] = np.linalg.lstsq(products[np.ix_(free, free)], rest, rcond=1e-14)[0]
+        out = free & ((wanted < low) | (wanted > high))
+        if not out.any():
+            return wanted
+        step[out] = np.clip(wanted[out], low[out], high[out])
+        held |= out
+    return np.clip(step, low, high)

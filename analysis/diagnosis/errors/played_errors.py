@@ -1,0 +1,84 @@
+"""How well a finished model predicts a recording to which nothing is fitted, and what one factor would mend."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Mask
+from analysis.diagnosis.errors.choose_measure import measure_of
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+Part = Literal["all", "test"]
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelRms:
+    """In the unit of the recording."""
+
+    name: str
+    unit: str
+    signal: float
+    left: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlayedError:
+    """Shares of the signal, root mean square over the channels; None where no number comes out."""
+
+    error: str
+    """How it was measured."""
+    as_it_is: float | None
+    with_gain: float | None
+    """With one factor for the prediction of all channels; fitted to what is not tested, or to all where all is."""
+    channels: tuple[ChannelRms, ...]
+    """As it is; none where it is no number."""
+
+
+def played_error(recording: Recording, model: MechanicalModel, part: Part) -> PlayedError:
+    """model: with its own effects. part: which samples the error is of."""
+    measure = measure_of((recording,), model).measure
+    measured, predicted, tested, fitted = [], [], [], []
+    for record, left in zip(measure.records, measure.residuals(model, ()), strict=True):
+        known = np.isfinite(record.measured).all(axis=1)
+        measured.append(record.measured)
+        predicted.append(record.measured - left * measure.unit)
+        tested.append((record.test if part == "test" else record.test | record.fit | record.choose) & known)
+        fitted.append((record.fit | record.choose) & known)
+    y, f = np.vstack(measured), np.vstack(predicted)
+    test, fit = np.concatenate(tested), np.concatenate(fitted)
+    gain = _gain(y, f, fit if part == "test" and fit.any() else test)
+    return PlayedError(
+        measure.name,
+        _share(y, f, test),
+        None if gain is None else _share(y, gain * f, test),
+        tuple(_channels(recording, y[test], f[test])),
+    )
+
+
+def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
+    """Of the responses, where these are what was compared."""
+    signal = recording.response
+    if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
+        return
+    for c, (name, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
+        yield ChannelRms(name, unit, float(np.std(y[:, c])), float(np.sqrt(np.mean((y - f)[:, c] ** 2))))
+
+
+def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+    size = np.maximum(np.sqrt(np.mean(y[mask] ** 2, axis=0)), np.finfo(float).tiny)
+    one, other = (f[mask] / size).ravel(), (y[mask] / size).ravel()
+    power = float(one @ one)
+    return float(one @ other) / power if np.isfinite(power) and power > 0 else None
+
+
+def _share(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+    if not mask.any():
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.maximum(np.std(y[mask], axis=0), np.finfo(float).tiny)
+        whole = float(np.sqrt(np.mean(np.mean((y - f)[mask] ** 2, axis=0) / size**2)))
+    return whole if np.isfinite(whole) else None

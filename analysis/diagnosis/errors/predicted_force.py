@@ -1,0 +1,133 @@
+"""The force that entered against the force that the model needs along the measured motion, within a band."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.needed_force import NeededForce, needed_force
+from equalizer.effects.along_motion import entered_force, force_along
+from equalizer.effects.bodies import bodies_of
+from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
+from equalizer.effects.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.band_limited import band_limited
+from equalizer.signals.signal import FloatArray
+
+EDGE = 0.5
+"""Periods of the band's end."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictedForce:
+    """For a plant in closed loop, where the command hangs on the response, and for one that drifts freely."""
+
+    records: tuple[Observed, ...]
+    """Views: their `measured` is the force that entered, as far as it lies within the band."""
+    motions: tuple[FloatArray, ...]
+    """Per record (n, m): the positions of the model's first m outputs, as measured."""
+    unit: FloatArray
+    noise: FloatArray
+    """(m,): rms of what the noise of the motion makes in the force."""
+    band_hz: float
+    name: str = "predicted force"
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
+    least: float = 0.0
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+
+    def shortened(self) -> "PredictedForce":
+        kept = [
+            (self._cut(one), motion)
+            for one, motion in zip(self.records, self.motions, strict=True)
+            if (one.fit | one.choose).any()
+        ]
+        records = tuple(one for one, _ in kept)
+        motions = tuple(motion[: len(one.command)] for one, motion in kept)
+        return replace(self, records=records, motions=motions)
+
+    def _cut(self, record: Observed) -> Observed:
+        """At the last sample that decisions may see; what lies just before feels that nothing follows."""
+        cut, edge = record.shortened(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
+        inside = np.arange(len(cut.command)) < len(cut.command) - edge
+        return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
+
+    def tells(self, effect: Effect) -> bool:
+        """Not of sensors: their reading is taken for the motion."""
+        return isinstance(effect.acts, (Structure, AxisForce, OnCommand))
+
+    def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        return tuple(
+            self._balance(model, (*self.known, *effects), record, motion).left / self.unit
+            for record, motion in zip(self.records, self.motions, strict=True)
+        )
+
+    def evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
+    ) -> tuple[Evidence, ...]:
+        return tuple(
+            self._evidence(model, (*self.known, *effects), record, motion)
+            for record, motion in zip(self.records, self.motions, strict=True)
+        )
+
+    def _balance(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: FloatArray
+    ) -> "_Balance":
+        rate_hz = record.recording.sample_rate_hz
+        model = carrying(model, record.recording)
+        structure = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, Structure)]).structure
+        needed = needed_force(structure, motion, rate_hz, self.band_hz)
+        entered = entered_force(model, record.command, rate_hz, effects, record.recording.hold)
+        within = band_limited(entered, rate_hz, self.band_hz)
+        ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
+        course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
+        added = force_along(structure, effects, course, within - (needed.force + ahead) / 2, rate_hz)
+        # Both are means over the step that begins at a sample; the needed force is that around it.
+        total = band_limited(entered + added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+        # A weaker actuator must not make every error smaller.
+        weaker = _rms(record.command) / np.maximum(_rms(entered), np.finfo(float).tiny)
+        return _Balance(needed, (total - needed.force) * weaker, total)
+
+    def _evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: FloatArray
+    ) -> Evidence:
+        found = self._balance(model, effects, record, motion)
+        return Evidence(
+            model=carrying(model, record.recording),
+            sample_rate_hz=record.recording.sample_rate_hz,
+            command=record.command,
+            axis_position=found.needed.axis_position,
+            axis_velocity=found.needed.axis_velocity,
+            axis_force=-found.left,
+            response=found.needed.force,
+            predicted=found.total,
+            noise=self.noise,
+            used=(record.fit | record.choose).astype(np.float64),
+        )
+
+
+def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
+    """At a record's end, where the filter has nothing to look at."""
+    return int(EDGE * sample_rate_hz / band_hz)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Balance:
+    needed: NeededForce
+    left: FloatArray
+    """(n, m): what entered, effects included, less what the motion needed; as if the actuator were as strong as it is
+    said to be."""
+    total: FloatArray
+    """(n, m): what entered, effects included."""
+
+
+def _rms(samples: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.mean(samples**2, axis=0)))

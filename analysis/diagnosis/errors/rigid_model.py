@@ -1,0 +1,89 @@
+"""A linear model of a device in closed loop, for whoever has none: masses, dampers and springs by least squares on
+forces, as rigid robots are identified (Gautier, Vandanjon and Pressé 1994). Spectra would be bent by the controller."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.data.noise_floor import noise_floor
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.errors.force_views import force_views
+from analysis.diagnosis.errors.needed_force import needed_force
+from analysis.diagnosis.errors.predicted_force import PredictedForce
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError, Tolerance
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+OPEN = 0.25
+"""Of the damping and stiffness found, one standard deviation: friction and the like hide in them. Of the mass:"""
+OPEN_MASS = 0.05
+WORTH = 0.05
+"""Share of the misfit that springs must take to be there."""
+_ROUNDS = 2
+
+
+def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
+    """Whether a controller made the commands, or a motion was imposed."""
+    return can_be_rigid(recordings) and any(in_closed_loop(one) or one.meta.get("imposed") for one in recordings)
+
+
+def can_be_rigid(recordings: Sequence[Recording]) -> bool:
+    """Whether there is one measured position or velocity for every command."""
+    return all(_is_square(one) for one in recordings)
+
+
+def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
+    """One body per command. Raises MechanicalModelError where the forces give no mass."""
+    model = _unit_masses(recordings[0], name)
+    records = observed_parts(recordings, model.outputs)
+    if not all(has_motion(one.recording, model) for one in records):
+        raise MechanicalModelError(("neither positions nor velocities were measured",))
+    floors = [noise_floor(one.recording) for one in records]
+    for _ in range(_ROUNDS):
+        model = _by_forces(model, force_views(records, model, floors).measure)
+    return model
+
+
+def _is_square(recording: Recording) -> bool:
+    orders = [DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recording.response.quantities]
+    square = len(recording.command.channels) == len(recording.response.channels)
+    seen = recording.position if max(orders) == 2 else recording.response
+    return square and len(set(orders)) == 1 and seen is not None and len(seen.channels) == len(orders)
+
+
+def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
+    eye = np.eye(len(recording.command.channels))
+    turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
+    return MechanicalModel(name, recording.response.quantities[0], eye, 0 * eye, 0 * eye, eye, eye, rotational=turning)
+
+
+def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
+    rows, aims = [], []
+    for record, motion in zip(measure.records, measure.motions, strict=True):
+        moved = needed_force(model, motion, record.recording.sample_rate_hz, measure.band_hz)
+        used = record.fit | record.choose
+        courses = moved.axis_acceleration, moved.axis_velocity, moved.axis_position, np.ones((len(used), 1))
+        rows.append(np.hstack(courses)[used])
+        aims.append(record.measured[used])
+    shapes, aim, m = np.vstack(rows), np.vstack(aims), model.inputs
+    whole, left = _least_squares(shapes, aim)
+    loose, left_loose = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), aim)
+    sprung = left < (1 - WORTH) * left_loose
+    mass, damping = ((one + one.T) / 2 for one in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
+    stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
+    # A body that pushes itself is no linear model; what makes it seem so is for the diagnosis.
+    damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
+    stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
+    largest = [float(np.abs(np.diagonal(one)).max()) for one in (mass, damping, stiffness)]
+    open_ = Tolerance(OPEN_MASS * largest[0], OPEN * largest[1] or None, OPEN * largest[2] or None, None)
+    return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=open_)
+
+
+def _least_squares(shapes: FloatArray, aim: FloatArray) -> tuple[FloatArray, float]:
+    """(k, m), and the mean square that is left."""
+    size = np.maximum(np.linalg.norm(shapes, axis=0), np.finfo(float).tiny)
+    found = np.linalg.lstsq(shapes / size, aim, rcond=None)[0] / size[:, None]
+    return np.asarray(found), float(np.mean((aim - shapes @ found) ** 2))

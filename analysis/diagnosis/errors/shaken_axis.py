@@ -1,0 +1,44 @@
+"""The part of what was observed that shakes one axis: enough to learn of its drive, and quick to simulate."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.observed_parts import part_of
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from equalizer.signals.recording import Segment
+
+SHAKEN = 0.5
+"""Share of the strongest axis's command that the axis must have in a segment."""
+LONGEST_S = 6.0
+"""Of a segment."""
+
+
+def shaken_along(measure: FreeSimulation, axis: int) -> FreeSimulation:
+    """Its segments, each from rest; all where there are no segments, or none that is driven along the axis."""
+    parts = tuple(
+        _cut(record, one)
+        for record in measure.records
+        for one in record.recording.segments
+        if one.kind != "rest" and one.stop <= len(record.command) and _is_shaken(record, one, axis)
+    )
+    kept = tuple(one for one in parts if (one.fit | one.choose).any())
+    return replace(measure, records=kept) if kept else measure
+
+
+def _is_shaken(record: Observed, segment: Segment, axis: int) -> bool:
+    power = np.sum(record.command[segment.start : segment.stop] ** 2, axis=0)
+    return bool(power[axis] >= SHAKEN**2 * power.max() > 0)
+
+
+def _cut(record: Observed, segment: Segment) -> Observed:
+    longest = int(LONGEST_S * record.recording.sample_rate_hz)
+    if segment.period:
+        longest = max(longest // segment.period, 1) * segment.period
+    first, last = segment.start, min(segment.stop, segment.start + longest)
+    kept = slice(first, last)
+    return Observed(
+        part_of(record.recording, first, last), record.command[kept], record.measured[kept],
+        record.fit[kept], record.choose[kept], record.test[kept],
+    )  # fmt: skip

@@ -1,0 +1,54 @@
+"""What a simulation leaves unexplained, as a force along each axis and the motion that goes with it."""
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.missing_force import missing_force
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.simulator import Played
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+EXPECTED = 0.1
+"""Rms of a missing force, as a share of the command's."""
+
+
+def evidence_of(
+    model: MechanicalModel,
+    record: Observed,
+    played: Played,
+    left: FloatArray,
+    scales: tuple[FloatArray, FloatArray],
+) -> Evidence:
+    """left: (n, c), the residuals of what was played. scales: the error measure's unit and noise, (c,) each."""
+    unit, noise = scales
+    residuals = np.where(np.isfinite(left), left, 0.0)
+    rate_hz, p = record.recording.sample_rate_hz, model.outputs
+    expected = EXPECTED * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
+    missing = missing_force(model, residuals, unit, rate_hz, expected)
+    measured, predicted = without_gaps(record.measured, left * unit, played)
+    seen = measured.shape[1] > p
+    return Evidence(
+        model=model,
+        sample_rate_hz=rate_hz,
+        command=record.command,
+        axis_position=played.axis_position + missing.position,
+        axis_velocity=played.axis_velocity + missing.velocity,
+        axis_force=missing.force,
+        response=measured[:, :p],
+        predicted=predicted[:, :p],
+        noise=noise[:p],
+        used=(record.fit | record.choose).astype(np.float64),
+        position=measured[:, p:] if seen else None,
+        predicted_position=predicted[:, p:] if seen else None,
+        position_noise=noise[p:] if seen else None,
+    )
+
+
+def without_gaps(measured: FloatArray, left: FloatArray, played: Played) -> tuple[FloatArray, FloatArray]:
+    """Measured and predicted, (n, c) each. Estimators look at whole courses: where nothing was measured, what was
+    played stands for both, so that nothing differs."""
+    known = np.isfinite(measured)
+    course = np.hstack([played.response, played.position])[:, : measured.shape[1]]
+    predicted = np.where(known, measured - left, course)
+    return np.where(known, measured, predicted), predicted

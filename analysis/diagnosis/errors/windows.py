@@ -1,0 +1,178 @@
+"""Short simulations, each from a state that was estimated from the measured motion: plants that drift cannot drift far.
+
+What is left of an error in the state is fitted to each window, and does not count.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smoothed_motion
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.free_simulation import channels
+from analysis.diagnosis.errors.unexplained_motion import without_gaps
+from equalizer.effects.along_motion import entered_force
+from equalizer.effects.bodies import Restarts, bodies_of
+from equalizer.effects.effect import Effect, PlacedEffect, Structure
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.sensor_path import low_passed
+from equalizer.effects.simulator import Played, Seen, simulate_windows
+from equalizer.plant.linear_simulation import linear_steps
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+_UNSEEN = 1e-9
+"""Of a window's largest direction: what moves the outputs less than that is not fitted."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """For plants that integrate freely, and for recordings that do not begin at rest."""
+
+    records: tuple[Observed, ...]
+    states: tuple[FloatArray, ...]
+    """Per record (windows, 2 coordinates): where each window begins."""
+    unit: FloatArray
+    noise: FloatArray
+    window_s: float = 1.0
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
+    least: float = 0.0
+
+    @property
+    def name(self) -> str:
+        return f"windows of {self.window_s:g} s"
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+
+    def shortened(self) -> "Windows":
+        kept = [
+            (one.shortened(), states)
+            for one, states in zip(self.records, self.states, strict=True)
+            if (one.fit | one.choose).any()
+        ]
+        return replace(self, records=tuple(one for one, _ in kept), states=tuple(states for _, states in kept))
+
+    def tells(self, effect: Effect) -> bool:
+        return True
+
+    def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        every = (*self.known, *effects)
+        return tuple(self._seen(model, every, *one)[1] for one in zip(self.records, self.states, strict=True))
+
+    def evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
+    ) -> tuple[Evidence, ...]:
+        return tuple(
+            self._evidence(model, (*self.known, *effects), record, states)
+            for record, states in zip(self.records, self.states, strict=True)
+        )
+
+    def _seen(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
+    ) -> tuple[Played, FloatArray]:
+        """And what is left, (n, c)."""
+        recording, p = record.recording, model.outputs
+        model = carrying(model, recording)
+        position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
+        length = samples_of(self.window_s, recording.sample_rate_hz)
+        played = simulate_windows(
+            model,
+            record.command,
+            (recording.sample_rate_hz, recording.hold),
+            effects,
+            Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
+            Restarts(length, states),
+        )
+        left = (record.measured - channels(played, record.measured.shape[1])) / self.unit
+        structure = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, Structure)]).structure
+        return played, self._without_states(structure, left, recording.sample_rate_hz, length)
+
+    def _without_states(
+        self, structure: MechanicalModel, left: FloatArray, sample_rate_hz: float, length: int
+    ) -> FloatArray:
+        """(n, c) less what other states at the windows' beginnings would make of it."""
+        n, c = left.shape
+        if not np.isfinite(left).all():
+            return left
+        free = _free(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
+        whole = n // length * length
+        found = left.copy()
+        if whole:
+            found[:whole] = _beside(left[:whole].reshape(-1, length * c), free.reshape(length * c, -1)).reshape(-1, c)
+        if n > whole:
+            found[whole:] = _beside(
+                left[whole:].reshape(1, -1), free[: n - whole].reshape((n - whole) * c, -1)
+            ).reshape(-1, c)
+        return found
+
+    def _evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
+    ) -> Evidence:
+        played, left = self._seen(model, effects, record, states)
+        recording, p = record.recording, model.outputs
+        model = carrying(model, recording)
+        entered = entered_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
+        found = smoothed_motion(model, record, entered + played.axis_force, self.unit)
+        measured, predicted = without_gaps(record.measured, left * self.unit, played)
+        seen = measured.shape[1] > p
+        return Evidence(
+            model=model,
+            sample_rate_hz=recording.sample_rate_hz,
+            command=record.command,
+            axis_position=found.axis_position,
+            axis_velocity=found.axis_velocity,
+            axis_force=found.missing_force,
+            response=measured[:, :p],
+            predicted=predicted[:, :p],
+            noise=self.noise[:p],
+            used=(record.fit | record.choose).astype(np.float64),
+            position=measured[:, p:] if seen else None,
+            predicted_position=predicted[:, p:] if seen else None,
+            position_noise=self.noise[p:] if seen else None,
+        )
+
+
+def windows_of(
+    records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
+) -> Windows:
+    """scales: unit and noise, (c,) each. Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
+    unit, noise = scales
+    states = []
+    for record in records:
+        rate_hz = record.recording.sample_rate_hz
+        entered = entered_force(model, record.command, rate_hz, (), record.recording.hold)
+        motion: SmoothedMotion = smoothed_motion(carrying(model, record.recording), record, entered, unit)
+        states.append(motion.states[:: samples_of(window_s, rate_hz)])
+    return Windows(records, tuple(states), unit, noise, window_s)
+
+
+def samples_of(window_s: float, sample_rate_hz: float) -> int:
+    return max(round(window_s * sample_rate_hz), 1)
+
+
+def _free(structure: MechanicalModel, sample_rate_hz: float, length: int, count: int) -> FloatArray:
+    """(length, c, 2n): the channels' free motion from each state of size 1."""
+    steps = linear_steps(structure, 1 / sample_rate_hz)
+    states = np.empty((length, *steps.advance.shape))
+    states[0] = np.eye(len(steps.advance))
+    for k in range(1, length):
+        states[k] = steps.advance @ states[k - 1]
+    response = low_passed(states.transpose(0, 2, 1) @ steps.response.T, sample_rate_hz, structure.sensor.bandwidth_hz)
+    seen = np.concatenate([response, states.transpose(0, 2, 1) @ steps.position.T], axis=2)
+    return np.asarray(seen[:, :, :count].transpose(0, 2, 1))
+
+
+def _beside(left: FloatArray, free: FloatArray) -> FloatArray:
+    """Rows of left (windows, samples) without what lies along the columns of free (samples, k)."""
+    size = np.linalg.norm(free, axis=0)
+    along, sizes, _ = np.linalg.svd(free / np.where(size > 0, size, 1.0), full_matrices=False)
+    along = along[:, sizes > _UNSEEN * max(float(sizes[0]), np.finfo(float).tiny)]
+    return np.asarray(left - (left @ along) @ along.T)

@@ -1,0 +1,33 @@
+"""The mismatch that a good model leaves on recordings in which nothing is missing: learned, so that it is not taken for
+physics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from analysis.diagnosis.data.frequency_cells import Band
+
+
+@dataclass(frozen=True, slots=True)
+class CleanFloor:
+    """Shares of the signal (rms)."""
+
+    shares: Mapping[tuple[str, str, str, Band], float] = field(default_factory=dict)
+    """By output, its quantity, input and octave."""
+    channels: tuple[float, ...] = ()
+    """By channel, the response's and then the position's, over all octaves. Empty where nothing was learned."""
+    error: str = ""
+    """How it was measured, as `diagnosis.json` says it."""
+    recordings: int = 0
+
+    @property
+    def beyond(self) -> float:
+        """By how much the largest that was seen was raised to give these shares: the fewer recordings, the more."""
+        return 1 + 1 / max(self.recordings, 1)
+
+    def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
+        """Of the cell; the largest of the channel's octave where clean recordings never drove this input; else 0."""
+        own = self.shares.get((output, quantity, input, band_hz))
+        if own is not None:
+            return own
+        beside = [s for (o, q, _, b), s in self.shares.items() if (o, q, b) == (output, quantity, band_hz)]
+        return max(beside, default=0.0)

@@ -1,0 +1,152 @@
+"""What kind of distortion a device has, from repeats and from lines that were not driven: by channel, input, level and
+band. Which kinds can be told apart depends on the recording; `Distortions.remarks` say what could not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from analysis.diagnosis.data.detection_lines import BoolArray, DetectionLines, detection_lines, held_samples
+from analysis.diagnosis.data.frequency_cells import Band, octaves_between, within
+from analysis.diagnosis.data.line_statistics import excess
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
+from analysis.diagnosis.localisation.driven_looks import DrivenLook, driven_looks
+from equalizer.identification.experiments import instrument_of
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+Kind = Literal["odd", "even", "either", "varying"]
+"""Odd and even distortion; distortion of either kind where even lines were driven; what differs between periods beyond
+the noise."""
+
+
+class _Where(NamedTuple):
+    output: str
+    quantity: str
+    input: str
+    amplitude: float
+    band_hz: Band
+
+
+@dataclass(frozen=True, slots=True)
+class Distortion:
+    """One kind in one cell."""
+
+    output: str
+    quantity: str
+    """Of the output: position and response channels may share a name."""
+    input: str
+    """Driven inputs, joined by "+"."""
+    amplitude: float
+    band_hz: Band
+    whole_band: bool
+    """True: all that was driven, not one octave of it."""
+    kind: Kind
+    rms: float
+    """In the output's unit, over all lines of the band that this kind reaches; 0 where not above the noise."""
+    limit_rms: float
+    """Less would not have been seen."""
+    signal_rms: float
+    """The response on the driven lines."""
+    p_value: float
+    """Chance of as much from noise alone."""
+    lines: int
+    """That it was measured on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Distortions:
+    cells: tuple[Distortion, ...]
+    remarks: tuple[str, ...]
+
+
+def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
+    """Per channel of response and position x input x level x (whole driven band and each octave of it)."""
+    if not floor.known:
+        return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
+    found = settled_periods(recording)
+    excitation = instrument_of(recording)
+    held = held_samples(excitation)
+    lines = [detection_lines(look_spectra(excitation, one).mean(axis=0), held) for one in found]
+    periods = [(one, its) for one, its in zip(found, lines, strict=True) if its is not None]
+    if not periods:
+        return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be told apart.",))
+    signals = [(recording.response, floor.response)]
+    if recording.position is not None and floor.position is not None:
+        signals.append((recording.position, floor.position))
+    cells: list[Distortion] = []
+    for signal, noise in signals:
+        for look in driven_looks(recording, signal, noise, floor.frequency_hz, periods):
+            cells += _cells(look, signal)
+    return Distortions(tuple(cells), tuple(_what_is_missing(periods)))
+
+
+def _what_is_missing(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
+    remarks = []
+    if all(one.looks < 2 for one, _ in periods):
+        remarks.append("No period was repeated: what varies from period to period cannot be seen.")
+    if not all(one.settled for one, _ in periods):
+        remarks.append("Some segments have one period only: its transient counts as distortion.")
+    if len({one.segment.amplitude for one, _ in periods}) < 2:
+        remarks.append("There is one level only: how distortion changes with level cannot be seen.")
+    if not any(lines.any_silent for _, lines in periods):
+        remarks.append("No line was left silent between driven ones: distortion cannot be told from the response.")
+    elif not any(lines.even.any() for _, lines in periods):
+        remarks.append("Even lines were driven, too: odd and even distortion cannot be told apart.")
+    elif not any(lines.odd.any() for _, lines in periods):
+        remarks.append("Every odd line was driven: odd distortion cannot be told from the response.")
+    return remarks
+
+
+def _cells(look: DrivenLook, signal: Signal) -> list[Distortion]:
+    lowest, highest = (float(line) for line in look.frequency_hz[look.lines.driven][[0, -1]])
+    cells = []
+    octaves = octaves_between(lowest, highest)
+    for band in dict.fromkeys(((octaves[0][0], octaves[-1][1]), *octaves)):
+        inside = within(look.frequency_hz, band)
+        if (inside & look.lines.driven).any():
+            for number, name in enumerate(signal.channels):
+                where = _Where(name, signal.quantities[number], look.input, look.amplitude, band)
+                cells += _kinds(look, number, inside, where, band == (octaves[0][0], octaves[-1][1]))
+    return cells
+
+
+def _kinds(look: DrivenLook, channel: int, inside: BoolArray, where: _Where, whole: bool) -> list[Distortion]:
+    power, error = np.abs(look.mean[:, channel]) ** 2, look.error[:, channel]
+    signal_rms = float(np.sqrt(2 * np.sum(power[inside & look.lines.driven])))
+    found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
+    for kind, chosen, reached in _silent(look, inside):
+        freedom = float(2 * max(look.looks - 1, 1) * chosen.sum())
+        beyond = excess(power[chosen], error[chosen], freedom)
+        found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
+    if look.looks > 1:
+        # Each line is known from looks - 1 differences.
+        seen = np.repeat(look.spread[inside, channel], look.looks - 1)
+        beyond = excess(
+            seen, np.repeat(look.floor[inside, channel], look.looks - 1), float(look.floor_freedom[channel])
+        )
+        found.append(("varying", beyond, 1 / (look.looks - 1), int(inside.sum())))
+    return [
+        Distortion(*where, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)
+        for kind, (beyond, limit, p_value), share, lines in found
+    ]
+
+
+def _silent(look: DrivenLook, inside: BoolArray) -> list[tuple[Kind, BoolArray, int]]:
+    """Kinds of detection lines, those in the band, and how many lines of the band that kind of distortion reaches."""
+    numbers = np.arange(1, len(inside) + 1)
+    multiple = inside & (numbers % look.lines.step == 0)
+    odd = numbers // look.lines.step % 2 == 1
+    kinds: list[tuple[Kind, BoolArray, int]] = [
+        ("odd", np.asarray(inside & look.lines.odd), int((multiple & odd).sum())),
+        ("even", np.asarray(inside & look.lines.even), int((multiple & ~odd).sum())),
+        ("either", np.asarray(inside & look.lines.either), int(multiple.sum())),
+    ]
+    return [kind for kind in kinds if kind[1].any()]
+
+
+def _rms(power: float) -> float:
+    """Of the sum of squared magnitudes of a one-sided spectrum."""
+    return float(np.sqrt(2 * max(power, 0.0)))

@@ -1,0 +1,100 @@
+"""Each periodic segment as mean lines and their errors, what the command itself brings to silent lines taken out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.channel_noise import ChannelNoise
+from analysis.diagnosis.data.detection_lines import DetectionLines
+from analysis.diagnosis.data.frequency_cells import driving_inputs
+from analysis.diagnosis.data.periods import Periods, look_spectra
+from analysis.diagnosis.localisation.commanded_response import between_lines, commanded, line_responses
+from equalizer.identification.experiments import instrument_of
+from equalizer.identification.noise_floor import over_neighbours, spread_over_looks
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+_SMOOTHED_LINES = 9
+_CLEAN = 1e-5
+"""Share of a command's strongest line below which a silent one brings nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivenLook:
+    """One segment as one signal answers it. Lines first, channels second."""
+
+    input: str
+    """Driven inputs, joined by "+"."""
+    amplitude: float
+    lines: DetectionLines
+    frequency_hz: FloatArray
+    mean: ComplexArray
+    """Over looks; on silent lines without what the command brings."""
+    error: FloatArray
+    """Expected |error|² of the mean."""
+    spread: FloatArray
+    """|error|² of one look, as seen between looks; the floor's, where there is one look."""
+    floor: FloatArray
+    """|error|² of one look from noise alone."""
+    looks: int
+    floor_freedom: FloatArray
+    """(channels,)"""
+
+
+def driven_looks(
+    recording: Recording,
+    signal: Signal,
+    noise: ChannelNoise,
+    floor_hz: FloatArray,
+    periods: Sequence[tuple[Periods, DetectionLines]],
+) -> list[DrivenLook]:
+    """noise: of the signal, on the lines floor_hz."""
+    found = []
+    for length in dict.fromkeys(one.length for one, _ in periods):
+        alike = [(one, lines) for one, lines in periods if one.length == length]
+        commands = [look_spectra(recording.command.samples, one).mean(axis=0) for one, _ in alike]
+        answers = [look_spectra(signal.samples, one) for one, _ in alike]
+        driven = [np.where(lines.driven[:, None], u, 0) for (_, lines), u in zip(alike, commands, strict=True)]
+        linear = _needed(driven, commands, answers)
+        lines_hz = alike[0][0].frequency_hz(recording.sample_rate_hz)
+        floor = _on_lines(noise, floor_hz, lines_hz) / length
+        for (one, lines), command, answer in zip(alike, commands, answers, strict=True):
+            mean, error, spread = _errors(answer, floor, noise.rounding / length)
+            if linear is not None:
+                brought, doubt = commanded(linear, np.where(lines.driven[:, None], 0, command))
+                mean, error = mean - brought, error + doubt
+            look = (lines, lines_hz, mean, error, spread, floor, one.looks, noise.freedom)
+            found.append(DrivenLook(inputs_of(recording, one), one.segment.amplitude, *look))
+    return found
+
+
+def inputs_of(recording: Recording, periods: Periods) -> str:
+    there = slice(periods.starts[0], periods.starts[0] + periods.length)
+    return "+".join(driving_inputs(instrument_of(recording)[there].var(axis=0), recording.command.channels))
+
+
+def _on_lines(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
+    """What differs between looks: the density without what repeats of rounding."""
+    return np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1) - noise.rounding
+
+
+def _errors(
+    answer: ComplexArray, floor: FloatArray, rounding: FloatArray
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    looks = len(answer)
+    spread = spread_over_looks(answer) if looks > 1 else floor
+    larger = np.maximum(floor, over_neighbours(spread, _SMOOTHED_LINES))
+    return answer.mean(axis=0), larger / looks + rounding, spread
+
+
+def _needed(
+    driven: Sequence[ComplexArray], commands: Sequence[ComplexArray], answers: Sequence[ComplexArray]
+) -> ComplexArray | None:
+    """The linear response at all lines, where commands have anything on silent lines; else None."""
+    clean = all(
+        np.abs(whole - lines).max(initial=0.0) <= _CLEAN * np.abs(whole).max(initial=0.0)
+        for lines, whole in zip(driven, commands, strict=True)
+    )
+    return None if clean else between_lines(line_responses(driven, [answer.mean(axis=0) for answer in answers]))

@@ -1,0 +1,146 @@
+"""Through which component a mismatch enters: a force at an axis, whatever its cause, moves all channels in proportions
+that the model knows; an error of one sensor shows in that channel alone.
+
+The score is the mean logarithm of the power that an entry leaves unexplained, line by line. A share of the power summed
+over lines says little, for where the device moves as one rigid body nearly all directions look alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import t as t_distribution
+
+from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra
+from analysis.diagnosis.localisation.sensor_rule import SensorRule, sensor_rule
+from equalizer.plant.effect_vocabulary import Place
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_ALIKE = 0.1
+"""Mean sine of the angle between two entries' whitened directions, below which they cannot be told apart."""
+_LOUD = 3.0
+"""A line counts where its residual is so many times its noise."""
+_BLOCK_LINES = 8
+"""Neighbouring lines share their fate: so many count as one when two entries are compared."""
+_SENSOR_PENALTY = np.log(2.0)
+_PER_DIMENSION = 0.25
+"""What each further direction must gain, or errors of the model on other axes would be forces, too."""
+_TINY = np.finfo(np.float64).tiny
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    name: str
+    place: Place
+    axis: str | None
+    directions: ComplexArray
+    """(lines, channels, k): what k independent unit inputs there do to response and position. (1, channels, k) where
+    alike at all lines."""
+    of_position: bool = False
+    """A sensor entry of the position sensor."""
+
+
+@dataclass(frozen=True, slots=True)
+class EntryScore:
+    name: str
+    place: Place
+    axis: str | None
+    score: float
+    """Mean log of unexplained power, noise = 0. Lower is better."""
+    share: float
+    """Of the residual's power beyond noise that it explains, median over lines."""
+    p_value: float
+    """That it explains as much as the best; 1 for the best and what is like it."""
+    alike: tuple[str, ...]
+    """Entries that these channels cannot tell from it."""
+
+
+@dataclass(frozen=True, slots=True)
+class EntryPoint:
+    ranking: tuple[EntryScore, ...]
+    """Best first."""
+    rule: SensorRule | None
+    """What position and response together say; None without position."""
+    lines: int
+    """That were loud enough to count."""
+
+
+def entry_point(
+    spectra: ResidualSpectra, entries: Sequence[Entry], derivative: Literal[0, 1, 2] | None = 2
+) -> EntryPoint:
+    """derivative: which of position the response is, channel by channel (2 = acceleration); None where it is not.
+
+    Raises ValueError where an entry's directions do not fit the lines and channels.
+    """
+    whitened = spectra.residual / np.sqrt(np.maximum(spectra.noise, _TINY))
+    total = np.sum(np.abs(whitened) ** 2, axis=2)
+    channels = whitened.shape[2]
+    loud = total / channels > _LOUD
+    rule = None if derivative is None else sensor_rule(spectra, derivative)
+    if not loud.any() or not entries:
+        return EntryPoint((), rule, int(loud.sum()))
+    weights = 1 / np.sqrt(np.maximum(spectra.noise.mean(axis=0), _TINY))
+    bases = [_basis(entry, weights) for entry in entries]
+    lefts = [_unexplained(whitened, total, basis) for basis in bases]
+    logs = [np.log1p(left / max(channels - basis.shape[2], 1)) for left, basis in zip(lefts, bases, strict=True)]
+    scores = [float(np.mean(log[loud])) for log in logs]
+    ranked = sorted(range(len(entries)), key=lambda k: scores[k] + _against(rule, entries[k], bases[k].shape[2]))
+    best = ranked[0]
+    ranking = []
+    for k in ranked:
+        alike = tuple(entries[j].name for j in ranked if j != k and _angle(bases[j], bases[k]) < _ALIKE)
+        same = k == best or entries[best].name in alike
+        p_value = 1.0 if same else _as_good(logs[k], logs[best], loud)
+        explained = 1 - lefts[k][loud] / total[loud]
+        entry = entries[k]
+        share = float(np.median(explained))
+        ranking.append(EntryScore(entry.name, entry.place, entry.axis, scores[k], share, p_value, alike))
+    return EntryPoint(tuple(ranking), rule, int(loud.sum()))
+
+
+def _basis(entry: Entry, weights: FloatArray) -> ComplexArray:
+    """(lines, channels, k), orthonormal at each line, in units of the noise."""
+    lines, channels = weights.shape
+    given = entry.directions.shape
+    if entry.directions.ndim != 3 or given[0] not in (1, lines) or given[1] != channels:
+        raise ValueError(f"the directions of '{entry.name}' must have shape ({lines}, {channels}, k), not {given}")
+    directions = np.broadcast_to(entry.directions, (lines, *given[1:])) * weights[:, :, None]
+    size = np.linalg.norm(directions, axis=1, keepdims=True)
+    return np.asarray(np.linalg.qr(directions / np.maximum(size, _TINY))[0], dtype=np.complex128)
+
+
+def _unexplained(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
+    """(experiments, lines)"""
+    along = np.einsum("lck,elc->elk", basis.conj(), whitened)
+    return np.asarray(np.maximum(total - np.sum(np.abs(along) ** 2, axis=2), 0.0))
+
+
+def _against(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
+    """What is added to a score: for more dimensions, and where the rule about position and response speaks."""
+    parsimony = _PER_DIMENSION * (dimensions - 1)
+    if rule is None or rule.verdict == "undecided":
+        return parsimony
+    of_response_sensor = entry.place == "sensor" and not entry.of_position
+    allowed = of_response_sensor if rule.verdict == "response sensor" else not of_response_sensor
+    return parsimony if allowed else parsimony + float(_SENSOR_PENALTY)
+
+
+def _angle(one: ComplexArray, other: ComplexArray) -> float:
+    """Mean sine of the largest angle between two subspaces; 1 where they have different dimensions."""
+    if one.shape[2] != other.shape[2]:
+        return 1.0
+    cosines = np.linalg.svd(np.einsum("lck,lcj->lkj", one.conj(), other), compute_uv=False)[:, -1]
+    return float(np.mean(np.sqrt(np.maximum(1 - cosines**2, 0.0))))
+
+
+def _as_good(log: FloatArray, best: FloatArray, loud: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> float:
+    """One-sided paired t-test over blocks of neighbouring loud lines."""
+    difference = (log - best)[loud]
+    blocks = len(difference) // _BLOCK_LINES
+    if blocks < 3:
+        return 1.0
+    means = difference[: blocks * _BLOCK_LINES].reshape(blocks, _BLOCK_LINES).mean(axis=1)
+    error = float(means.std(ddof=1)) / np.sqrt(blocks)
+    return float(t_distribution.sf(means.mean() / max(error, _TINY), blocks - 1))

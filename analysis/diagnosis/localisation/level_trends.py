@@ -1,0 +1,108 @@
+"""How distortion changes with level: the five numbers per band that point at a kind of physics before any fit.
+
+Relative to the linear response, friction and dead zones fall with level, stiffness and drag rise, limits rise from
+nothing, what is tied to position stays, timing makes more of what varies, and noise from outside takes no notice of it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.detection_lines import BoolArray
+from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.data.line_statistics import two_sided
+from analysis.diagnosis.localisation.distortion import Distortion, Kind
+from equalizer.signals.signal import FloatArray
+
+PRESENT = 0.001
+"""p-value below which a kind of distortion is taken to be there."""
+STEADY_DB = 1.5
+"""Per doubling of the level: less is neither rising nor falling."""
+_SCATTER_DB = 4.343
+"""Of the power on a single line, one standard deviation, where distortion is random over lines."""
+
+
+@dataclass(frozen=True, slots=True)
+class LevelTrend:
+    output: str
+    quantity: str
+    input: str
+    band_hz: Band
+    whole_band: bool
+    kind: Kind
+    relative_db: float
+    """At the highest level, to the response on driven lines."""
+    p_value: float
+    """That there is any at all: the smallest over levels, corrected for their number."""
+    db_per_doubling: float | None
+    """Of the relative size, with the level; None where seen at no level, or with one level only."""
+    slope_p_value: float | None
+    """That the slope is 0."""
+    from_nothing: bool
+    """It was not seen at the lowest level: the slope is a lower bound."""
+
+    @property
+    def present(self) -> bool:
+        return self.p_value < PRESENT
+
+    @property
+    def course(self) -> str:
+        """ "falls", "rises", "rises from nothing", "stays", or "" where nothing can be said."""
+        if not self.present or self.db_per_doubling is None:
+            return ""
+        if abs(self.db_per_doubling) < STEADY_DB:
+            return "stays"
+        if self.db_per_doubling < 0:
+            return "falls"
+        return "rises from nothing" if self.from_nothing else "rises"
+
+
+def level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
+    groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
+    for cell in cells:
+        # Realisations differ a little in the band that they drive.
+        band = _ALL if cell.whole_band else cell.band_hz
+        key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
+        groups.setdefault(key, []).append(cell)
+    return tuple(_trend(key, sorted(group, key=lambda cell: cell.amplitude)) for key, group in groups.items())
+
+
+def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
+    sizes = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
+    signals = np.array([cell.signal_rms for cell in cells])
+    levels = np.array([cell.amplitude for cell in cells])
+    relative_db = 20 * np.log10(np.maximum(sizes, _TINY) / np.maximum(signals, _TINY))
+    p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
+    seen = np.array([cell.p_value < PRESENT for cell in cells])
+    slope, slope_p = _course(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
+    if key[4]:
+        band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
+        key = (*key[:3], band, *key[4:])
+    return LevelTrend(*key, float(relative_db[-1]), p_value, slope, slope_p, bool(seen.any() and not seen[0]))
+
+
+def _course(
+    levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: BoolArray
+) -> tuple[float | None, float | None]:
+    """Slope and p-value. Where nothing was seen at a level, the limit of what would have been bounds the slope: from
+    below where that is the lowest level, from above where it is the highest."""
+    if not seen.any() or not (levels > 0).all() or len(set(levels)) < 2:
+        return None, None
+    bounded = _slope(np.log2(levels), relative_db, lines)
+    rises, falls = bounded[0] > STEADY_DB and not seen[0], bounded[0] < -STEADY_DB and not seen[-1]
+    if seen.all() or rises or falls:
+        return bounded
+    return _slope(np.log2(levels[seen]), relative_db[seen], lines[seen]) if len(set(levels[seen])) > 1 else (None, None)
+
+
+def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) -> tuple[float, float]:
+    """Weighted by lines; the error from the scatter of random distortion over them."""
+    centred = doublings - np.average(doublings, weights=lines)
+    information = float(np.sum(lines * centred**2))
+    slope = float(np.sum(lines * centred * relative_db)) / information
+    return slope, two_sided(slope * np.sqrt(information) / _SCATTER_DB)
+
+
+_TINY = 1e-300
+_ALL: Band = (0.0, np.inf)

@@ -1,0 +1,158 @@
+"""Where a prediction and a recording disagree: channel x driving input x octave x level, with how much and how surely.
+
+The residual is tested against noise and a margin of equivalence: a model that is two per cent off is not wrong physics.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.detection_lines import BoolArray
+from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.data.line_statistics import noncentral_f_sf
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.closed_testing import closed_adjusted
+from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+LEVEL = 0.01
+"""Of false discoveries."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """A model's answer to the recorded command; NaN where it has none."""
+
+    response: FloatArray
+    """(n, p)"""
+    position: FloatArray | None = None
+    """(n, d)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """What is no mismatch: so much of the signal in a cell, and what clean recordings have, squares added."""
+
+    share: float = 0.02
+    learned: CleanFloor = field(default_factory=CleanFloor)
+
+    def of(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
+        return float(np.hypot(self.share, self.learned.share(output, quantity, input, band_hz)))
+
+
+@dataclass(frozen=True, slots=True)
+class MismatchCell:
+    output: str
+    quantity: str
+    """Of the output: response and position channels may share a name."""
+    input: str
+    """Driven inputs, joined by "+"."""
+    band_hz: Band
+    amplitude: float
+    """Of the excitation, in the command's unit."""
+    rms: float
+    """Of the mismatch, in the output's unit, noise taken out."""
+    signal_rms: float
+    """Of the response in the cell, or a tenth of the loudest channel's, whichever is larger."""
+    in_noise: float
+    """The residual's rms in units of what noise alone would leave."""
+    margin: float
+    """Share of the signal that was taken for equivalent."""
+    p_value: float
+    """Chance of as much from noise and a mismatch of the margin's size."""
+    adjusted_p_value: float
+    """For the number of cells, within channel and band."""
+    seconds: float
+
+    @property
+    def share(self) -> float:
+        """Mismatch / signal, rms; above 1 where the prediction is worse than none."""
+        return self.rms / self.signal_rms if self.signal_rms > 0 else 0.0
+
+    @property
+    def significant(self) -> bool:
+        return self.adjusted_p_value <= LEVEL
+
+
+def mismatch_cells(
+    recording: Recording,
+    prediction: Prediction,
+    floor: NoiseFloor,
+    used: BoolArray | None = None,
+    margin: Margin | None = None,
+) -> tuple[MismatchCell, ...]:
+    """used: (n,), the samples that count; None = all. Empty where the noise is not known.
+
+    Raises ValueError where a prediction has another shape than what it predicts.
+    """
+    seen = _observations(recording, prediction, floor)
+    if not floor.known:
+        return ()
+    counted = np.ones(len(recording), dtype=np.bool_) if used is None else used
+    if counted.shape != (len(recording),):
+        raise ValueError(f"the mask of used samples must have shape ({len(recording)},), not {counted.shape}")
+    allowed = margin or Margin()
+    cells: list[MismatchCell] = []
+    for channels, one in seen:
+        groups: dict[tuple[str, Band, float], list[ResidualLines]] = {}
+        for lines in residual_lines(recording, one, counted):
+            groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
+        for group in groups.values():
+            cells += [_cell(group, k, name, one, allowed) for k, name in enumerate(channels)]
+    return _adjusted(cells)
+
+
+def _observations(
+    recording: Recording, prediction: Prediction, floor: NoiseFloor
+) -> list[tuple[tuple[str, ...], Observation]]:
+    pairs = [("response", recording.response, prediction.response, floor.response)]
+    if recording.position is not None and prediction.position is not None and floor.position is not None:
+        pairs.append(("position", recording.position, prediction.position, floor.position))
+    for name, signal, predicted, _ in pairs:
+        if predicted.shape != signal.samples.shape:
+            raise ValueError(f"the predicted {name} must have shape {signal.samples.shape}, not {predicted.shape}")
+    return [
+        (signal.channels, Observation(signal.samples, predicted, noise, floor.frequency_hz, signal.quantities))
+        for _, signal, predicted, noise in pairs
+    ]
+
+
+def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, margin: Margin) -> MismatchCell:
+    first = group[0]
+    quantity = seen.quantities[k]
+    allowed = margin.of(name, quantity, first.input, first.band_hz)
+    seconds = np.array([one.seconds for one in group])
+    lines = np.array([one.lines for one in group])
+    residual, noise, signal = (
+        float(np.average([getattr(one, what)[k] for one in group], weights=seconds))
+        for what in ("residual", "noise", "signal")
+    )
+    ratio = float(np.average([one.whitened[k] for one in group], weights=lines))
+    shift = 2 * allowed**2 * sum(float(one.signal_to_noise[k]) for one in group)
+    p_value = float(noncentral_f_sf(ratio, lines.sum(), max(float(seen.noise.freedom[k]), 1.0), shift))
+    return MismatchCell(
+        name, quantity, first.input, first.band_hz, first.amplitude,
+        float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(ratio)),
+        allowed, p_value, 1.0, float(seconds.sum()),
+    )  # fmt: skip
+
+
+def _adjusted(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
+    paths = [((cell.output, cell.quantity), cell.band_hz) for cell in cells]
+    adjusted = closed_adjusted(np.array([cell.p_value for cell in cells]), paths, LEVEL)
+    return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, adjusted, strict=True))
+
+
+def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
+    """From the cells of recordings in which nothing is missing, one sequence for each. The largest share over
+    recordings and levels, and the more beyond it, the fewer recordings there are."""
+    shares: dict[tuple[str, str, str, Band], float] = {}
+    for cells in clean:
+        for cell in cells:
+            key = (cell.output, cell.quantity, cell.input, cell.band_hz)
+            shares[key] = max(shares.get(key, 0.0), cell.share)
+    beyond = CleanFloor(recordings=len(clean)).beyond
+    return CleanFloor({key: beyond * share for key, share in shares.items()}, recordings=len(clean))

@@ -1,0 +1,186 @@
+"""What a prediction leaves of a recording, segment by segment, as power on lines: of the mean period where periods
+repeat, of overlapping windows elsewhere (Welch)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.channel_noise import ChannelNoise
+from analysis.diagnosis.data.detection_lines import BoolArray, detection_lines, held_samples
+from analysis.diagnosis.data.frequency_cells import Band, driving_inputs, octaves_between, within
+from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods, spectra
+from equalizer.identification.experiments import instrument_of
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+_WINDOW_S = 1.0
+_DRIVEN_IN_BAND = 1e-4
+"""Share of the strongest band's power of the command below which a band is not driven."""
+_DRIVEN_IN_WINDOW = 1e-2
+"""Share of its band's strongest window below which a window does not count for the band."""
+_HANN_NEIGHBOURS = 1.944
+"""1 + 2 (4/9 + 1/36): by how much the neighbours of a line in a Hann window lower its degrees of freedom,"""
+_HANN_OVERLAP = 1.056
+"""1 + 2/36: and windows that overlap by half."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualLines:
+    """One segment in one band, one signal; each array (channels,)."""
+
+    input: str
+    amplitude: float
+    band_hz: Band
+    seconds: float
+    """That it is made of."""
+    lines: float
+    """That are independent of each other."""
+    residual: FloatArray
+    """Power per second, summed over lines: mean square, noise included."""
+    noise: FloatArray
+    """What noise alone would leave of it."""
+    signal: FloatArray
+    """Mean square of the response without its noise."""
+    whitened: FloatArray
+    """Mean over lines of residual power / noise power: 1 for noise alone."""
+    signal_to_noise: FloatArray
+    """Summed over independent lines: (mean square of the signal, channels that hear little counted as if they heard a
+    tenth of the loudest) / noise."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """One signal with its prediction; (n, channels)."""
+
+    measured: FloatArray
+    predicted: FloatArray
+    noise: ChannelNoise
+    noise_hz: FloatArray
+    quantities: tuple[str, ...]
+
+
+_HEARD = 0.1
+"""Of the loudest channel of its quantity: as much a channel hears at least. What leaks into one that hears next to
+nothing is a matter of a degree of misalignment, and judged by the loudest."""
+
+
+def residual_lines(recording: Recording, seen: Observation, used: BoolArray) -> list[ResidualLines]:
+    """used: (n,), the samples that count. Segments without a whole period or window of them are left out."""
+    whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
+    periods = {one.index: one for one in settled_periods(recording)}
+    found: list[ResidualLines] = []
+    for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
+        if segment.kind == "rest":
+            continue
+        if index in periods:
+            starts = tuple(s for s in periods[index].starts if whole[s : s + segment.period].all())
+            if starts:
+                found += _of_periods(recording, seen, Periods(index, segment, starts, periods[index].settled))
+        else:
+            found += _of_windows(recording, seen, segment, whole)
+    return found
+
+
+def _of_periods(recording: Recording, seen: Observation, periods: Periods) -> list[ResidualLines]:
+    excitation = look_spectra(instrument_of(recording), periods).mean(axis=0)
+    driven = detection_lines(excitation, held_samples(instrument_of(recording)))
+    if driven is None:
+        return []
+    lines_hz = periods.frequency_hz(recording.sample_rate_hz)
+    response = np.abs(look_spectra(seen.measured, periods).mean(axis=0)) ** 2
+    residual = np.abs(look_spectra(seen.measured - seen.predicted, periods).mean(axis=0)) ** 2
+    noise = _noise_power(seen, lines_hz, periods.looks) / periods.length
+    inputs = "+".join(driving_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
+    lowest, highest = (float(line) for line in lines_hz[driven.driven][[0, -1]])
+    inside = (lines_hz >= lowest) & (lines_hz <= highest)
+    seconds = periods.looks * periods.length / recording.sample_rate_hz
+    found = []
+    for band in octaves_between(lowest, highest):
+        chosen = inside & within(lines_hz, band)
+        if (chosen & driven.driven).any():
+            where = (inputs, periods.segment.amplitude, band, seconds, float(chosen.sum()))
+            found.append(_summed(where, residual[chosen], noise[chosen], response[chosen], seen.quantities))
+    return found
+
+
+def _of_windows(recording: Recording, seen: Observation, segment: Segment, whole: BoolArray) -> list[ResidualLines]:
+    length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
+    starts = [
+        s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if whole[s : s + length].all()
+    ]
+    command = instrument_of(recording)[segment.start : segment.stop]
+    if length < 16 or not starts or not np.isfinite(command).all():
+        return []
+    lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
+    excitation = np.sum(_window_power(instrument_of(recording), starts, length), axis=2)
+    response = _window_power(seen.measured, starts, length)
+    residual = _window_power(seen.measured - seen.predicted, starts, length)
+    noise = np.broadcast_to(_noise_power(seen, lines_hz, 1) / length, response.shape)
+    inputs = "+".join(driving_inputs(command.var(axis=0), recording.command.channels))
+    by_band = [(band, within(lines_hz, band)) for band in octaves_between(2 * float(lines_hz[0]), float(lines_hz[-1]))]
+    strongest = max(float(excitation[:, lines].sum(axis=1).max(initial=0.0)) for _, lines in by_band)
+    found = []
+    for band, lines in by_band:
+        power = excitation[:, lines].sum(axis=1)
+        if not lines.any() or power.max() <= _DRIVEN_IN_BAND * strongest:
+            continue
+        chosen = np.ix_(power > _DRIVEN_IN_WINDOW * power.max(), lines)
+        windows, width = len(chosen[0]), int(lines.sum())
+        independent = windows * width / (_HANN_NEIGHBOURS * (_HANN_OVERLAP if windows > 1 else 1.0))
+        where = (
+            inputs,
+            segment.amplitude,
+            band,
+            windows * length / 2 / recording.sample_rate_hz,
+            max(independent, 1.0),
+        )
+        flat = [power_of[chosen].reshape(windows * width, -1) for power_of in (residual, noise, response)]
+        per_window = _summed(where, flat[0], flat[1], flat[2], seen.quantities)
+        found.append(_per_window(per_window, windows))
+    return found
+
+
+def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
+    """(windows, lines, channels)"""
+    hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
+    looks = np.stack([samples[start : start + length] for start in starts])
+    return np.abs(spectra((looks - looks.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
+
+
+def _noise_power(seen: Observation, lines_hz: FloatArray, looks: int) -> FloatArray:
+    """Times length: of the mean of that many looks. What repeats of rounding does not average out."""
+    density = np.stack([np.interp(lines_hz, seen.noise_hz, channel) for channel in seen.noise.density.T], axis=1)
+    return (density - seen.noise.rounding) / looks + seen.noise.rounding
+
+
+def _summed(
+    where: tuple[str, float, Band, float, float],
+    residual: FloatArray,
+    noise: FloatArray,
+    response: FloatArray,
+    quantities: tuple[str, ...],
+) -> ResidualLines:
+    """residual, noise, response: (lines, channels) squared magnitudes of a one-sided spectrum."""
+    signal = np.maximum(response - noise, 0.0)
+    loudest = np.stack([signal[:, [q == own for q in quantities]].max(axis=1) for own in quantities], axis=1)
+    heard = np.maximum(signal, _HEARD**2 * loudest)
+    quiet = np.maximum(noise, np.finfo(np.float64).tiny)
+    lines = where[4]
+    return ResidualLines(
+        *where,
+        2 * residual.sum(axis=0),
+        2 * noise.sum(axis=0),
+        2 * heard.sum(axis=0),
+        np.mean(residual / quiet, axis=0),
+        lines * np.mean(heard / quiet, axis=0),
+    )
+
+
+def _per_window(summed: ResidualLines, windows: int) -> ResidualLines:
+    """Mean squares are those of a mean window."""
+    return ResidualLines(
+        summed.input, summed.amplitude, summed.band_hz, summed.seconds, summed.lines,
+        summed.residual / windows, summed.noise / windows, summed.signal / windows,
+        summed.whitened, summed.signal_to_noise,
+    )  # fmt: skip

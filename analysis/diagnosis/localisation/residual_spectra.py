@@ -1,0 +1,105 @@
+"""A residual's spectrum over all channels at once, response first, then position: what an entry point is judged by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.channel_noise import ChannelNoise
+from analysis.diagnosis.data.detection_lines import BoolArray, detection_lines, held_samples
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
+from analysis.diagnosis.localisation.mismatch_cells import Prediction
+from equalizer.identification.experiments import instrument_of
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+_WINDOW_S = 2.0
+_HEARD = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualSpectra:
+    """Experiments on the same lines."""
+
+    frequency_hz: FloatArray
+    """(lines,), within the driven band"""
+    residual: ComplexArray
+    """(experiments, lines, channels)"""
+    noise: FloatArray
+    """(experiments, lines, channels): expected |error|²."""
+    responses: int
+    """So many of the channels are the response's."""
+
+
+def residual_spectra(
+    recording: Recording,
+    prediction: Prediction,
+    floor: NoiseFloor,
+    used: BoolArray | None = None,
+    model_error: float = 0.01,
+) -> ResidualSpectra | None:
+    """Of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the noise
+    is not known. used: (n,), the samples that count. model_error: share of the response on each line that the model is
+    not trusted for, counted as noise: else what re-tuning leaves on other axes passes for a second force."""
+    left = [recording.response.samples - prediction.response]
+    noises = [floor.response]
+    if recording.position is not None and prediction.position is not None and floor.position is not None:
+        left.append(recording.position.samples - prediction.position)
+        noises.append(floor.position)
+    residual = np.hstack(left)
+    whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
+    looks = [one for one in (_within(periods, whole) for periods in settled_periods(recording)) if one.starts]
+    if not looks:
+        looks = _windows(recording, whole)
+    looks = [one for one in looks if one.length == looks[0].length]
+    if not looks or not floor.known:
+        return None
+    lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
+    excitation = np.stack([look_spectra(instrument_of(recording), one).mean(axis=0) for one in looks])
+    together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
+    driven = detection_lines(together, held_samples(instrument_of(recording)))
+    if driven is None:
+        return None
+    first, last = np.flatnonzero(driven.driven)[[0, -1]]
+    inside = slice(int(first), int(last) + 1)
+    spectra = np.stack([look_spectra(residual, one).mean(axis=0)[inside] for one in looks])
+    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], one) for one in looks])
+    noise += model_error**2 * np.stack([_answered(recording, one, len(noises) > 1)[inside] for one in looks])
+    return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
+
+
+def _within(periods: Periods, whole: BoolArray) -> Periods:
+    starts = tuple(start for start in periods.starts if whole[start : start + periods.length].all())
+    return Periods(periods.index, periods.segment, starts, periods.settled)
+
+
+def _windows(recording: Recording, whole: BoolArray) -> list[Periods]:
+    """Each a look of its own, for windows are not alike."""
+    length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
+    found = []
+    for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
+        for start in range(segment.start, segment.stop - length + 1, length):
+            if segment.kind != "rest" and whole[start : start + length].all():
+                window = Segment(start, start + length, segment.kind, segment.amplitude, length, segment.role)
+                found.append(Periods(index, window, (start,), True))
+    return found
+
+
+def _answered(recording: Recording, periods: Periods, position: bool) -> FloatArray:
+    """(lines, channels): squared magnitudes; a channel counts for a tenth of the loudest of its signal at least."""
+    signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
+    parts = []
+    for signal in signals:
+        power = np.abs(look_spectra(signal.samples, periods).mean(axis=0)) ** 2
+        parts.append(np.maximum(power, _HEARD**2 * power.max(axis=1, keepdims=True)))
+    return np.hstack(parts)
+
+
+def _noise(noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods) -> FloatArray:
+    parts = []
+    for noise in noises:
+        density = np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1)
+        parts.append(((density - noise.rounding) / periods.looks + noise.rounding) / periods.length)
+    return np.hstack(parts)

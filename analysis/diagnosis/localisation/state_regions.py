@@ -1,0 +1,183 @@
+"""In which state a mismatch sits: at what position, speed, command, response or time a residual force or residual is
+large, or depends on the state by its sign."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from analysis.diagnosis.localisation.block_permutation import IntArray, block_length, permutation_p_values
+from analysis.diagnosis.localisation.state_words import dependence_in_words, region_in_words
+from equalizer.signals.signal import FloatArray
+
+StateKind = Literal["position", "velocity", "command", "response", "time"]
+_BINS = 12
+PERMUTATIONS = 60
+_CONCENTRATED = 1.5
+"""Mean square of a bin, of what it would be anywhere, from which on a bin belongs to a region."""
+_LEAST_SHARE = 0.05
+"""Of the power that means over bins must explain."""
+_TINY = np.finfo(np.float64).tiny
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    kind: StateKind
+    symbol: str
+    """As it is to be read: "v", "x", "fx", "ax", "t"."""
+    unit: str
+    values: FloatArray
+    """(n,)"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disturbance:
+    """A residual, or the force that would explain it."""
+
+    values: FloatArray
+    """(n,)"""
+    strata: IntArray
+    """(n,): a number for each condition, or segment; -1 = not used. What is driven, and how hard, differs between them,
+    so samples are compared within them."""
+    signal: FloatArray | None = None
+    """(n,): what the disturbance is a part of. Needed for elapsed time: asked is whether its share of it changes."""
+
+
+@dataclass(frozen=True, slots=True)
+class StateRegion:
+    kind: StateKind
+    symbol: str
+    by: Literal["size", "sign"]
+    """Whether the mismatch is larger there, or has a mean that follows the state."""
+    share: float
+    """Of the mismatch's power: inside the region (size), or explained by the means over bins (sign)."""
+    occupied: float
+    """Share of the samples in the region; 1 for sign."""
+    p_value: float
+    words: str
+    """For `Mismatch.state`: "near v = 0"."""
+
+
+def state_regions(
+    disturbance: Disturbance, states: Sequence[State], seed: int, permutations: int = PERMUTATIONS
+) -> tuple[StateRegion, ...]:
+    """Smallest p-value first, then largest share; only regions that stand out. p-values are of single tests, by block
+    permutation within segments; they depend on the seed in their third digit.
+
+    Raises ValueError where a state has another length than the disturbance.
+    """
+    for state in states:
+        if state.values.shape != disturbance.values.shape:
+            raise ValueError(f"{state.symbol} has shape {state.values.shape}, not {disturbance.values.shape}")
+    there = (disturbance.strata >= 0) & np.isfinite(disturbance.values)
+    if there.sum() < 10 * _BINS or not disturbance.values[there].any():
+        return ()
+    used = np.flatnonzero(there)[np.argsort(disturbance.strata[there], kind="stable")]
+    values, strata = disturbance.values[used], disturbance.strata[used]
+    random = np.random.default_rng(seed)
+    block = block_length(values)
+    found: list[StateRegion] = []
+    inside = [(state, state.values[used]) for state in states if state.kind != "time"]
+    if inside:
+        expected = _mean_square_in(values, strata)
+        found += _tested(_Asked(values, expected, strata, block), inside, permutations, random)
+    times = [(state, _within_stratum(strata)) for state in states if state.kind == "time"]
+    if times and disturbance.signal is not None:
+        signal = disturbance.signal[used] ** 2
+        share = _mean_square_in(values, strata) / np.maximum(_mean_square_in(disturbance.signal[used], strata), _TINY)
+        found += _tested(_Asked(values, share * signal, strata, block), times, permutations, random)
+    return tuple(sorted(found, key=lambda region: (region.p_value, -region.share)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    values: FloatArray
+    expected: FloatArray
+    """Mean square that each sample would have if the state did not matter."""
+    strata: IntArray
+    block: int
+
+
+def _tested(
+    asked: _Asked, states: Sequence[tuple[State, FloatArray]], permutations: int, random: np.random.Generator
+) -> list[StateRegion]:
+    by_size = [_equal_bins(np.abs(v) if _by_magnitude(state) else v) for state, v in states]
+    by_sign = [_equal_bins(v) for state, v in states if _has_sign(state)]
+    power, total = asked.values**2, float(np.sum(asked.values**2))
+
+    def statistics(order: IntArray) -> FloatArray:
+        moved, expected, means = power[order], asked.expected[order], asked.values[order]
+        sizes = [_unevenness(_sums(b, moved), _sums(b, expected)) for b in by_size]
+        signs = [float(np.sum(_sums(b, means) ** 2 / np.bincount(b))) / total for b in by_sign]
+        return np.array(sizes + signs)
+
+    p_values = permutation_p_values(statistics, asked.strata, asked.block, permutations, random)
+    found = []
+    for (state, v), bins, p_value in zip(states, by_size, p_values, strict=False):
+        region = _region(state, v, bins, asked)
+        if region is not None:
+            share, occupied, words = region
+            found.append(StateRegion(state.kind, state.symbol, "size", share, occupied, float(p_value), words))
+    signed = [state for state, _ in states if _has_sign(state)]
+    for state, bins, p_value in zip(signed, by_sign, p_values[len(states) :], strict=True):
+        means = _sums(bins, asked.values) / np.bincount(bins)
+        share = float(np.sum(np.bincount(bins) * means**2)) / total
+        if share >= _LEAST_SHARE:
+            words = dependence_in_words(state.symbol, means)
+            found.append(StateRegion(state.kind, state.symbol, "sign", share, 1.0, float(p_value), words))
+    return found
+
+
+def _region(state: State, values: FloatArray, bins: IntArray, asked: _Asked) -> tuple[float, float, str] | None:
+    """Share, occupied, words of the stretch of bins around the largest that stand out; None where none does."""
+    power = asked.values**2
+    one_stratum = bool((asked.strata == asked.strata[0]).all())
+    ratio = _sums(bins, power) / np.maximum(_sums(bins, asked.expected), _TINY)
+    top = int(np.argmax(ratio))
+    if ratio[top] < _CONCENTRATED:
+        return None
+    first = last = top
+    while first > 0 and ratio[first - 1] >= _CONCENTRATED:
+        first -= 1
+    while last < len(ratio) - 1 and ratio[last + 1] >= _CONCENTRATED:
+        last += 1
+    inside = (bins >= first) & (bins <= last)
+    share = float(power[inside].sum() / max(float(power.sum()), _TINY))
+    centre = float(np.average(values[inside], weights=power[inside]))
+    words = region_in_words(state.kind, state.symbol, state.unit, (first, last, len(ratio)), centre, one_stratum)
+    return share, float(np.mean(inside)), words
+
+
+def _unevenness(seen: FloatArray, expected: FloatArray) -> float:
+    return float(np.sum((seen - expected) ** 2 / np.maximum(expected, _TINY)) / max(float(expected.sum()), _TINY))
+
+
+def _within_stratum(strata: IntArray) -> FloatArray:
+    """How far into its stratum each sample lies, 0 to 1. strata: (n,), sorted."""
+    _, first, number, length = np.unique(strata, return_index=True, return_inverse=True, return_counts=True)
+    return np.asarray((np.arange(len(strata)) - first[number]) / length[number], dtype=np.float64)
+
+
+def _sums(bins: IntArray, weights: FloatArray) -> FloatArray:
+    return np.asarray(np.bincount(bins, weights), dtype=np.float64)
+
+
+def _mean_square_in(values: FloatArray, strata: IntArray) -> FloatArray:
+    _, numbers = np.unique(strata, return_inverse=True)
+    mean = _sums(numbers, values**2) / np.bincount(numbers)
+    return np.asarray(mean[numbers], dtype=np.float64)
+
+
+def _equal_bins(values: FloatArray) -> IntArray:
+    """Equally filled, as far as equal values allow. (n,)"""
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    return np.unique(np.searchsorted(edges, values, side="right"), return_inverse=True)[1].astype(np.int64)
+
+
+def _by_magnitude(state: State) -> bool:
+    return state.kind in ("velocity", "command", "response")
+
+
+def _has_sign(state: State) -> bool:
+    return state.kind in ("position", "velocity")

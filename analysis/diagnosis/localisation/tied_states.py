@@ -1,0 +1,109 @@
+"""Which states a mismatch is tied to: asked of the force that is missing along each axis, or of a sensor's error."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.detection_lines import BoolArray
+from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.localisation.block_permutation import IntArray
+from analysis.diagnosis.localisation.mismatch_cells import LEVEL, MismatchCell
+from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
+from analysis.diagnosis.localisation.state_regions import Disturbance, State, StateRegion, state_regions
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.placing import axis_letter
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+_SEED = 20
+_DRIVEN = 0.02
+"""Of the loudest segment's rms, from which on an axis counts as driven."""
+_CROWDED = 1.5
+"""Share of a mismatch in a region, over the region's share of the samples, from which on it says something."""
+_MOST = 2
+"""Per axis or channel: what hangs on one state is seen in others, too."""
+
+
+def tied_forces(
+    evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], rotational: bool
+) -> tuple[StateMismatch, ...]:
+    """Of the missing force along each driven axis that has a significant cell. p-values are corrected for all regions
+    that were looked at."""
+    found = []
+    for k, channel in enumerate(recording.command.channels):
+        mine = [cell for cell in cells if cell.significant and channel in cell.input.split("+")]
+        if not mine:
+            continue
+        letter = axis_letter(channel, recording.command.channels)
+        length, speed = ("rad", "ω") if rotational else ("m", "v")
+        command = evidence.command[:, k]
+        states = [
+            State("position", letter if len(letter) == 1 else "x", length, evidence.axis_position[:, k]),
+            State("velocity", speed, f"{length}/s", evidence.axis_velocity[:, k]),
+            State("command", channel, "", command),
+            State("time", "t", "s", np.arange(len(command)) / evidence.sample_rate_hz),
+        ]
+        strata = _strata(recording, evidence.used > 0, command)
+        worst = max(mine, key=lambda cell: cell.in_noise)
+        seen = state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
+        found.append([StateMismatch(worst.output, channel, _band(mine), one) for one in seen])
+    return _corrected(found, looked_at=6)
+
+
+def tied_errors(
+    evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
+) -> tuple[StateMismatch, ...]:
+    """Of the error of each response channel among `channels` that has a significant cell."""
+    found = []
+    for k, channel in enumerate(recording.response.channels):
+        own = recording.response.quantities[k]
+        mine = [one for one in cells if one.significant and (one.output, one.quantity) == (channel, own)]
+        if not mine or channel not in channels:
+            continue
+        reading = evidence.response[:, k]
+        states = [
+            State("response", channel, "", reading),
+            State("time", "t", "s", np.arange(len(reading)) / evidence.sample_rate_hz),
+        ]
+        strata = _strata(recording, evidence.used > 0, reading)
+        inputs = "+".join(one for one in recording.command.channels if any(one in m.input.split("+") for m in mine))
+        seen = state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
+        found.append([StateMismatch(channel, inputs, _band(mine), one) for one in seen])
+    return _corrected(found, looked_at=2)
+
+
+def _corrected(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tuple[StateMismatch, ...]:
+    """Bonferroni, over all axes or channels and the regions of each."""
+    tests = looked_at * len(found)
+    kept = []
+    for group in found:
+        raised = [
+            replace(one, region=replace(one.region, p_value=min(1.0, tests * one.region.p_value))) for one in group
+        ]
+        significant = [one for one in raised if one.region.p_value <= LEVEL and _says_something(one.region)]
+        kept += sorted(significant, key=lambda one: -one.region.share)[:_MOST]
+    return tuple(kept)
+
+
+def _says_something(region: StateRegion) -> bool:
+    if region.words.startswith("at middling"):
+        return False
+    return region.by == "sign" or region.share > _CROWDED * region.occupied
+
+
+def _strata(recording: Recording, used: BoolArray, driven: FloatArray) -> IntArray:
+    """Number of the segment; -1 where samples do not count, or next to nothing drives them. (n,)"""
+    n = len(driven)
+    strata = np.full(n, -1, dtype=np.int64)
+    parts = [(s.start, min(s.stop, n)) for s in recording.segments if s.kind != "rest" and s.start < n] or [(0, n)]
+    loud = [float(np.sqrt(np.nanmean(driven[start:stop] ** 2))) for start, stop in parts]
+    for number, ((start, stop), rms) in enumerate(zip(parts, loud, strict=True)):
+        if rms > _DRIVEN * max(loud):
+            strata[start:stop] = number
+    strata[~used] = -1
+    return strata
+
+
+def _band(cells: Sequence[MismatchCell]) -> Band:
+    return min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)

@@ -1,0 +1,193 @@
+"""What a finished search says, put into the document and what is drawn beside it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.data.observed import Mask
+from analysis.diagnosis.document import Diagnosis
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import without_claim
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.localisation import Localisation, localised
+from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
+from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
+from analysis.diagnosis.result.black_box import black_box
+from analysis.diagnosis.result.error_table import channel_errors, errors_of
+from analysis.diagnosis.result.findings import BlackBox, Course, Findings, Signature
+from analysis.diagnosis.result.impact_remainder import impact_remainder
+from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
+from analysis.diagnosis.result.proposed_experiment import Proposal, proposed_experiment
+from analysis.diagnosis.result.signature_curves import Names, signature_of
+from analysis.diagnosis.result.unit_doubt import unit_sentences
+from analysis.diagnosis.search.determined import number_errors
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.learn_clean_floor import learned_sentence
+from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.verdict import Judgement
+from equalizer.effects.effect import Values
+from equalizer.effects.placing import axis_letter, model_effects
+from equalizer.signals.recording import Recording
+
+
+def assembled(
+    arena: Arena,
+    found: Explanation,
+    judged: Judgement,
+    floors: tuple[NoiseFloor, ...],
+    names: Sequence[str],
+    learned: CleanFloor,
+) -> Findings:
+    """found.after is what is named; the same as re-tuned where nothing is. names: of the recordings. learned: what
+    clean recordings differ by."""
+    measure, tuning = arena.whole, arena.tuning
+    recording, fitted = measure.records[0].recording, found.after.fitted
+    said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
+    channels = channel_names(recording, len(measure.noise))
+    maps, courses = maps_of(measure, found, floors, learned), _courses(measure, found, names)
+    local = localised(measure, tuning, found, floors, maps.cells)
+    proposal = _proposal(arena, found, judged)
+    document = _document(arena, found, judged, (maps, local), proposal)
+    effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
+    return Findings(
+        diagnosis=document,
+        explanation=found,
+        given=tuning.model,
+        improved=replace(tuning.tuned(fitted.deviations), effects=effects),
+        named=placed,
+        evidence=gather_evidence(measure, tuning, found.retuned.fitted),
+        courses=courses,
+        noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
+        channel_errors=channel_errors(found, channels),
+        mismatch=maps.rows,
+        signatures=_signatures(arena, found, said),
+        black_box=_black_box(measure, found, document),
+        remarks=_remarks(learned_sentence(learned, channels), *unit_sentences(courses), *_of_noise(floors)),
+        maps=maps.cells,
+        local=local,
+        floor=floors[0],
+        tuning=tuning,
+        axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
+        proposal=proposal,
+        split_s=_split_s(measure),
+    )
+
+
+def _black_box(measure: ErrorMeasure, found: Explanation, document: Diagnosis) -> BlackBox | None:
+    if found.statistic is not None:
+        return None
+    numbers = max(len(found.after.fitted.hypothesis.point), 1)
+    return black_box(measure, found.retuned, numbers, document.fit.test.after)
+
+
+def _of_noise(floors: tuple[NoiseFloor, ...]) -> list[str]:
+    return [remark for floor in floors for remark in floor.remarks]
+
+
+def _remarks(*sentences: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(filter(None, sentences)))
+
+
+def _split_s(measure: ErrorMeasure) -> dict[str, float]:
+    """Seconds to fit, to choose and to test by."""
+    rate_hz = measure.records[0].recording.sample_rate_hz
+    return {
+        part: sum(int(getattr(record, part).sum()) for record in measure.records) / rate_hz
+        for part in ("fit", "choose", "test")
+    }
+
+
+def _document(
+    arena: Arena, found: Explanation, judged: Judgement, looked: tuple[Maps, Localisation], proposal: Proposal | None
+) -> Diagnosis:
+    measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
+    maps, local = looked
+    said = said_of(measure.records[0].recording, tuning.model)
+    return Diagnosis(
+        verdict=judged.verdict,
+        mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
+        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
+        effects=named_effects(found, number_errors(arena, found), said) if judged.named else (),
+        retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
+        remainder=()
+        if judged.verdict not in ("partly_explained", "unexplained")
+        else impact_remainder(measure, found)
+        or mismatch_rows(maps.cells["after"], local.states["after"])
+        or whole_mismatch(measure, found.after),
+        fit=errors_of(measure, found),
+        error=measure.name,
+        next_experiment=None if proposal is None else proposal.document,
+    )
+
+
+def _proposal(arena: Arena, found: Explanation, judged: Judgement) -> Proposal | None:
+    foretold = judged.named and arena.whole.name == "free simulation" and found.statistic is None
+    return proposed_experiment(arena, found) if foretold else None
+
+
+def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
+    """The response's, then the position's."""
+    position = () if recording.position is None else recording.position.channels
+    return (*recording.response.channels, *position)[:count]
+
+
+def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) -> tuple[Course, ...]:
+    courses = []
+    for number, record in enumerate(measure.records):
+        count = record.measured.shape[1]
+        before, retuned, after = (
+            record.measured - one.fitted.residuals[number] * measure.unit
+            for one in (found.before, found.retuned, found.after)
+        )
+        courses.append(
+            Course(
+                name=names[number] if number < len(names) else f"recording {number + 1}",
+                sample_rate_hz=record.recording.sample_rate_hz,
+                channels=channel_names(record.recording, count),
+                units=_units(record.recording)[:count],
+                measured=record.measured,
+                before=before,
+                retuned=retuned,
+                after=after,
+                tested=_stretches(record.test),
+            )
+        )
+    return tuple(courses)
+
+
+def _units(recording: Recording) -> tuple[str, ...]:
+    signals = [one for one in (recording.response, recording.position) if one is not None]
+    return tuple(
+        one.unit if isinstance(one.unit, str) else one.unit[k] for one in signals for k in range(len(one.channels))
+    )
+
+
+def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
+
+
+def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature, ...]:
+    """Each named effect's, against the final model without it alone."""
+    measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
+    names = Names(
+        tuple(axis_letter(one, said.inputs) for one in said.inputs), said.outputs, said.response_unit, said.rotational
+    )
+    hold, drawn = measure.records[0].recording.hold, []
+    for number in range(len(fitted.hypothesis.claims)):
+        others = without_claim(fitted.hypothesis, number)
+        bare = gather_evidence(measure, tuning, evaluated(measure, tuning, fitted.deviations, others))
+        own = fitted.hypothesis.of_claim(number)
+        drawn.append(
+            signature_of(bare[0], max(own, key=lambda one: _strength(one.values)), others.placed(), names, hold)
+        )
+    return tuple(drawn)
+
+
+def _strength(values: Values) -> float:
+    """By the main number, which comes first."""
+    return abs(next(iter(values.values())))

@@ -1,0 +1,55 @@
+"""The errors of the given, the re-tuned and the completed model, normalised and against the noise."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from analysis.diagnosis.document import Errors, Fit
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.standing import rms_over
+from analysis.diagnosis.search.explain import Explanation, Statistic
+from analysis.diagnosis.search.rivalry import Contender
+
+
+def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
+    """Root mean square over the channels of each one's rms error over its rms signal. "fit" holds the samples to choose
+    by, too."""
+    if found.statistic is not None:
+        return Fit(*(_by_statistic(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
+    return Fit(_errors(measure, found, ("fit", "choose")), _errors(measure, found, ("test",)))
+
+
+def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
+    """By stage and channel: rms over the test samples in units of the noise."""
+    stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
+    return {
+        stage: dict(zip(names, contender.standing.test.tolist(), strict=True)) for stage, contender in stages.items()
+    }
+
+
+def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
+    """Root mean square over the channels of the logarithm that a prediction is off by."""
+
+    def one(contender: Contender) -> float | None:
+        off = np.array([getattr(contender.standing, part) for part in parts]) * statistic.chance
+        whole = float(np.sqrt(np.mean(off**2)))
+        return whole if np.isfinite(whole) else None
+
+    chance = float(np.sqrt(np.mean(statistic.chance**2)))
+    return Errors(one(found.before), one(found.retuned), one(found.after), chance)
+
+
+def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:
+    masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
+    if not any(mask.any() for mask in masks):
+        return Errors(None, None, None, None)
+    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
+    size = np.maximum(rms_over(measure.records, signals, masks), np.finfo(float).tiny)
+
+    def one(contender: Contender) -> float | None:
+        rms = rms_over(measure.records, contender.fitted.residuals, masks) * measure.unit / size
+        whole = float(np.sqrt(np.mean(rms**2)))
+        return whole if np.isfinite(whole) else None
+
+    noise = float(np.sqrt(np.mean((measure.noise / size) ** 2)))
+    return Errors(one(found.before), one(found.retuned), one(found.after), noise)

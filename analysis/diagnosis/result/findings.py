@@ -1,0 +1,102 @@
+"""All that a diagnosis found: the document that is handed on, and what its figures and sentences are drawn from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.document import Diagnosis, Mismatch
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.localisation.localisation import Localisation
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
+from analysis.diagnosis.result.proposed_experiment import Proposal
+from analysis.diagnosis.search.explain import Explanation
+from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """One recording, measured and predicted; channels are the response's, then the position's; all (n, c), SI."""
+
+    name: str
+    sample_rate_hz: float
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    measured: FloatArray
+    before: FloatArray
+    retuned: FloatArray
+    after: FloatArray
+    tested: tuple[tuple[int, int], ...]
+    """Stretches of samples that nothing was fitted to or chosen by."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signature:
+    """What shows a named effect: the missing force or error against what it hangs on, with the fitted law on it."""
+
+    effect: str
+    axis: str | None
+    along: str
+    """What the abscissa is, with unit: "velocity of x (m/s)"."""
+    of: str
+    """What the ordinate is, with unit."""
+    measured_at: FloatArray
+    """(k,)"""
+    measured: FloatArray
+    """(k,): mean of what is missing there,"""
+    spread: FloatArray
+    """and its standard error, (k,)."""
+    law_at: FloatArray
+    """(q,)"""
+    law: FloatArray
+    """(q,)"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BlackBox:
+    """A model without physics and with as many numbers, fitted to the same samples."""
+
+    kind: str
+    numbers: int
+    test: float
+    """Its error, as `document.Errors`; beside it, the physics' own:"""
+    physics: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    diagnosis: Diagnosis
+    explanation: Explanation
+    given: MechanicalModel
+    improved: MechanicalModel
+    """Re-tuned, with the named effects among its `effects`."""
+    named: tuple[PlacedEffect, ...]
+    evidence: tuple[Evidence, ...]
+    """Of the re-tuned model, per recording."""
+    courses: tuple[Course, ...]
+    noise_rms: Mapping[str, float]
+    """By channel, SI."""
+    channel_errors: Mapping[str, Mapping[str, float]]
+    """By "before", "retuned", "after", then by channel: rms over the test samples in units of the noise."""
+    mismatch: tuple[Mismatch, ...]
+    """All cells that were looked at, not only the significant ones (p_value and share say which)."""
+    signatures: tuple[Signature, ...]
+    black_box: BlackBox | None
+    remarks: tuple[str, ...]
+    """Sentences that a reader must know: what was assumed, what is weak, what is not sensible physically."""
+    maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
+    """By "before", "retuned", "after": every cell of the map, in units of the noise."""
+    local: Localisation = field(default_factory=Localisation)
+    """In which states it sits, through what it enters, of which kind it is."""
+    floor: NoiseFloor | None = None
+    """Of the first recording: how the noise was measured, and its spectrum."""
+    tuning: Tuning | None = None
+    """What the deviations of `explanation` count: names, units, sizes."""
+    axes: tuple[str, ...] = ()
+    """The driven axes, as a reader calls them; empty = x, y, z."""
+    proposal: Proposal | None = None
+    """Of what to record next, where rivals are as good as what is named."""
+    split_s: Mapping[str, float] = field(default_factory=dict)
+    """Seconds by "fit", "choose", "test"."""

@@ -1,0 +1,74 @@
+"""Where a mismatch sits, in plain sentences."""
+
+from collections.abc import Sequence
+
+from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
+from analysis.diagnosis.localisation.localisation import Localisation
+from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
+from analysis.diagnosis.unit_wording import share_text
+from analysis.wording import listed, p_text
+
+FEWEST_LINES = 40
+"""Loud lines below which nothing is said of where a mismatch enters."""
+_AS_GOOD = 0.05
+_FORCE = "the drive, the mechanism and a hand all push there, and these channels cannot tell which does"
+_FORCES = "drives, mechanism and a hand enter so, and so does timing, which shifts all channels alike"
+
+
+def localisation_sentences(local: Localisation) -> tuple[str, ...]:
+    """Of what re-tuning leaves: where it enters, and the states that it is tied to."""
+    said = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
+    return tuple(one for one in said if one)
+
+
+def entry_sentence(entry: EntryPoint | None) -> str:
+    """Empty where too little is there to say it."""
+    if entry is None or not entry.ranking or entry.lines < FEWEST_LINES:
+        return ""
+    best = entry.ranking[0]
+    kind = "" if best.place == "sensor" else f" ({_FORCES if best.axis is None else _FORCE})"
+    explained = f"{_percent(best)} of it, at the median of {entry.lines} frequency lines"
+    return " ".join(
+        filter(None, (f"What re-tuning leaves enters as {best.name}{kind}: {explained}{_next(entry)}.", _rule(entry)))
+    )
+
+
+def states_sentence(states: Sequence[StateMismatch]) -> str:
+    if not states:
+        return ""
+    parts = [
+        f"{one.output}, driven by {one.input}, {one.region.words} ({share_text(one.region.share)} of what is missing, "
+        f"{p_text(one.region.p_value)})"
+        for one in states
+    ]
+    return f"It is tied to a state: {'; '.join(parts)}."
+
+
+def _next(entry: EntryPoint) -> str:
+    best, others = entry.ranking[0], [one for one in entry.ranking[1:] if one.name not in entry.ranking[0].alike]
+    alike = f"; so does {listed(best.alike)}, which looks the same" if best.alike else ""
+    # Forces along several axes hold each single one, and errors of several channels each channel's.
+    rivals = [one for one in others if not (one.axis is None and one.place == best.place)]
+    if not rivals:
+        return alike
+    second = rivals[0]
+    chance = p_text(second.p_value)
+    if second.p_value > _AS_GOOD:
+        return f"{alike}; {second.name} would explain it about as well ({_percent(second)}, {chance})"
+    return f"{alike}; next comes {second.name} with {_percent(second)} ({chance} that it is as good)"
+
+
+def _rule(entry: EntryPoint) -> str:
+    if entry.rule is None or entry.rule.verdict == "undecided":
+        return ""
+    if entry.rule.verdict == "motion":
+        return (
+            "The position shows it, too: the device itself moves otherwise, and no sensor of the response is at fault."
+        )
+    return (
+        "The position shows nothing of it: the fault is in how the response is measured, not in how the device moves."
+    )
+
+
+def _percent(score: EntryScore) -> str:
+    return share_text(max(score.share, 0.0))

@@ -1,0 +1,174 @@
+"""The effects that a diagnosis names, as its document says them: numbers with intervals, rivals with reasons."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.document import Estimate, NamedEffect, Rival
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
+from analysis.diagnosis.result.impact_wording import BY_CHANCE, BY_NOISE
+from analysis.diagnosis.result.probability import probabilities
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.parsimony import both_stand, only_refines
+from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.verdict import BY_CHANCE as OF_CHANCE
+from analysis.diagnosis.search.verdict import shares_taken
+from equalizer.effects.placing import axis_letter
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+RIVALS = 6
+BESIDE_NOISE, EXACT = 2.5, 0.005
+"""No law is exactly a device's, and what differs pulls at the numbers more than noise does: by what factor, and by what
+share of the number beside it. Set so that on a bank of simulated devices nine intervals in ten held the truth; by noise
+alone, six did (docs/proof.md)."""
+_TELLING = 0.005
+"""Errors that differ by less are the same to a reader."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Said:
+    """Words that the numbers need."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    response_unit: str
+    rotational: bool
+
+
+def said_of(recording: Recording, model: MechanicalModel) -> Said:
+    unit = recording.response.unit
+    return Said(
+        recording.command.channels,
+        recording.response.channels,
+        unit if isinstance(unit, str) else unit[0],
+        model.rotational,
+    )
+
+
+def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
+    """errors: (numbers,), standard errors of the final hypothesis's point."""
+    whole, named, first = found.after.fitted.hypothesis, [], 0
+    shares = shares_taken(found.retuned, found.steps)
+    for number, claim in enumerate(whole.claims):
+        size = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
+        rivals, likely = _rivals(found, number, said)
+        named.append(
+            NamedEffect(
+                effect=claim.effect.name,
+                place=EFFECTS_BY_NAME[claim.effect.name].place,
+                axis=axis_of(claim, said),
+                share=shares[number],
+                probability=likely,
+                parameters=_estimates(whole, number, errors, slice(first, first + size), said),
+                rivals=rivals,
+            )
+        )
+        first += size
+    return tuple(named)
+
+
+def axis_of(claim: Claim, said: Said) -> str | None:
+    """None where all share it."""
+    if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
+        return None
+    sensed = EFFECTS_BY_NAME[claim.effect.name].place == "sensor"
+    channels = said.outputs if sensed else said.inputs
+    return axis_letter(channels[claim.sites[0]], channels)
+
+
+def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
+    contenders = found.rounds[number]
+    left = found.after.standing.seen if found.statistic is None else found.after.standing.seen / OF_CHANCE
+    chances = probabilities(contenders, left)
+    best, by_name = contenders[0], _chances_of_names(contenders, chances)
+    rivals: dict[str, Rival] = {}
+    unit = BY_NOISE if found.statistic is None else BY_CHANCE
+    for other in contenders[1:]:
+        claim = other.fitted.hypothesis.claims[-1]
+        if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
+            continue
+        same = both_stand(best, other)
+        rivals[claim.effect.name] = Rival(
+            claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (said, unit))
+        )
+        if len(rivals) == RIVALS:
+            break
+    return tuple(rivals.values()), by_name[best.fitted.hypothesis.claims[-1].effect.name]
+
+
+def _chances_of_names(contenders: Sequence[Contender], chances: Sequence[float]) -> dict[str, float]:
+    """An effect may contend several times, at other axes or from another start: the name is one."""
+    found: dict[str, float] = {}
+    for one, chance in zip(contenders, chances, strict=True):
+        name = one.fitted.hypothesis.claims[-1].effect.name
+        found[name] = min(1.0, found.get(name, 0.0) + chance)
+    return found
+
+
+def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, str]) -> str:
+    """words: of the device, and what errors are counted in."""
+    said, unit = words
+    worst, least = other.standing.seen, best.standing.seen
+    claim = other.fitted.hypothesis.claims[-1]
+    axis = axis_of(claim, said)
+    where = f" ({axis})" if axis else ""
+    if only_refines(other, best):
+        gain = "too little" if worst < (1 - _TELLING) * least else "nothing"
+        return (
+            f"it holds the named law as a special case{where}, and what it allows beyond that brings {gain}: "
+            f"{worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
+        )
+    if same:
+        return f"as good{where}: it leaves {worst:.2f} times {unit} in the worst channel, the named one {least:.2f}"
+    return f"at its best{where} it leaves {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
+
+
+def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Said) -> dict[str, Estimate]:
+    claim = whole.claims[number]
+    at = _reported(whole, number, whole.point)
+    spread = {name: 0.0 for name in at}
+    for coordinate in range(own.start, own.stop):
+        if not np.isfinite(errors[coordinate]):
+            continue
+        moved = whole.point.copy()
+        moved[coordinate] += errors[coordinate]
+        for name, value in _reported(whole, number, moved).items():
+            spread[name] += (value - at[name]) ** 2
+    units = {
+        p.name: p.unit_in(said.rotational, said.response_unit) for p in EFFECTS_BY_NAME[claim.effect.name].parameters
+    }
+    return {
+        name: Estimate(value, units.get(name, "1"), _interval(value, float(np.sqrt(spread[name]))))
+        for name, value in at.items()
+        if np.isfinite(value)
+    }
+
+
+def _interval(value: float, standard_error: float) -> tuple[float, float] | None:
+    reach = float(np.hypot(1.96 * BESIDE_NOISE * standard_error, EXACT * value)) if standard_error > 0 else 0.0
+    return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
+
+
+def _reported(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+    """The vocabulary's numbers: of the only axis, of the first, or where the effect's size is asked of the largest."""
+    groups = _groups(whole, number, point)
+    claim = whole.claims[number]
+    reported = [dict(claim.effect.report(values)) for values in groups]
+    main = EFFECTS_BY_NAME[claim.effect.name].main.name
+    if claim.effect.name in LARGEST and len(reported) > 1:
+        return max(reported, key=lambda one: abs(one[main]))
+    return reported[0]
+
+
+LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
+"""Whose numbers are those of the largest channel."""
+
+
+def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
+    placed = whole.placed(point)
+    first = sum(claim.groups for claim in whole.claims[:number])
+    return [dict(one.values) for one in placed[first : first + whole.claims[number].groups]]

@@ -1,0 +1,79 @@
+"""What of a fit no engineer would believe, a sentence each."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from analysis.diagnosis.document import NamedEffect
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.unit_wording import value_text
+from equalizer.effects.effect import Parameter, PlacedEffect
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, RESPONSE
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+_AT_THE_EDGE = 1e-3
+_LOSSES = 1e-6
+"""Of the largest damping: what a matrix may be negative by from rounding."""
+
+
+def implausible_sentences(found: Findings) -> tuple[str, ...]:
+    return (
+        *(sentence for placed in found.named for sentence in _of_effect(placed, found)),
+        *(sentence for effect in found.diagnosis.effects for sentence in _of_interval(effect, found.named)),
+        *_of_model(found.improved),
+    )
+
+
+def _of_effect(placed: PlacedEffect, found: Findings) -> Iterator[str]:
+    noun, values = noun_of(placed.effect.name), placed.values
+    for parameter in placed.effect.parameters:
+        value = values[parameter.name]
+        if not parameter.fixed and _at_an_edge(value, parameter):
+            said = value_text(value, _unit(placed.effect.name, parameter.name, found))
+            yield (
+                f"The {parameter.name.replace('_', ' ')} of {noun} ran into the end of what was allowed ({said}): the "
+                "fit has found no best value for it."
+            )
+    if placed.effect.name == "stribeck_friction" and values["static"] < values["coulomb"]:
+        yield "Friction came out smaller at rest than in motion, which real surfaces seldom do."
+
+
+def _at_an_edge(value: float, parameter: Parameter) -> bool:
+    edges = [edge for edge in (parameter.lower, parameter.upper) if edge != parameter.none]
+    return any(np.isclose(value, edge, rtol=_AT_THE_EDGE, atol=0.0) for edge in edges if edge)
+
+
+def _of_interval(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator[str]:
+    placed = next((one for one in named if one.effect.name == effect.effect), None)
+    for parameter in placed.effect.parameters[:1] if placed is not None else ():
+        estimate = effect.parameters.get(parameter.name)
+        if estimate is None or estimate.ci95 is None or parameter.none is None:
+            continue
+        low, high = estimate.ci95
+        if low <= parameter.none <= high:
+            said = value_text(estimate.value, estimate.unit, estimate.ci95)
+            yield f"The interval of {noun_of(effect.effect)}, {said}, holds no effect at all: the data hardly bear it."
+
+
+def _of_model(improved: MechanicalModel) -> Iterator[str]:
+    for name, matrix in (("damping", improved.damping), ("stiffness", improved.stiffness)):
+        lowest, largest = _ends(matrix)
+        if lowest < -_LOSSES * max(largest, 1e-300):
+            what = "would gain energy by itself" if name == "damping" else "would run away by itself"
+            yield f"The improved model's {name} is negative in one direction: in it, the device {what}."
+
+
+def _ends(matrix: FloatArray) -> tuple[float, float]:
+    values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    return float(values[0]), float(np.abs(values).max())
+
+
+def _unit(effect: str, parameter: str, found: Findings) -> str:
+    known = EFFECTS_BY_NAME.get(effect)
+    for one in known.parameters if known else ():
+        if one.name == parameter:
+            response = found.courses[0].units[0] if found.courses else RESPONSE
+            return one.unit_in(found.given.rotational, response)
+    return "1"

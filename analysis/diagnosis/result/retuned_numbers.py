@@ -1,0 +1,87 @@
+"""Which of the model's own numbers a fit moved, how far, and whether that is still believable, in words."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.errors.output_error import BOUND
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.unit_wording import value_text
+from analysis.wording import listed
+from equalizer.signals.signal import FloatArray
+
+MOVED = 1.0
+"""Standard deviations of its calibration by which a number must move to be named."""
+FAR = 3.0
+"""And to be doubted."""
+_NAMED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class MovedNumber:
+    name: str
+    change: float
+    """In `unit`."""
+    unit: str
+    """SI; "1" for a relative change."""
+    deviations: float
+    """The same in standard deviations of the calibration."""
+
+    @property
+    def text(self) -> str:
+        """ "damping fx +0.35 N s/m (2.1 standard deviations)"."""
+        return f"{self.name} {self.size} ({abs(self.deviations):.2g} standard deviations)"
+
+    @property
+    def size(self) -> str:
+        """The change, with its sign."""
+        sign = "+" if self.change >= 0 else ""
+        size = f"{100 * self.change:.2g} %" if self.unit == "1" else value_text(self.change, self.unit)
+        return f"{sign}{size}".replace("-", "−")
+
+
+def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+    """deviations: (parameters,)"""
+    return tuple(
+        MovedNumber(name, float(change), unit, float(deviation))
+        for name, change, unit, deviation in zip(
+            tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
+        )
+    )
+
+
+def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+    """Those that moved by a standard deviation or more, the furthest first. deviations: (parameters,)"""
+    moved = [one for one in all_numbers(tuning, deviations) if abs(one.deviations) >= MOVED]
+    return tuple(sorted(moved, key=lambda one: -abs(one.deviations)))
+
+
+def retuned_sentence(moved: Sequence[MovedNumber]) -> str:
+    """Beside named physics: what else was turned."""
+    if not moved:
+        return ""
+    texts = [one.text for one in moved[:_NAMED]]
+    more = len(moved) - _NAMED
+    said = listed([*texts, f"{more} more"] if more > 0 else texts)
+    return f"Re-tuned beyond the calibration's standard deviation: {said}."
+
+
+def doubtful_sentences(moved: Sequence[MovedNumber]) -> tuple[str, ...]:
+    """Numbers that left what their calibration makes likely: they may stand for physics that was not named. Many are
+    counted, for all of them stand in the table of numbers."""
+    far = [one for one in moved if abs(one.deviations) >= FAR]
+    if len(far) > _NAMED:
+        edge = sum(abs(one.deviations) >= BOUND - 1e-6 for one in far)
+        return (
+            f"{len(far)} numbers were moved by {FAR:g} standard deviations of their calibration or more"
+            f"{f', {edge} of them as far as they may' if edge else ''}: "
+            "either the calibration is wrong, or they stand for physics that was not named.",
+        )
+    return tuple(
+        f"The {one.name} was moved by {abs(one.deviations):.2g} standard deviations of its calibration"
+        f"{_AS_FAR if abs(one.deviations) >= BOUND - 1e-6 else ''}: "
+        "either the calibration is wrong, or it stands for physics that was not named."
+        for one in far
+    )
+
+
+_AS_FAR = ", as far as it may"

@@ -1,0 +1,204 @@
+"""What shows a named effect: what is missing where the effect alone is left out of the fit, against what it hangs on,
+and the fitted law, played by the simulator and averaged alike."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.signal import welch
+
+from analysis.diagnosis.errors.missing_force import missing_force
+from analysis.diagnosis.errors.unexplained_motion import EXPECTED
+from analysis.diagnosis.result.findings import Signature
+from analysis.diagnosis.result.signature_bins import binned, binned_law, running_rms
+from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.simulator import Played, simulate_mechanism
+from equalizer.signals.recording import Hold
+from equalizer.signals.signal import FloatArray
+
+Along = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
+
+ALONG: Mapping[str, Along] = {
+    "coulomb_friction": "velocity",
+    "asymmetric_friction": "velocity",
+    "stribeck_friction": "velocity",
+    "viscous_damping": "velocity",
+    "quadratic_damping": "velocity",
+    "position_dependent_friction": "velocity",
+    "presliding_hysteresis": "velocity",
+    "added_mass": "acceleration",
+    "hardening_stiffness": "position",
+    "asymmetric_stiffness": "position",
+    "constant_force": "position",
+    "cogging": "position",
+    "end_stop": "position",
+    "force_saturation": "command",
+    "force_deadband": "command",
+    "force_gain": "command",
+    "sensor_clipping": "reading",
+    "sensor_gain": "reading",
+    "sensor_nonlinearity": "reading",
+    "sensor_misalignment": "reading",
+    "cross_axis_sensitivity": "reading",
+    "sensor_offset": "time",
+    "sensor_drift": "time",
+    "clock_drift": "growth",
+}
+"""Of all others the spectrum of what is missing is shown."""
+_FREQUENCY_LINES = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """How a reader calls what is drawn."""
+
+    axes: tuple[str, ...]
+    channels: tuple[str, ...]
+    """Of the response."""
+    unit: str
+    """Of the response."""
+    rotational: bool = False
+
+
+def signature_of(
+    evidence: Evidence, placed: PlacedEffect, others: Sequence[PlacedEffect], names: Names, hold: Hold
+) -> Signature:
+    """evidence: of the final model with all its effects but this one; others: those."""
+    acts, along = placed.effect.acts, ALONG.get(placed.effect.name, "frequency")
+    if along in ("velocity", "position", "acceleration") and not isinstance(acts, (OnCommand, OnResponse)):
+        return _of_motion(evidence, placed, along, names, hold)
+    if along == "command" and isinstance(acts, OnCommand):
+        return _of_command(evidence, placed, names)
+    if along in ("reading", "time", "growth") and isinstance(acts, OnResponse):
+        changed = acts.change(evidence.predicted, evidence.sample_rate_hz, placed.sites, placed.values)
+        if along == "reading":
+            return _of_reading(evidence, placed, changed - evidence.predicted, names)
+        return _of_time(evidence, placed, changed - evidence.predicted, names, along)
+    return _of_frequency(evidence, placed, others, names, hold)
+
+
+def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
+    axis = _strongest(placed.sites, evidence.axis_force)
+    played = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
+    force = played.axis_force
+    if isinstance(placed.effect.acts, Structure):
+        force = _equivalent_force(evidence, played, hold)
+    used, unit = evidence.used > 0, "rad" if names.rotational else "m"
+    unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[along]
+    seen, law_seen = (
+        _course(position[:, axis], velocity[:, axis], along, evidence.sample_rate_hz)
+        for position, velocity in (
+            (evidence.axis_position, evidence.axis_velocity),
+            (played.axis_position, played.axis_velocity),
+        )
+    )
+    at, mean, spread = binned(seen, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = binned_law(law_seen[used], force[used, axis])
+    return Signature(
+        placed.effect.name, names.axes[axis], f"{along} of {names.axes[axis]} ({unit})",
+        f"missing force ({_force_unit(names)})", at, mean, spread, law_at, law,
+    )  # fmt: skip
+
+
+def _course(position: FloatArray, velocity: FloatArray, along: Along, rate_hz: float) -> FloatArray:
+    if along == "acceleration":
+        return np.asarray(np.gradient(velocity) * rate_hz)
+    return velocity if along == "velocity" else position
+
+
+def _equivalent_force(evidence: Evidence, played: Played, hold: Hold) -> FloatArray:
+    """The force on the model without it that would do what another structure does: found as the missing one is."""
+    without = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
+    change, unit = [played.response - without.response], [evidence.noise]
+    if evidence.position_noise is not None:
+        change.append(played.position - without.position)
+        unit.append(evidence.position_noise)
+    expected = EXPECTED * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
+    noise = np.concatenate(unit)
+    return missing_force(evidence.model, np.hstack(change) / noise, noise, evidence.sample_rate_hz, expected).force
+
+
+def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:
+    assert isinstance(placed.effect.acts, OnCommand)
+    axis = _strongest(placed.sites, evidence.axis_force)
+    command, used = evidence.command[:, axis], evidence.used > 0
+    changed = placed.effect.acts.change(command, 1 / evidence.sample_rate_hz, placed.values)
+    at, mean, spread = binned(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_at, law = binned_law(command[used], (changed - command)[used])
+    unit = _force_unit(names)
+    return Signature(
+        placed.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})", f"missing force ({unit})",
+        at, mean, spread, law_at, law,
+    )  # fmt: skip
+
+
+def _of_reading(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
+    used = evidence.used > 0
+    drives = evidence.predicted[used]
+    # The pair of channels in which the effect shows most: how much of what it changes here goes with what is there.
+    together = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
+    here, there = np.unravel_index(int(np.argmax(together)), together.shape)
+    errors = (evidence.response - evidence.predicted)[:, here]
+    at, mean, spread = binned(evidence.predicted[:, there], errors, used, evidence.sample_rate_hz)
+    law_at, law = binned_law(drives[:, there], change[used, here])
+    return Signature(
+        placed.effect.name, names.channels[here], f"predicted {names.channels[there]} ({names.unit})",
+        f"error of {names.channels[here]} ({names.unit})", at, mean, spread, law_at, law,
+    )  # fmt: skip
+
+
+def _of_time(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, along: Along) -> Signature:
+    used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
+    here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
+    errors, seconds = (evidence.response - evidence.predicted)[:, here], np.arange(len(change)) / rate_hz
+    what = f"error of {names.channels[here]} ({names.unit})"
+    if along == "growth":
+        at, mean, spread = running_rms(seconds, errors, used)
+        law_at, law, _ = running_rms(seconds, np.hypot(change[:, here], evidence.noise[here]), used)
+        what = f"rms {what}"
+    else:
+        at, mean, spread = binned(seconds, errors, used, rate_hz)
+        law_at, law = binned_law(seconds[used], change[used, here])
+    return Signature(placed.effect.name, names.channels[here], "time (s)", what, at, mean, spread, law_at, law)
+
+
+def _of_frequency(
+    evidence: Evidence, placed: PlacedEffect, others: Sequence[PlacedEffect], names: Names, hold: Hold
+) -> Signature:
+    rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
+    whole, without = (
+        simulate_mechanism(evidence.model, evidence.command, rate_hz, effects, hold).response
+        for effects in ((*others, placed), tuple(others))
+    )
+    change, errors = whole - without, evidence.response - evidence.predicted
+    here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
+    frequency_hz, measured, spread = _spectrum(errors[used, here], rate_hz)
+    _, law, _ = _spectrum(change[used, here], rate_hz)
+    return Signature(
+        placed.effect.name, names.channels[here], "frequency (Hz)",
+        f"error of {names.channels[here]}, amplitude density ({names.unit}/√Hz)",
+        frequency_hz, measured, spread, frequency_hz, law,
+    )  # fmt: skip
+
+
+def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Amplitude density in twelfths of an octave, with its standard error."""
+    length = min(2 * _FREQUENCY_LINES, len(signal))
+    lines_hz, power = welch(signal, rate_hz, nperseg=length)
+    looks = max(1.0, 1.5 * len(signal) / length)
+    edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
+    which = np.digitize(lines_hz[1:], edges)
+    groups = [power[1:][which == k] for k in np.unique(which)]
+    at = np.array([float(np.exp(np.mean(np.log(lines_hz[1:][which == k])))) for k in np.unique(which)])
+    mean = np.array([float(np.sqrt(group.mean())) for group in groups])
+    return at, mean, mean / 2 / np.sqrt(looks * np.array([len(group) for group in groups]))
+
+
+def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:
+    return max(sites, key=lambda site: float(np.mean(force[:, site] ** 2)))
+
+
+def _force_unit(names: Names) -> str:
+    return "N m" if names.rotational else "N"

@@ -1,0 +1,53 @@
+"""Channels that the model foresees but for a factor or a sign: a unit or a wire is wrong more often than a device is so
+far off."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.diagnosis.result.findings import Course
+
+FACTOR = 5.0
+"""From which, up or down, a factor is doubted;"""
+ALIKE = 0.9
+"""where measured and predicted course correlate so well."""
+
+
+def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
+    """By the model as given."""
+    found: dict[str, float] = {}
+    for course in courses:
+        for channel, name in enumerate(course.channels):
+            factor = _factor(course, channel)
+            if factor is not None and not 1 / FACTOR < factor < FACTOR:
+                found.setdefault(name, factor)
+    return tuple(
+        f"{name} has the course that the model foresees, but {_words(factor)}: its {_what(factor)}, the command's or "
+        "one in the model may be wrong."
+        for name, factor in found.items()
+    )
+
+
+def _factor(course: Course, channel: int) -> float | None:
+    """Of measured to predicted; None where the courses are not alike."""
+    measured, predicted = course.measured[:, channel], course.before[:, channel]
+    known = np.isfinite(measured) & np.isfinite(predicted)
+    if not known.any():
+        return None
+    one, other = (each[known] - np.mean(each[known]) for each in (measured, predicted))
+    sizes = float(np.sqrt(one @ one)), float(np.sqrt(other @ other))
+    together = float(one @ other)
+    if min(sizes) == 0 or not np.isfinite(sizes).all() or abs(together) < ALIKE * sizes[0] * sizes[1]:
+        return None
+    return float(np.copysign(sizes[0] / sizes[1], together))
+
+
+def _words(factor: float) -> str:
+    times = max(abs(factor), 1 / abs(factor))
+    shown = f"{times:.3g}" if times < 100 else f"{times:.0f}"
+    said = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= FACTOR else []
+    return " and ".join([*said, *(["with the other sign"] if factor < 0 else [])])
+
+
+def _what(factor: float) -> str:
+    return "sign" if -FACTOR < factor < -1 / FACTOR else "unit"

@@ -1,0 +1,7 @@
+"""Which effects are missing.
+
+In this order: `seen_directly` names what a recording shows without a model; `explain` re-tunes the model and adds one
+effect after another (`candidates` suggests, `screening` ranks, `rivalry` fits, `parsimony` chooses); `prune` and
+`determined` take out what is not needed or not fixed by the data; `verdict` says what may be claimed. `search` runs
+this, `search_beside_sound` with clean recordings of the same device (`learn_clean_floor`), `impacts` for rattling play.
+"""

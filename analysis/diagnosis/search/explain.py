@@ -1,0 +1,171 @@
+"""From a model and what was observed to the physics that the model lacks: re-tune, screen, fit, choose, add, prune."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
+from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
+from analysis.diagnosis.search.candidates import candidates
+from analysis.diagnosis.search.clock_drift_by_trial import NAME as DRIFTS
+from analysis.diagnosis.search.clock_drift_by_trial import clock_drift_by_trial
+from analysis.diagnosis.search.families import excludes
+from analysis.diagnosis.search.no_answer import silences
+from analysis.diagnosis.search.parsimony import plainest_first
+from analysis.diagnosis.search.patience import OutOfPatienceError, Patience, always, impatient
+from analysis.diagnosis.search.rivalry import Arena, Contender, contest, refine, sensitivity_at
+from analysis.diagnosis.search.same_within_errors import excess
+from analysis.diagnosis.search.screening import screen
+from equalizer.effects.effect import Effect
+from equalizer.signals.signal import FloatArray
+
+RETUNING_ROUNDS = 4
+MOST_EFFECTS = 3
+CLEAN = 1.05
+"""Errors of so many times the noise, in the worst channel, count as noise alone;"""
+SURPRISING = 1.15
+"""or, on the sealed samples, as a sign that re-tuning hid something where it was fitted;"""
+MORE = 1.12
+"""and of so many, as no reason to look for a further effect: laws of real physics are never exact."""
+WORTHWHILE = 0.15
+"""Share of what is left above the noise that an effect must take to be added,"""
+NOTICED = 0.003
+"""and so much in mean log error power."""
+
+Progress = Callable[[str, float], None]
+"""What is being done, and the share of all that is done."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Statistic:
+    """What contenders were compared by where waveforms cannot be predicted."""
+
+    words: str
+    chance: FloatArray
+    """(c,): its usual difference between two courses of one model, which stands where noise does otherwise."""
+    errors: FloatArray
+    """(numbers,): standard errors of the final hypothesis's point."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explanation:
+    before: Contender
+    """The model as given,"""
+    retuned: Contender
+    """re-tuned within its tolerances,"""
+    after: Contender
+    """and with what was found; the same as re-tuned where nothing was."""
+    rounds: tuple[tuple[Contender, ...], ...]
+    """The contenders for the first effect, the second, …; the best first. The last may have brought nothing."""
+    steps: tuple[Contender, ...]
+    """What stood after each effect that was added."""
+    statistic: Statistic | None = None
+    """None where samples were compared, in units of their noise."""
+    ended_early: bool = False
+    """Patience ran out before the search was done."""
+    barred: str = ""
+    """An effect that was not to be named, where nothing but refinements of it explains as much."""
+    undetermined: tuple[str, ...] = ()
+    """Effects that were found, and are not named: the recordings leave their numbers open."""
+
+
+def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Explanation:
+    """patient: asked before each piece of the search for effects; once it says no, what was found until then stands."""
+    before = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    progress("re-tuning the model within its tolerances", 0.02)
+    retuned = _retuned_from(arena, before)
+    base = arena.contender(retuned)
+    confirmed = arena.confirmed(base)
+    surprised = bool(np.nanmax(confirmed.standing.test, initial=0.0) > SURPRISING)
+    rounds: list[tuple[Contender, ...]] = []
+    steps: list[Contender] = []
+    barred = ""
+    hasty, ended_early = replace(arena, map_=impatient(arena.map_, patient)), False
+    for one in arena.certain:
+        base = _with(arena, base, one)
+        rounds.append((base,))
+        steps.append(base)
+    surprised |= arena.sound is not None
+    more = MORE * (1.0 if arena.sound is None else arena.sound.beyond)
+    while (
+        not arena.certain
+        and len(rounds) < MOST_EFFECTS
+        and (base.standing.seen > (more if rounds else CLEAN) or (surprised and not rounds))
+    ):
+        step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+        try:
+            contenders = _next(hasty, catalogue, base.fitted, step)
+        except OutOfPatienceError:
+            ended_early = True
+            break
+        named = tuple(one for one in contenders if one.fitted.hypothesis.claims[-1].effect.name not in arena.barred)
+        rounds.append(named)
+        if not named or not worthwhile(base, named[0]):
+            break
+        if named[0] is not contenders[0]:
+            barred = contenders[0].fitted.hypothesis.claims[-1].effect.name
+            break
+        base = named[0]
+        steps.append(base)
+    ends = (arena.confirmed(arena.contender(before)), confirmed, arena.confirmed(base))
+    return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
+
+
+def _with(arena: Arena, base: Contender, one: Hypothesis) -> Contender:
+    """Whatever it gains."""
+    start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, one))
+    return arena.contender(refine(arena, start))
+
+
+def retuned_alone(arena: Arena) -> Fitted:
+    """Without physics that the model does not name."""
+    return _retuned_from(arena, evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
+
+
+def _retuned_from(arena: Arena, before: Fitted) -> Fitted:
+    known = sensitivity_at(arena, before.deviations, NOTHING)
+    return refine(arena, fit(arena.measure, arena.tuning, before, known, RETUNING_ROUNDS))
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A stretch of the work, as it is shown."""
+
+    what: str
+    begun: float
+    progress: Progress
+
+    def at(self, share: float) -> None:
+        self.progress(self.what, self.begun + 0.3 * share)
+
+
+def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[Contender, ...]:
+    step.at(0.0)
+    held = base.hypothesis.claims
+    evidence = gather_evidence(arena.measure, arena.tuning, base)
+    suggested = [
+        one
+        for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
+        if not any(excludes(claim, one.claims[0]) for claim in held)
+    ]
+    if arena.sound is not None and not any(claim.effect.name == DRIFTS for claim in held):
+        suggested += clock_drift_by_trial([one for one in catalogue if arena.measure.tells(one)], evidence[0])
+    known = sensitivity_at(arena, base.deviations, base.hypothesis)
+    step.at(0.2)
+    screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
+    step.at(0.6)
+    contenders = contest(arena, base, known, screened)
+    return plainest_first([one for one in contenders if not silences(arena.measure, base, one.fitted)])
+
+
+def worthwhile(base: Contender, better: Contender) -> bool:
+    """Where only the worst channel is above the noise, and not their mean, it must come down by half of that."""
+    gained, over = base.standing.chosen_by - better.standing.chosen_by, np.log(base.standing.seen)
+    if excess(base) == 0 and over > np.log(CLEAN) and np.log(better.standing.seen) > over / 2:
+        return False
+    return gained > max(WORTHWHILE * excess(base), NOTICED)
+
+
+_COUNTED = ("first", "second", "third")

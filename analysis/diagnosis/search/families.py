@@ -1,0 +1,31 @@
+"""Effects that are one thing in several shapes: of those, one at a time can be at an axis."""
+
+from analysis.diagnosis.errors.hypothesis import Claim
+
+DRY_FRICTION = frozenset(
+    {
+        "coulomb_friction",
+        "asymmetric_friction",
+        "stribeck_friction",
+        "presliding_hysteresis",
+        "position_dependent_friction",
+    }
+)
+
+FAMILIES: tuple[frozenset[str], ...] = (
+    DRY_FRICTION,
+    frozenset({"amplifier_lag", "transport_delay"}),
+    frozenset({"clock_drift", "logger_offset"}),
+    frozenset({"sensor_misalignment", "cross_axis_sensitivity"}),
+    frozenset({"sensor_offset", "sensor_drift"}),
+    frozenset({"added_mass", "hand_impedance", "body_on_actuator"}),
+    frozenset({"backlash", "loose_joint"}),
+)
+
+
+def excludes(held: Claim, other: Claim) -> bool:
+    """Whether `other` cannot be beside what is held already."""
+    if not set(held.sites) & set(other.sites):
+        return False
+    one, two = held.effect.name, other.effect.name
+    return one == two or any(one in family and two in family for family in FAMILIES)

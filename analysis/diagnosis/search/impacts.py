@@ -1,0 +1,181 @@
+"""Play that rattles: no waveform of it can be predicted, so hypotheses are judged by the response's band powers.
+
+Two simulations of a drive with play part within a few blows, however little they differ; one that has the right play is
+as far from the record as from another of its own (Ott, Chaos in Dynamical Systems, chapter 4). So what two courses of
+the same hypothesis differ by takes the place of the noise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.errors.band_power import BandPower
+from analysis.diagnosis.errors.band_power_fit import Foreseen, View, fitted, foreseen
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.shaken_axis import shaken_along
+from analysis.diagnosis.errors.standing import Standing
+from analysis.diagnosis.search.explain import Explanation, Statistic
+from analysis.diagnosis.search.irregular import irregular
+from analysis.diagnosis.search.rivalry import Arena, Contender
+from equalizer.effects.effect import Effect, Values
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+WORDS = "band power of the response"
+LEAST_CHANCE = 0.05
+"""Rms of the logarithm of an amplitude that counts as none: no simulation foresees it better."""
+APART, COURSES = 1e-9, 4
+"""What courses of one hypothesis differ by at first, in the logarithm of a number; and how many there are."""
+CALM = 0.01
+"""What chance may do to a band that the model's own numbers are learnt from."""
+TAKEN, NEAR = 0.6, 3.0
+"""Least share of the linear model's misfit that is taken away, and most times chance that is left, on average over the
+channels, of what is chosen by and of what was sealed."""
+WIDTHS = np.geomspace(0.02, 5.0, 13)
+"""Of a gap, over that which is guessed."""
+FIRST_ROUNDS, ROUNDS = 5, 3
+RIVAL = "loose_joint"
+
+
+def rattling(
+    arena: Arena, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
+) -> Explanation | None:
+    """None where nothing rattles, or where no play explains how."""
+    effects = {effect.name: effect for effect in catalogue}
+    if "backlash" not in effects or not isinstance(arena.whole, FreeSimulation):
+        return None
+    if not irregular(arena, found, floors):
+        return None
+    given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    evidence = gather_evidence(arena.measure, arena.tuning, given)[0]
+    view = View(BandPower(arena.measure), arena.tuning, arena.map_)
+    claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(arena.tuning.model.inputs)]
+    places = sorted((_at(view, evidence, one) for one in claims), key=lambda one: one.cost)
+    if places[0].cost >= foreseen(view, given.deviations, NOTHING).cost:
+        return None
+    view = _with_chance(view, places[0])
+    best = fitted(view, foreseen(view, places[0].deviations, places[0].hypothesis), ROUNDS)
+    others = list(places[1:])
+    if RIVAL in effects:
+        others.append(_at(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
+    return _judged(arena, found, best, [one.hypothesis for one in others if _is_model(one)])
+
+
+def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
+    """The best that a claim can do by the stretches that shake its axis."""
+    measure = view.power.measure
+    assert isinstance(measure, FreeSimulation)
+    near = View(BandPower(shaken_along(measure, claim.sites[0])), view.tuning, view.map_)
+    given = np.zeros(len(view.tuning.names))
+    starts = claim.effect.starts(evidence, claim.sites[0])[:1]
+    net = [{**values, "gap": float(wide * values["gap"])} for values in starts for wide in WIDTHS]
+
+    def at(values: Values) -> Foreseen:
+        return foreseen(near, given, claimed(claim, [values]))
+
+    tried: list[Foreseen] = list(near.map_(at, net))  # type: ignore[arg-type]
+    best = fitted(near, min(tried, key=lambda one: one.cost), FIRST_ROUNDS) if tried else None
+    return foreseen(view, given, NOTHING if best is None else best.hypothesis)
+
+
+def _is_model(one: Foreseen) -> bool:
+    return bool(one.hypothesis.claims) and bool(np.isfinite(one.cost))
+
+
+def _with_chance(view: View, at: Foreseen) -> View:
+    """Knowing what chance does to each band, and what the model's own numbers do to those that it leaves alone."""
+
+    def course(number: int) -> FloatArray:
+        return view.predicted(at.deviations, _apart(at.hypothesis, number))
+
+    spread = np.std(np.array(list(view.map_(course, range(COURSES)))), axis=0, ddof=1)
+    calm = spread < CALM
+    linear = view.predicted(at.deviations, NOTHING)
+    ways = np.eye(len(at.deviations))
+
+    def moved(number: int) -> FloatArray:
+        change = view.predicted(at.deviations + ways[number], NOTHING) - linear
+        return np.where(calm & np.isfinite(change), change, 0.0)
+
+    columns = np.array(list(view.map_(moved, range(len(ways)))))
+    return replace(view, spread=spread, by_deviations=columns)
+
+
+def _apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
+    return replace(hypothesis, point=hypothesis.point + number * APART)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Court:
+    """What contenders are brought before: all samples, the sealed ones, too."""
+
+    arena: Arena
+    power: BandPower
+    chance: FloatArray
+    """(c,)"""
+
+    def stands(self, deviations: FloatArray, hypothesis: Hypothesis) -> Contender:
+        whole = evaluated(self.arena.whole, self.arena.tuning, deviations, hypothesis)
+        off = self.power.misfits(self.power.measured - self.power.predicted(whole.residuals))
+        return Contender(whole, Standing(*(self._times(one) for one in (off.fit, off.choose, off.test))))
+
+    def _times(self, off: FloatArray) -> FloatArray:
+        """Of a channel in which noise drowns all bands, that it is as good as chance."""
+        return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
+
+
+def _judged(arena: Arena, found: Explanation, best: Foreseen, others: Sequence[Hypothesis]) -> Explanation | None:
+    court = _court(arena, best)
+    named = court.stands(best.deviations, best.hypothesis)
+    given = np.zeros_like(best.deviations)
+    before = court.stands(given, NOTHING)
+    linear = [before, *(court.stands(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
+    retuned = min(linear, key=lambda one: one.standing.chosen_by)
+    rivals = [court.stands(given, one) for one in others]
+    earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
+    rivals += [
+        court.stands(one.fitted.deviations, one.fitted.hypothesis)
+        for one in earlier
+        if one.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
+    ]
+    rivals.sort(key=lambda one: one.standing.chosen_by)
+    if not _convincing(named, retuned) or any(_as_good(one, named) for one in rivals):
+        return None
+    statistic = Statistic(WORDS, court.chance, best.errors)
+    return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
+
+
+def _court(arena: Arena, best: Foreseen) -> _Court:
+    power, model = BandPower(arena.whole), arena.tuning.tuned(best.deviations)
+
+    def course(number: int) -> FloatArray:
+        return power.predicted(arena.whole.residuals(model, _apart(best.hypothesis, number).placed()))
+
+    one, other = (np.asarray(each) for each in arena.map_(course, range(2)))
+    apart = power.misfits(one - other)
+    chance = np.fmax(np.fmax(apart.fit, apart.choose), apart.test)
+    return _Court(arena, power, np.fmax(chance, LEAST_CHANCE))
+
+
+def _convincing(named: Contender, retuned: Contender) -> bool:
+    pairs = [
+        (getattr(retuned.standing, part), getattr(named.standing, part))
+        for part in ("choose", "test")
+        if np.isfinite(getattr(named.standing, part)).any()
+    ]
+    return all(_whole(left) <= (1 - TAKEN) * _whole(of) and _whole(left) <= NEAR for of, left in pairs)
+
+
+def _as_good(rival: Contender, named: Contender) -> bool:
+    ways = [(getattr(one.standing, part) for one in (rival, named)) for part in ("choose", "test")]
+    return all(_whole(other) <= 1.1 * _whole(own) for other, own in ways if np.isfinite(other).any())
+
+
+def _whole(times: FloatArray) -> float:
+    """Over the channels."""
+    return float(np.sqrt(np.nanmean(times**2)))

@@ -1,0 +1,51 @@
+"""An explanation that foresees nothing: effects that hold the device still are the last refuge of a fit."""
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Mask
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.output_error import Fitted
+from analysis.diagnosis.errors.standing import rms_over
+from analysis.diagnosis.search.rivalry import Contender
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.signals.signal import FloatArray
+
+NO_BETTER = 0.9
+"""Share of its signal that an explanation may leave in every channel: also where noise is no less, for then nothing
+can be told by name."""
+FAR = 3.0
+"""Times the noise."""
+SILENT = 0.3
+"""Share of the signal below which a prediction is none."""
+_TINY = 1e-300
+
+
+def foresees_nothing(measure: ErrorMeasure, contender: Contender) -> bool:
+    """On the samples that decisions may see: in no channel is it better than no prediction."""
+    return bool((_left(measure, contender.fitted) >= NO_BETTER * _signal(measure)).all())
+
+
+def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
+    """Whether what is new foresees nothing, far above the noise, in the channel where it gains most or whose sensor it
+    is said to be: a low pass that lets nothing through explains nothing, though it leaves the model free for others."""
+    before, left = _left(measure, base), _left(measure, fitted)
+    most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
+    claim = fitted.hypothesis.claims[-1]
+    sensed = claim.sites if EFFECTS_BY_NAME[claim.effect.name].place == "sensor" else ()
+    nothing = left >= np.maximum(NO_BETTER * _signal(measure), FAR * measure.noise)
+    return bool(nothing[most] or any(nothing[site] for site in sensed if site < len(nothing)))
+
+
+def _left(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
+    """(c,): rms"""
+    return np.asarray(rms_over(measure.records, fitted.residuals, _seen(measure)) * measure.unit)
+
+
+def _signal(measure: ErrorMeasure) -> FloatArray:
+    """(c,): rms"""
+    signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
+    return rms_over(measure.records, signals, _seen(measure))
+
+
+def _seen(measure: ErrorMeasure) -> list[Mask]:
+    return [record.fit | record.choose for record in measure.records]

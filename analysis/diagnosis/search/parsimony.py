@@ -1,0 +1,62 @@
+"""Of explanations about as good, the plainest: few numbers, a calibration that was right, a law not refined."""
+
+from collections.abc import Sequence
+
+from analysis.diagnosis.search.families import DRY_FRICTION
+from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.same_within_errors import excess, inseparable
+
+REFINED = 0.006
+"""Mean log error power that a refined law must gain over the plain one that it contains,"""
+REFINED_SHARE = 0.35
+"""or as a share of what the plain law leaves above the noise: where both are wrong, the richer one errs less;"""
+RUBBED_SHARE = 0.7
+"""(dry friction: what happens while it turns round differs from device to device, and any further number takes some of
+it);"""
+HALVED = 0.7
+"""but never more than this, half of the power, which no plainness makes up for."""
+
+
+def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
+    """contenders: sorted by their errors, the best first; the same with the one to prefer at the front."""
+    if not contenders:
+        return ()
+    chosen = contenders[0]
+    for other in contenders[1:]:
+        if _is_plainer(other, chosen) and _good_enough(other, chosen):
+            chosen = other
+    return (chosen, *(one for one in contenders if one is not chosen))
+
+
+def _is_plainer(one: Contender, other: Contender) -> bool:
+    return only_refines(other, one) or (_price(one) < _price(other) and not only_refines(one, other))
+
+
+def _price(contender: Contender) -> float:
+    """Akaike's (1974): two for each number, and what it costs the calibration to be so far off."""
+    deviations = contender.fitted.deviations
+    return 2.0 * len(contender.fitted.hypothesis.point) + float(deviations @ deviations)
+
+
+def only_refines(other: Contender, one: Contender) -> bool:
+    """Whether the other's last effect holds the one's as a special case, at the same place."""
+    return _contained(one, other)
+
+
+def both_stand(named: Contender, other: Contender) -> bool:
+    """Whether the other belongs to the answer, too: as good, and no mere refinement."""
+    return inseparable(named, other) and not only_refines(other, named)
+
+
+def _contained(one: Contender, other: Contender) -> bool:
+    plain, refined = one.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
+    return plain.effect.name in refined.effect.simpler and set(plain.sites) <= set(refined.sites)
+
+
+def _good_enough(plain: Contender, refined: Contender) -> bool:
+    if not _contained(plain, refined):
+        return inseparable(refined, plain)
+    gained = plain.standing.chosen_by - refined.standing.chosen_by
+    rubs = plain.fitted.hypothesis.claims[-1].effect.name in DRY_FRICTION
+    share = RUBBED_SHARE if rubs else REFINED_SHARE
+    return gained <= max(REFINED, min(share * excess(plain), HALVED))

@@ -1,0 +1,38 @@
+"""A search that ends in time: what was found until then stands."""
+
+from collections.abc import Callable, Iterable
+
+from analysis.diagnosis.search.screening import Mapper
+
+Patience = Callable[[], bool]
+"""Whether to go on."""
+
+OUT_OF_TIME = (
+    "The time for the search ran out before it was done: a further effect, or a better fit of the last one, was not "
+    "looked for."
+)
+
+
+class OutOfPatienceError(Exception):
+    """Raised within the search, and caught by it."""
+
+
+def always() -> bool:
+    return True
+
+
+def impatient(map_: Mapper, patient: Patience) -> Mapper:
+    """The same map, that begins no further piece of work once patience has ended."""
+
+    def asked(function: Callable[..., object]) -> Callable[..., object]:
+        def work(*arguments: object) -> object:
+            if not patient():
+                raise OutOfPatienceError
+            return function(*arguments)
+
+        return work
+
+    def mapped(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
+        return list(map_(asked(function), *items))
+
+    return mapped

@@ -1,0 +1,183 @@
+"""Fits of the hypotheses that a screen left over, the best first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.felt_numbers import felt_numbers
+from analysis.diagnosis.errors.hypothesis import Hypothesis, alike, without_claim
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting, sensitivity
+from analysis.diagnosis.errors.standing import Standing, standing
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.screening import Mapper, Screened
+from analysis.diagnosis.search.sound_recordings import SoundRecordings
+from equalizer.effects.effect import AxisForce, JointForce
+
+MOST_FITTED, LEAST_FITTED = 10, 4
+"""Hypotheses that get a first fit."""
+WORTH_FITTING = 0.2
+"""Share of the best one's foreseen gain that another must foresee."""
+MOST_REFINED = 3
+"""And a second one, with everything recomputed where they stand,"""
+WORTH_REFINING = 0.5
+"""where they gained such a share of what the best one gained."""
+FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
+MOST_REFRESHED, SETTLED, SETTLED_FAR, STALE = 4, 0.0005, 0.01, 0.5
+"""What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
+noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
+deviations since, for it costs a simulation for each."""
+NEARLY_CLEAN = 1.08
+"""Errors of so many times the noise need no second start."""
+ALIKE = 4.0
+"""Squares of the noise, in sum, that more numbers must gain over plain ones that do almost the same."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contender:
+    fitted: Fitted
+    standing: Standing
+    usual: float = 0.0
+    """Mean log error power that it would gain on a device in order, and that is counted against it here."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arena:
+    """What all fits share."""
+
+    measure: ErrorMeasure
+    """Of what decisions may see,"""
+    whole: ErrorMeasure
+    """and with what they may not."""
+    tuning: Tuning
+    map_: Mapper
+    barred: frozenset[str] = frozenset()
+    """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
+    only where its refinement shows, and without it that law is the barred one."""
+    sound: SoundRecordings | None = None
+    """Contenders stand as they would without what they gain on these."""
+    certain: tuple[Hypothesis, ...] = ()
+    """Seen without any model: no search, and no comparison, is needed for these."""
+
+    def half_opened(self) -> "Arena":
+        """With the first half of every sealed stretch to fit and to choose by."""
+        whole = self.whole.with_records(tuple(one.unsealed() for one in self.whole.records))
+        return replace(self, measure=whole.shortened(), whole=whole)
+
+    def contender(self, fitted: Fitted) -> Contender:
+        """As decisions see it; its `test` is NaN."""
+        return self._contender(fitted, self.measure)
+
+    def confirmed(self, contender: Contender) -> Contender:
+        """With the sealed samples."""
+        fitted = evaluated(self.whole, self.tuning, contender.fitted.deviations, contender.fitted.hypothesis)
+        return self._contender(fitted, self.whole)
+
+    def _contender(self, fitted: Fitted, measure: ErrorMeasure) -> Contender:
+        stands = standing(measure, fitted.residuals)
+        if self.sound is None:
+            return Contender(fitted, stands)
+        gained = self.sound.gained(fitted.hypothesis)
+        return Contender(fitted, stands.larger(np.exp(gained)), 2 * float(gained.mean()))
+
+
+def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> tuple[Contender, ...]:
+    """The best first. known: of the model's own numbers, near the base."""
+    measure, tuning = arena.measure, arena.tuning
+
+    def first(one: Screened) -> Fitted:
+        return fit(measure, tuning, evaluated(measure, tuning, base.deviations, one.hypothesis), known, FIRST_ROUNDS)
+
+    fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
+    fits.sort(key=lambda one: one.cost)
+    gained = [base.cost - one.cost for one in fits]
+    worth = [one for one, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
+    refined = [refine(arena, one) for one in worth[:MOST_REFINED]]
+    rest = fits[len(refined) :]
+    plain = [one for one in rest if any(_holds(richer, one) for richer in refined[:1])][:1]
+    refined += [refine(arena, one) for one in plain]
+    contenders = [arena.contender(one) for one in [*refined, *(one for one in rest if one not in plain)]]
+    return tuple(sorted(contenders, key=lambda one: one.standing.chosen_by))
+
+
+def refine(arena: Arena, fitted: Fitted) -> Fitted:
+    """To the end, with what the model's numbers do recomputed there; where that leaves more than noise, also from the
+    calibration as it was, for what re-tuning had to hide may have taken it far away."""
+    here, known = _refined_from(arena, fitted, None)
+    here, known = _of_alike(arena, here, known)
+    if arena.contender(here).standing.seen <= NEARLY_CLEAN:
+        return here
+    calibrated = evaluated(arena.measure, arena.tuning, np.zeros_like(here.deviations), here.hypothesis)
+    there, _ = _refined_from(arena, calibrated, known)
+    return there if there.cost < here.cost else here
+
+
+def _of_alike(arena: Arena, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
+    """The best of what does almost the same, each fitted to the end; the plain one where it is as good as any."""
+    best = fitted, known
+    for other in alike(fitted.hypothesis):
+        beside = _refined_from(arena, evaluated(arena.measure, arena.tuning, fitted.deviations, other), known)
+        best = beside if beside[0].cost < best[0].cost else best
+    for other in alike(best[0].hypothesis):
+        plain = evaluated(arena.measure, arena.tuning, best[0].deviations, other)
+        samples = len(fitting(arena.measure, plain.residuals))
+        best = (plain, best[1]) if plain.cost < best[0].cost + ALIKE / samples else best
+    return best
+
+
+def sensitivity_at(
+    arena: Arena, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
+) -> Sensitivity:
+    """Of the model's own numbers. Without forces that depend on the motion simulations are quick, and where those are
+    small beside what moves, they hardly matter to it."""
+    kept = hypothesis
+    for number in reversed(range(len(hypothesis.claims))):
+        if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
+            kept = without_claim(kept, number)
+    plain = sensitivity(arena.measure, arena.tuning, deviations, kept, arena.map_)
+    if not with_forces or kept is hypothesis:
+        return plain
+    felt = felt_numbers(arena.measure, arena.tuning, plain, hypothesis)
+    return sensitivity(arena.measure, arena.tuning, deviations, hypothesis, arena.map_, (plain.columns, felt))
+
+
+def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
+    """known: what the model's numbers do, taken elsewhere with the same hypothesis; None = not taken yet."""
+    best = fitted
+    complete = known is not None
+    there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
+    for _ in range(MOST_REFRESHED):
+        better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
+        settled = better.cost > (1 - max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))) * best.cost
+        best = better
+        if (complete and settled) or (arena.contender(best).standing.seen <= NEARLY_CLEAN and settled):
+            break
+        if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
+            there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=True)
+            complete = True
+    return best, there
+
+
+def _holds(richer: Fitted, plain: Fitted) -> bool:
+    """Whether the last claim of one holds the other's as a special case: then both must be fitted as well."""
+    last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
+    return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)
+
+
+def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:
+    varied = _varied(screened)
+    best = max((base.cost - one.cost for one in varied), default=0.0)
+    worth = [one for one in varied if base.cost - one.cost >= WORTH_FITTING * best]
+    return (worth if len(worth) >= LEAST_FITTED else varied[:LEAST_FITTED])[:MOST_FITTED]
+
+
+def _varied(screened: Sequence[Screened]) -> list[Screened]:
+    """The best start of each hypothesis before the second start of any."""
+    seen: dict[object, int] = {}
+    ranked = []
+    for one in screened:
+        key = one.hypothesis.key
+        seen[key] = seen.get(key, -1) + 1
+        ranked.append((seen[key], one))
+    return [one for _, one in sorted(ranked, key=lambda pair: pair[0])]

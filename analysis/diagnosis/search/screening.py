@@ -1,0 +1,62 @@
+"""Which hypotheses are worth a fit: how much of what is left each could take, at one simulation apiece."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.hypothesis import Hypothesis, together
+from analysis.diagnosis.errors.output_error import BOUND, Fitted, Sensitivity, bounded_step, fitting
+from analysis.diagnosis.errors.tuning import Tuning
+
+Mapper = Callable[..., Iterable[object]]
+"""`map`, or one that works in parallel and keeps the order."""
+WEAKEST, STRONGEST = 0.1, 6.0
+"""Factors by which a start's strength may be wrong."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screened:
+    hypothesis: Hypothesis
+    """Together with what is already held to be true."""
+    cost: float
+    """As `Fitted.cost`, foreseen by a straight line through the start."""
+
+
+def screen(
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    base: Fitted,
+    known: Sensitivity,
+    suggested: Sequence[Hypothesis],
+    map_: Mapper,
+) -> tuple[Screened, ...]:
+    """The best first."""
+    model = tuning.tuned(base.deviations)
+    errors = fitting(measure, base.residuals)
+
+    def foreseen(one: Hypothesis) -> Screened:
+        whole = together(base.hypothesis, one)
+        with np.errstate(over="ignore", invalid="ignore"):
+            there = fitting(measure, measure.residuals(model, whole.placed()))
+        return Screened(whole, _reached(base, known, errors, errors - there))
+
+    found: list[Screened] = list(map_(foreseen, suggested))  # type: ignore[arg-type]
+    return tuple(sorted(found, key=lambda one: one.cost))
+
+
+def _reached(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        strength = float(change @ change)
+    if not (np.isfinite(strength) and strength > 0):
+        return np.inf
+    t = len(base.deviations)
+    cross = known.columns @ change
+    products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
+    pull = np.concatenate([known.columns @ errors - base.deviations, [float(change @ errors)]])
+    low = np.concatenate([-BOUND - base.deviations, [WEAKEST]])
+    high = np.concatenate([BOUND - base.deviations, [STRONGEST]])
+    step = bounded_step(products, pull, low, high)
+    gain = 2 * float(step @ pull) - float(step @ products @ step)
+    return base.cost - gain / len(errors)

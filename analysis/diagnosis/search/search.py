@@ -1,0 +1,78 @@
+"""The search for what is missing, and once more with half of the sealed samples where they alone show something."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.search.explain import Explanation, Progress, explain
+from analysis.diagnosis.search.no_answer import foresees_nothing
+from analysis.diagnosis.search.patience import OUT_OF_TIME, Patience, always
+from analysis.diagnosis.search.prune import pruned
+from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.verdict import Judgement, judge
+from equalizer.effects.effect import Effect
+
+SHOWN = 1.25
+"""Errors of so many times the noise on sealed samples cannot be passed over,"""
+MORE_THAN_SEEN = 1.5
+"""and so many times larger than on all others, they come from something that the others do not hold."""
+OPENED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
+    "such stretch was used to find it, the second half to confirm it."
+)
+NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
+
+
+ONLY_REFINES = (
+    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
+    "but what they add to it does not show, so none of them is named."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    arena: Arena
+    """With the samples as they were used in the end."""
+    found: Explanation
+    judged: Judgement
+    remarks: tuple[str, ...] = ()
+
+
+def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
+    found = pruned(arena, explain(arena, catalogue, progress, patient), patient)
+    judged = _judged(arena, found)
+    if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
+        return Searched(arena, found, judged, _remarks(found))
+    half = arena.half_opened()
+    again = pruned(half, explain(half, catalogue, progress, patient), patient)
+    second = _judged(half, again)
+    if second.named:
+        return Searched(half, again, second, (OPENED, *_remarks(again)))
+    return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN, *_remarks(found)))
+
+
+def _remarks(found: Explanation) -> tuple[str, ...]:
+    early = (OUT_OF_TIME,) if found.ended_early else ()
+    barred = (ONLY_REFINES,) if found.barred else ()
+    return early + barred + (_left_open(found.undetermined) if found.undetermined else ())
+
+
+def _left_open(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(
+        f"An explanation by {noun_of(one)} is not named: these recordings leave its numbers as good as open."
+        for one in dict.fromkeys(names)
+    )
+
+
+def _judged(arena: Arena, found: Explanation) -> Judgement:
+    judged = judge(found)
+    if judged.named and foresees_nothing(arena.whole, found.after):
+        return Judgement("unexplained", False)
+    return judged
+
+
+def _sealed_alone(found: Explanation) -> bool:
+    shown = float(np.nanmax(found.retuned.standing.test, initial=0.0))
+    return shown > SHOWN and shown > MORE_THAN_SEEN * found.retuned.standing.seen

@@ -1,0 +1,120 @@
+"""Faults of a converter or a line that a recording shows by itself, without any model: readings that take steps only,
+that stay at a limit, or that are there twice. Recordings of the sound device say what of that is usual.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import Mask
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, claimed
+from equalizer.effects.effect import Effect, Values
+from equalizer.effects.lattice import lattice_step
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+WIDER = 1.5
+"""Times a sound device's steps, from which on steps are others."""
+LEAST = 8
+"""Readings at a limit, or there twice, that are no chance;"""
+USUAL = 3.0
+"""and times what a sound device has of them,"""
+SURELY = 5.0
+"""by so many standard deviations of such a count."""
+ALIKE = 1e-3
+"""Share of a step by which those of channels may differ that have the same."""
+SAME = 1e-9
+"""Share of its largest reading by which a channel's readings at a limit may differ."""
+
+
+def seen_directly(
+    recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
+) -> tuple[Hypothesis, ...]:
+    """At most one, for steps are also there twice and have a largest reading. effects: those that may be named."""
+    known = {one.name: one for one in effects}
+    new, sound = _readings(recordings), [_readings([one]) for one in clean]
+    for name, look in (("quantization", _steps), ("sensor_clipping", _limit), ("lost_samples", _twice)):
+        found = look(new, sound)
+        if found is not None:
+            return (_claimed(known[name], *found),) if name in known else ()
+    return ()
+
+
+Found = tuple[tuple[int, ...], Values]
+"""Channels, and what they show."""
+
+
+def _claimed(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
+    spread: Spread = "all" if len(channels) > 1 else "one"
+    return claimed(Claim(effect, spread, channels), [values])
+
+
+def _readings(recordings: Sequence[Recording]) -> FloatArray:
+    """(n, p): those that are known, one after the other."""
+    samples = np.vstack([one.response.samples for one in recordings])
+    return np.asarray(samples[np.isfinite(samples).all(axis=1)])
+
+
+def _steps(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+    found = {}
+    for c in range(new.shape[1]):
+        step = lattice_step(new[:, c])
+        usual = max((lattice_step(one[:, c]) or 0.0 for one in sound), default=0.0)
+        if step is not None and step > WIDER * usual:
+            found[c] = step
+    alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
+    return _where(found, alike and len(found) == new.shape[1], new.shape[1], "step")
+
+
+def _limit(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+    """A limit is reached on both sides where both are asked for, and holds more readings than the place below it."""
+    found = {}
+    for c in range(new.shape[1]):
+        limit, count = _at_the_top(new[:, c])
+        usual = max(_at_the_top(one[:, c])[1] / len(one) for one in sound) * len(new)
+        beyond = max(float(np.abs(one[:, c]).max()) for one in sound)
+        if limit < beyond and _unusual(count, usual):
+            found[c] = limit
+    within = bool(found) and bool(np.all(np.abs(new) <= max(found.values()) * (1 + SAME)))
+    return _where(found, within, new.shape[1], "limit")
+
+
+def _at_the_top(values: FloatArray) -> tuple[float, int]:
+    """The largest magnitude, and how many readings have it more than have the next."""
+    sizes = np.abs(values)
+    limit = float(sizes.max())
+    there = sizes >= limit * (1 - SAME)
+    rest = sizes[~there]
+    below = int(np.count_nonzero(rest >= rest.max() * (1 - SAME))) if len(rest) else 0
+    return limit, int(np.count_nonzero(there)) - below
+
+
+def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+    """Here and there: a sensor that stands still for a while has not lost samples."""
+    repeated = _repeats(new)
+    usual = max(float(_begun(_repeats(one)).mean()) for one in sound) * len(repeated)
+    if not _unusual(int(_begun(repeated).sum()), usual):
+        return None
+    fraction = (float(repeated.sum()) - usual) / len(repeated)
+    return tuple(range(new.shape[1])), {"fraction": fraction}
+
+
+def _repeats(values: FloatArray) -> Mask:
+    return np.asarray((np.diff(values, axis=0) == 0).all(axis=1), dtype=np.bool_)
+
+
+def _begun(repeated: Mask) -> Mask:
+    """Where repeats begin, one after the other counted once."""
+    return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
+
+
+def _unusual(count: int, usual: float) -> bool:
+    return count >= LEAST and count > USUAL * usual and count > usual + SURELY * np.sqrt(usual)
+
+
+def _where(found: Mapping[int, float], everywhere: bool, width: int, name: str) -> Found | None:
+    """found: by channel. Where not all channels have the same, that with most of it is meant."""
+    if not found:
+        return None
+    most = max(found, key=lambda channel: found[channel])
+    return tuple(range(width)) if everywhere else (most,), {name: found[most]}

@@ -1,0 +1,76 @@
+"""What an explanation gains on recordings of a sound device: so much it gains without being true."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together, without_claim
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
+from analysis.diagnosis.errors.standing import rms_over
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.candidates import candidates
+from analysis.diagnosis.search.screening import Mapper
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+ROUNDS = 4
+TRIED = 2
+"""Starts that are followed to their end."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SoundRecording:
+    measure: ColouredMeasure
+    tuning: Tuning
+    base: Fitted
+    """Re-tuned, without any effect."""
+    known: Sensitivity
+    """Of the model's numbers, there."""
+    evidence: Evidence
+
+    def gained(self, wanted: Hypothesis) -> FloatArray:
+        """(c,): logarithm of the errors' rms without less that with it, each at its best."""
+        measure, tuning = self.measure, self.tuning
+        starts = [evaluated(measure, tuning, self.base.deviations, one) for one in self._starts(wanted)]
+        starts.sort(key=lambda one: one.cost)
+        ends = [fit(measure, tuning, one, self.known, ROUNDS) for one in starts[:TRIED]]
+        best = min([*ends, self.base], key=lambda one: one.cost)
+        without, with_it = self._left(self.base), self._left(best)
+        return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
+
+    def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
+        """Where the recordings to diagnose have it, and where this one's own course suggests it for the last claim."""
+        last = wanted.claims[-1]
+        own = [one for one in candidates([last.effect], self.evidence) if one.claims == (last,)]
+        held = without_claim(wanted, len(wanted.claims) - 1)
+        return [wanted, *(together(held, one) for one in own)]
+
+    def _left(self, fitted: Fitted) -> FloatArray:
+        masks = [one.fit | one.choose for one in self.measure.records]
+        return rms_over(self.measure.records, fitted.residuals, masks)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SoundRecordings:
+    each: tuple[SoundRecording, ...]
+    beyond: float
+    """A gain counts by what is more than so many times that on the sound ones: the fewer, the more."""
+    seen: dict[object, FloatArray] = field(default_factory=dict)
+
+    def gained(self, hypothesis: Hypothesis) -> FloatArray:
+        """(c,): logarithm of the errors' rms, that counts against it; none of a model without effects."""
+        if not hypothesis.claims:
+            return np.zeros(1)
+        if hypothesis.key not in self.seen:
+            gains = np.max([one.gained(hypothesis) for one in self.each], axis=0)
+            self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
+        return self.seen[hypothesis.key]
+
+
+def sound_recording(measure: ColouredMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper) -> SoundRecording:
+    """deviations: of the model re-tuned to it."""
+    known = sensitivity(measure, tuning, deviations, NOTHING, map_)
+    base = fit(measure, tuning, evaluated(measure, tuning, deviations, NOTHING), known, ROUNDS)
+    return SoundRecording(measure, tuning, base, known, gather_evidence(measure, tuning, base)[0])

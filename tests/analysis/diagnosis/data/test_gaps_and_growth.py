@@ -1,0 +1,82 @@
+"""Samples that were not measured, and models that run away, end no diagnosis."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.data.growth import growth_rate, runs_away
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.tuning import tuning_of
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.plant.mechanical_model import Tolerance
+
+TRIED = ("coulomb_friction", "sensor_clipping", "hardening_stiffness")
+GAP = slice(3500, 3650)
+
+
+@pytest.fixture(scope="module")
+def made(module_at):
+    return module_at(Path(__file__).parents[3] / "diagnosed.py")
+
+
+@pytest.fixture(scope="module")
+def gapped(made):
+    one = made.recorded(1)
+    response, position = one.response.samples.copy(), one.position.samples.copy()
+    response[GAP] = position[GAP] = np.nan
+    return replace(
+        one, response=replace(one.response, samples=response), position=replace(one.position, samples=position)
+    )
+
+
+def test_every_estimator_sees_whole_courses_of_a_recording_with_a_gap(made, gapped, arena_of):
+    from analysis.diagnosis.errors.choose_measure import measure_of
+
+    model = made.device(1)
+    measure = measure_of([gapped], model).measure
+    evidence = measure.evidence(model, (), measure.residuals(model, ()))[0]
+    for each in (evidence.response, evidence.predicted, evidence.position, evidence.predicted_position):
+        assert each is not None and np.isfinite(each).all()
+    np.testing.assert_array_equal(evidence.response[GAP], evidence.predicted[GAP])
+    assert (evidence.used[GAP] == 0).all() and evidence.used[:3000].any()
+    for effect in CATALOGUE:
+        effect.starts(evidence, 0)
+
+
+def test_friction_is_named_in_spite_of_a_gap(made, gapped):
+    others = tuple(effect.name for effect in CATALOGUE if effect.name not in TRIED)
+    found = diagnose([gapped], made.device(1), DiagnosisSettings(without=others), map, lambda said, share: None)
+    assert [(one.effect, one.axis) for one in found.diagnosis.effects] == [("coulomb_friction", "x")]
+    assert found.diagnosis.effects[0].parameters["level"].value == pytest.approx(made.FRICTION_N, rel=0.03)
+
+
+def test_growth_is_told_from_motion_that_dies_out(made):
+    model = made.device(1)
+    assert growth_rate(model) == pytest.approx(-8.0)
+    assert not runs_away(model, 1000.0)
+    pushed = replace(model, damping=-model.damping)
+    assert runs_away(pushed, 1.0) and not runs_away(pushed, 0.1)
+
+
+def test_a_fit_with_wide_tolerances_stays_with_models_that_hold_themselves(made):
+    from analysis.diagnosis.errors.choose_measure import measure_of
+
+    recording = made.recorded(1, effects=())
+    given = replace(
+        made.device(1), damping=np.array([[0.4]]), stiffness=np.array([[60.0]]), tolerance=Tolerance(0.1, 4.0, 400.0)
+    )
+    measure = measure_of([recording], given).measure
+    tuning = tuning_of(given, ("fx",))
+    start = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    found = start
+    for _ in range(4):
+        found = fit(measure, tuning, found, sensitivity(measure, tuning, found.deviations, NOTHING), 4)
+    assert found.cost < start.cost / 10
+    assert not runs_away(tuning.tuned(found.deviations), 12.0)
+    # Where a number is moved to see what it does, it may run away: that way is not looked.
+    at = np.array([0.0, -0.02 - given.damping[0, 0] / 4.0, 0.0])
+    assert np.isfinite(sensitivity(measure, tuning, at, NOTHING).columns).all()

@@ -1,0 +1,111 @@
+"""Which samples count for what."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.data.observed import FLOOR, measured_of, noise_in_units, observed, roles
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+
+def at(start, stop, role="fit", level=1.0, kind="multisine"):
+    return Segment(start, stop, kind, level, 0, role)
+
+
+def counts(segments, length=1000, tested=False):
+    return tuple(int(mask.sum()) for mask in roles(tuple(segments), length, tested))
+
+
+def recording(response, position=None):
+    n = len(response)
+    moved = None if position is None else Signal(position, 1000.0, "position", "m", tuple("xyz"[: position.shape[1]]))
+    return Recording(
+        "small",
+        Signal(np.zeros((n, 2)), 1000.0, "force", "N", ("fx", "fy")),
+        Signal(response, 1000.0, "acceleration", "m/s^2", ("ax", "ay")),
+        moved,
+    )
+
+
+def test_no_sample_counts_twice():
+    for segments in ([], [at(0, 500)], [at(0, 500), at(600, 900, "test")], [at(0, 1000, "")]):
+        fit, choose, test = roles(tuple(segments), 1000)
+        assert not (fit & choose).any() and not (fit & test).any() and not (choose & test).any()
+
+
+def test_without_segments_the_end_is_sealed_and_what_is_before_it_is_split():
+    fit, choose, test = roles((), 1000)
+    assert np.flatnonzero(test)[[0, -1]].tolist() == [750, 999]
+    assert np.flatnonzero(choose)[[0, -1]].tolist() == [562, 749]
+    assert fit.sum() == 562
+
+
+def test_segments_without_roles_are_treated_alike_and_the_pauses_count_for_nothing():
+    fit, choose, test = roles((at(0, 400, ""), at(500, 900, "")), 1000)
+    assert not (fit | choose | test)[400:500].any() and not (fit | choose | test)[900:].any()
+    assert test.sum() == 200 and test[700:900].all()
+
+
+def test_what_is_marked_as_test_stays_sealed():
+    fit, choose, test = roles((at(0, 600), at(700, 1000, "test")), 1000)
+    assert np.flatnonzero(test)[[0, -1]].tolist() == [700, 999]
+    assert fit.sum() == 450 and choose[450:600].all()
+
+
+def test_the_middle_of_three_levels_is_kept_back_to_choose_by():
+    levels = [at(0, 100, level=0.5), at(200, 300, level=1.5), at(400, 500, level=3.0), at(600, 700, "test", 1.5)]
+    fit, choose, test = roles(tuple(levels), 1000)
+    assert np.flatnonzero(choose)[[0, -1]].tolist() == [200, 299]
+    assert fit.sum() == 200 and test.sum() == 100
+
+
+def test_of_two_levels_none_is_kept_back():
+    assert counts([at(0, 400, level=1.0), at(400, 800, level=2.0), at(900, 1000, "test")]) == (600, 200, 100)
+
+
+def test_a_level_that_is_only_tested_is_none_to_choose_by():
+    segments = [at(0, 400, level=1.0), at(400, 800, level=2.0), at(900, 1000, "test", 3.0)]
+    assert counts(segments) == (600, 200, 100)
+
+
+def test_rest_is_neither_fitted_nor_tested():
+    fit, choose, test = roles((at(0, 500), at(500, 1000, "", kind="rest")), 1000)
+    assert not (fit | choose | test)[500:].any()
+
+
+def test_where_another_recording_is_there_to_test_by_none_of_this_one_is_sealed():
+    assert counts([], tested=True) == (750, 250, 0)
+    assert counts([at(0, 800)], tested=True) == (600, 200, 0)
+
+
+def test_a_recording_that_is_all_test_is_not_fitted():
+    assert counts([at(0, 1000, "test")]) == (0, 0, 1000)
+
+
+def test_lost_samples_count_for_nothing():
+    samples = np.ones((1000, 2))
+    samples[100:200, 1] = np.nan
+    seen = observed(recording(samples), 2)
+    assert not (seen.fit | seen.choose | seen.test)[100:200].any()
+    assert (seen.fit | seen.choose | seen.test).sum() == 900
+
+
+def test_positions_are_compared_where_they_belong_to_the_outputs():
+    samples = np.ones((50, 2))
+    assert measured_of(recording(samples, 2 * samples), 2)[0].shape == (50, 4)
+    assert measured_of(recording(samples, np.ones((50, 3))), 2)[0].shape == (50, 2)
+    assert measured_of(recording(samples), 2)[0].shape == (50, 2)
+
+
+def test_decisions_do_not_reach_the_sealed_samples():
+    seen = observed(recording(np.ones((1000, 2))), 2)
+    short = seen.shortened()
+    assert len(short.command) == len(short.measured) == 750
+    assert not short.test.any()
+    assert (short.fit.sum(), short.choose.sum()) == (seen.fit.sum(), seen.choose.sum())
+
+
+def test_errors_are_counted_in_noise_and_in_a_share_of_the_signal():
+    loud = np.full((100, 1), 10.0)
+    assert noise_in_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * FLOOR))
+    assert noise_in_units(loud, np.array([0.0])) == pytest.approx(10 * FLOOR)

@@ -1,0 +1,43 @@
+"""Parts of recordings as they are compared."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.observed_parts import observed_parts, samples_to_fit
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+RATE_HZ, LONG = 1000.0, 1000
+LEVELS_N = (0.5, 1.5, 3.0)
+
+
+def three_levels() -> Recording:
+    random = np.random.default_rng(1)
+    samples = random.standard_normal((len(LEVELS_N) * LONG, 1))
+    segments = tuple(
+        Segment(k * LONG, (k + 1) * LONG, "noise", level, 0, "") for k, level in enumerate(LEVELS_N)
+    )  # fmt: skip
+    return Recording(
+        "three levels",
+        Signal(samples, RATE_HZ, "force", "N", ("fx",)),
+        Signal(4 * samples, RATE_HZ, "acceleration", "m/s^2", ("ax",)),
+        segments=segments,
+    )
+
+
+def test_the_middle_level_is_chosen_by():
+    (one,) = observed_parts([three_levels()], 1)
+    assert one.choose[LONG : 2 * LONG].all()
+    assert not one.choose[:LONG].any()
+
+
+def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
+    whole = three_levels()
+    lost = whole.response.samples.copy()
+    lost[LONG : 2 * LONG] = np.nan
+    recording = replace(whole, response=replace(whole.response, samples=lost))
+    (one,) = observed_parts([recording], 1)
+    assert one.choose.any() and one.fit.any() and one.test.any()
+    assert np.isfinite(lost[one.fit | one.choose | one.test]).all()
+    assert samples_to_fit([recording]) == one.fit.sum()

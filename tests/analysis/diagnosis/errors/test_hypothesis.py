@@ -1,0 +1,106 @@
+"""Claims with numbers: what a fit steps along is what is simulated."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, alike, claimed, together, without_claim
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.candidates import STARTS, candidates
+from equalizer.effects.catalogue import CATALOGUE, EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+
+def some_values(effect):
+    """Inside its bounds, and not where it is nothing."""
+    return {p.name: float(np.clip(1.3 if p.scale == "log" else 0.7, p.lower, p.upper)) for p in effect.parameters}
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+def test_what_is_claimed_is_what_is_placed(effect):
+    values = some_values(effect)
+    (placed,) = claimed(Claim(effect, "one", (1,)), [values]).placed()
+    assert (placed.effect, placed.sites) == (effect, (1,))
+    assert dict(placed.values) == pytest.approx(values)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+def test_a_step_never_leaves_what_is_allowed(effect):
+    whole = claimed(Claim(effect, "one", (0,)), [some_values(effect)])
+    for far in (-1e9, 1e9):
+        (placed,) = whole.placed(np.full(len(whole.point), far))
+        for p in effect.parameters:
+            assert p.lower <= placed.values[p.name] <= p.upper
+
+
+def test_every_axis_has_numbers_of_its_own_where_each_is_claimed():
+    drag = EFFECTS["viscous_damping"]
+    each = claimed(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
+    assert [one.sites for one in each.placed()] == [(0,), (1,)]
+    assert len(each.numbers) == 2 * sum(not p.fixed for p in drag.parameters)
+
+
+def test_claims_are_put_together_and_taken_away_again():
+    parts = [
+        claimed(Claim(EFFECTS[name], "one", (k,)), [some_values(EFFECTS[name])])
+        for k, name in enumerate(("coulomb_friction", "extra_mode", "sensor_lag"))
+    ]
+    whole = together(together(parts[0], parts[1]), parts[2])
+    assert [key[0] for key in whole.key] == ["coulomb_friction", "extra_mode", "sensor_lag"]
+    less = without_claim(whole, 1)
+    expected = together(parts[0], parts[2])
+    assert less.key == expected.key and np.array_equal(less.point, expected.point)
+    assert less.placed() == expected.placed()
+    assert [one.effect.name for one in whole.of_claim(1)] == ["extra_mode"]
+
+
+def test_nothing_is_the_beginning_of_all_claims():
+    part = claimed(Claim(EFFECTS["sensor_lag"], "one", (0,)), [some_values(EFFECTS["sensor_lag"])])
+    assert together(NOTHING, part).placed() == part.placed()
+    assert NOTHING.placed() == ()
+
+
+def evidence_of(arena):
+    base = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    return gather_evidence(arena.measure, arena.tuning, base)[0]
+
+
+def test_friction_in_the_data_suggests_friction_near_its_level(arena_of):
+    rubs = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),)
+    found = candidates([EFFECTS["coulomb_friction"]], evidence_of(arena_of(rubs)))
+    assert 1 <= len(found) <= STARTS
+    assert found[0].placed()[0].values["level"] == pytest.approx(0.2, rel=0.3)
+
+
+def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
+    rubs = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),)
+    # Some, for the time that looking for starting values takes.
+    some = CATALOGUE[::4]
+    found = candidates(some, evidence_of(arena_of(rubs, axes=2)))
+    order = [effect.name for effect in some]
+    named = [one.claims[0].effect.name for one in found]
+    assert named == sorted(named, key=order.index)
+    for one in found:
+        (claim,) = one.claims
+        assert set(claim.sites) <= {0, 1}
+        assert claim.spread == "one" or claim.sites == (0, 1)
+        for number, at in zip(one.numbers, one.point, strict=True):
+            low, high = number.bounds
+            assert low - 1e-9 <= at <= high + 1e-9
+
+
+def test_numbers_that_do_almost_the_same_are_tried_in_place_of_an_effects_own():
+    parts = [
+        claimed(Claim(EFFECTS["sensor_lag"], "one", (0,)), [{"bandwidth": 60.0}]),
+        claimed(Claim(EFFECTS["force_deadband"], "one", (1,)), [{"width": 0.02, "jump": 0.25}]),
+        claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
+    ]
+    (other,) = alike(together(together(parts[0], parts[1]), parts[2]))
+    lag, band, force = other.placed()
+    assert band.values == pytest.approx({"width": 0.015, "jump": 0.0})
+    assert (lag.values["bandwidth"], force.values["force"]) == pytest.approx((60.0, 0.1))
+
+
+def test_plain_numbers_have_nothing_else_to_try():
+    plain = claimed(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.02, "jump": 0.0}])
+    assert not list(alike(plain))

@@ -1,0 +1,103 @@
+"""Intervals hold the truth as often as they say, where errors are neither white nor of the assumed strength.
+
+On an invented measure whose prediction is a straight line in all numbers.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.hypothesis import Claim, claimed
+from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.tuning import Tuning
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ, SAMPLES, DRAWS = 200.0, 4000, 120
+FORCE_N, STIFFER = 0.3, 0.8
+"""The truth: of the effect, and of the model in standard deviations."""
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """Channel 0 answers to the effect's number and to the model's, each along a row of its own."""
+
+    records: tuple[Observed, ...]
+    rows: np.ndarray
+    noise: np.ndarray
+    unit: np.ndarray
+    name: str = "straight line"
+
+    def residuals(self, model, effects):
+        force = effects[0].values["force"]
+        predicted = self.rows[0] * force + self.rows[1] * (model.stiffness[0, 0] - 100.0)
+        return (self.records[0].measured - predicted[:, None],)
+
+
+ONE = [[1.0]]
+MODEL = MechanicalModel("line", "position", ONE, ONE, [[100.0]], ONE, ONE)
+TUNING = Tuning(
+    MODEL, ("stiffness x",), np.ones(1), ("N/m",), lambda at: replace(MODEL, stiffness=np.array([[100.0 + at[0]]]))
+)
+PUSHED = claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}])
+
+
+def rows(seed):
+    """Slow, like what a mechanism answers."""
+    random = np.random.default_rng([seed, 1])
+    return lfilter([1.0], [1.0, -0.95], random.standard_normal((2, SAMPLES)), axis=1)
+
+
+def measured(seed, colour, strength):
+    """What the line answers with the truth, and coloured errors on it."""
+    white = np.random.default_rng([seed, 2]).standard_normal(SAMPLES)
+    errors = strength * lfilter([np.sqrt(1 - colour**2)], [1.0, -colour], white)
+    n = np.ones(SAMPLES, dtype=bool)
+    known = rows(seed)
+    # The calibration is one draw, too, from what it says of itself.
+    own = np.random.default_rng([seed, 3]).standard_normal()
+    samples = (known[0] * FORCE_N + known[1] * own + errors)[:, None]
+    signal = Signal(samples, RATE_HZ, "position", "m", ("x",))
+    recording = Recording("line", Signal(np.zeros_like(samples), RATE_HZ, "force", "N", ("fx",)), signal)
+    record = Observed(recording, np.zeros_like(samples), samples, n, ~n, ~n)
+    return StraightLine((record,), known, np.ones(1), np.ones(1)), own
+
+
+def fitted_and_errors(seed, colour, strength):
+    measure, own = measured(seed, colour, strength)
+    start = evaluated(measure, TUNING, np.zeros(1), PUSHED)
+    known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
+    found = fit(measure, TUNING, start, known, 4)
+    return found, standard_errors(measure, TUNING, found, known), own
+
+
+@pytest.mark.parametrize(("colour", "strength"), [(0.0, 1.0), (0.9, 1.0), (0.9, 6.0)])
+def test_ninety_five_of_a_hundred_intervals_hold_the_truth(colour, strength):
+    held = 0
+    for seed in range(DRAWS):
+        found, errors, _ = fitted_and_errors(seed, colour, strength)
+        of, at = found.hypothesis.numbers[0], found.hypothesis.point[0]
+        held += of.value(at - 1.96 * errors[1]) <= FORCE_N <= of.value(at + 1.96 * errors[1])
+    assert 0.88 <= held / DRAWS <= 0.99
+
+
+def test_intervals_grow_with_the_errors_and_with_their_memory():
+    width = {case: fitted_and_errors(3, *case)[1][1] for case in [(0.0, 1.0), (0.9, 1.0), (0.0, 4.0)]}
+    assert width[0.9, 1.0] > 1.5 * width[0.0, 1.0]
+    assert width[0.0, 4.0] == pytest.approx(4 * width[0.0, 1.0], rel=0.05)
+
+
+def test_what_the_data_say_of_the_model_outweighs_its_calibration():
+    found, errors, own = fitted_and_errors(3, 0.0, 1.0)
+    assert found.deviations[0] == pytest.approx(own, abs=4 * errors[0])
+    assert errors[0] < 0.1
+
+
+def test_the_same_record_gives_the_same_interval():
+    assert np.array_equal(fitted_and_errors(5, 0.9, 1.0)[1], fitted_and_errors(5, 0.9, 1.0)[1])

@@ -1,0 +1,131 @@
+"""Fits find numbers that were invented, and stay where the data say nothing."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
+from analysis.diagnosis.errors.output_error import BOUND, bounded_step, evaluated, fit, fitting, sensitivity
+from analysis.diagnosis.search.rivalry import refine
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+FRICTION_N, LAG_S = 0.2, 1.5e-3
+
+
+def alone(name, values):
+    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+def recovered(arena, hypothesis):
+    zero = np.zeros(len(arena.tuning.names))
+    start = evaluated(arena.measure, arena.tuning, zero, hypothesis)
+    known = sensitivity(arena.measure, arena.tuning, zero, NOTHING)
+    return refine(arena, fit(arena.measure, arena.tuning, start, known, 4))
+
+
+@pytest.fixture(scope="module")
+def rubbing_arena(arena_of):
+    return arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),))
+
+
+def off(tuning, **deviations):
+    at = np.zeros(len(tuning.names))
+    for name, value in deviations.items():
+        at[tuning.names.index(name.replace("_", " "))] = value
+    return at
+
+
+def test_the_model_s_own_numbers_are_found(arena_of):
+    truth = arena_of()
+    wrong = off(truth.tuning, mass_fx=-2.0, damping_fx=1.5, stiffness_fx=-1.0)
+    arena = arena_of(given=truth.tuning.tuned(wrong))
+    found = recovered(arena, NOTHING)
+    assert found.deviations == pytest.approx(-wrong, abs=0.15)
+    assert arena.contender(found).standing.seen < 1.03
+
+
+def test_a_number_that_fits_as_it_is_stays(arena_of):
+    found = recovered(arena_of(), NOTHING)
+    assert np.abs(found.deviations).max() < 0.2
+
+
+@pytest.mark.parametrize("start", [0.05, 0.6])
+def test_friction_is_found_from_far_away(rubbing_arena, start):
+    found = recovered(rubbing_arena, alone("coulomb_friction", {"level": start}))
+    assert found.hypothesis.placed()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
+    assert rubbing_arena.contender(found).standing.seen < 1.03
+
+
+def test_two_effects_are_found_at_once(arena_of):
+    truth = (
+        PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),
+        PlacedEffect(EFFECTS["amplifier_lag"], (0,), {"time_constant": LAG_S}),
+    )
+    both = together(alone("coulomb_friction", {"level": 0.1}), alone("amplifier_lag", {"time_constant": 1e-3}))
+    rubs, lags = recovered(arena_of(truth), both).hypothesis.placed()
+    assert rubs.values["level"] == pytest.approx(FRICTION_N, rel=5e-3)
+    assert lags.values["time_constant"] == pytest.approx(LAG_S, rel=5e-3)
+
+
+def test_a_wrong_law_does_not_come_down_to_the_noise(rubbing_arena):
+    found = recovered(rubbing_arena, alone("hardening_stiffness", {"k3": 1e4}))
+    assert rubbing_arena.contender(found).standing.seen > 3
+
+
+def test_a_fit_is_never_worse_than_its_start(rubbing_arena):
+    zero = np.zeros(len(rubbing_arena.tuning.names))
+    known = sensitivity(rubbing_arena.measure, rubbing_arena.tuning, zero, NOTHING)
+    for level in (1e-3, 0.2, 3.0):
+        start = evaluated(
+            rubbing_arena.measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": level})
+        )
+        assert fit(rubbing_arena.measure, rubbing_arena.tuning, start, known, 3).cost <= start.cost
+
+
+def test_the_same_start_gives_the_same_fit(rubbing_arena):
+    one, other = (recovered(rubbing_arena, alone("coulomb_friction", {"level": 0.1})) for _ in range(2))
+    assert one.cost == other.cost and np.array_equal(one.deviations, other.deviations)
+
+
+def test_numbers_stay_within_what_calibration_and_physics_allow(arena_of):
+    truth = arena_of()
+    far = off(truth.tuning, mass_fx=-9.0)
+    found = recovered(arena_of(given=truth.tuning.tuned(far)), NOTHING)
+    assert found.deviations[0] == pytest.approx(BOUND)
+    assert np.abs(found.deviations).max() <= BOUND
+
+
+def test_sealed_samples_are_not_fitted_to(rubbing_arena):
+    left = evaluated(rubbing_arena.measure, rubbing_arena.tuning, np.zeros(3), NOTHING).residuals
+    (record,) = rubbing_arena.measure.records
+    assert len(fitting(rubbing_arena.measure, left)) == record.fit.sum() * record.measured.shape[1]
+    assert not record.test.any()
+
+
+def test_a_sensitivity_foretells_what_a_small_change_does(arena_of):
+    arena = arena_of()
+    zero = np.zeros(len(arena.tuning.names))
+    known = sensitivity(arena.measure, arena.tuning, zero, NOTHING)
+    step = off(arena.tuning, damping_fx=0.05)
+    base, there = (fitting(arena.measure, arena.measure.residuals(arena.tuning.tuned(at), ())) for at in (zero, step))
+    assert base - there == pytest.approx(step @ known.columns, abs=0.02 * np.abs(base - there).max())
+    assert known.squares == pytest.approx(known.columns @ known.columns.T)
+
+
+def test_a_step_within_bounds_is_the_best_one():
+    random = np.random.default_rng(5)
+    for _ in range(30):
+        rows = random.normal(size=(12, 4))
+        products, pull = rows.T @ rows, rows.T @ random.normal(size=12)
+        low, high = -random.uniform(0, 0.3, 4), random.uniform(0, 0.3, 4)
+        step = bounded_step(products, pull, low, high)
+        assert ((step >= low - 1e-12) & (step <= high + 1e-12)).all()
+        free = np.linalg.solve(products, pull)
+        if ((free >= low) & (free <= high)).all():
+            assert step == pytest.approx(free)
+
+        def cost(at, products=products, pull=pull):
+            return at @ products @ at - 2 * pull @ at
+
+        nothing = cost(np.zeros(4))
+        assert cost(step) <= nothing + 1e-12

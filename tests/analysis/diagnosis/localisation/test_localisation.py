@@ -1,0 +1,74 @@
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
+from analysis.diagnosis.localisation.mismatch_cells import LEVEL
+from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
+from analysis.diagnosis.localisation.sensor_rule import SensorRule
+from analysis.diagnosis.localisation.state_regions import StateRegion
+from analysis.diagnosis.result.localisation_words import entry_sentence, localisation_sentences, states_sentence
+
+ALONG_X = EntryScore("a force along x", "mechanism", "x", 1.0, 0.9, 1.0, ())
+ALONG_ALL = EntryScore("forces along several axes", "mechanism", None, 0.9, 0.95, 1.0, ())
+OF_AX = EntryScore("an error of the ax channel", "sensor", "ax", 1.6, 0.4, 1e-9, ())
+MOVED, AT_SENSOR = SensorRule("motion", 50.0, 49.0), SensorRule("response sensor", 50.0, 0.1)
+RUBS = StateRegion("velocity", "v", "sign", 0.86, 1.0, 1e-5, "by the sign of v")
+
+
+def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(friction_found):
+    local = friction_found.local
+    assert local.entry.ranking[0].name == "a force along x"
+    assert local.entry.rule.verdict == "motion"
+    for stage in ("before", "retuned"):
+        worst = local.states[stage][0]
+        assert (worst.input, worst.region.words) == ("fx", "by the sign of v")
+        assert worst.region.p_value <= LEVEL
+    assert not local.states["after"]
+
+
+def test_rows_of_the_document_say_the_state(friction_found):
+    assert "by the sign of v" in {row.state for row in friction_found.diagnosis.mismatch}
+
+
+def test_distortion_is_told_per_channel_and_level(friction_found):
+    cells = friction_found.local.distortions.cells
+    assert {cell.amplitude for cell in cells} == {0.5, 1.5, 3.0}
+    assert {"ax", "x"} <= {cell.output for cell in cells}
+
+
+def test_the_entry_is_said_with_what_comes_next():
+    assert entry_sentence(EntryPoint((ALONG_X, ALONG_ALL, OF_AX), MOVED, 1200)) == (
+        "What re-tuning leaves enters as a force along x (the drive, the mechanism and a hand all push there, and "
+        "these channels cannot tell which does): 90 % of it, at the median of 1200 frequency lines; "
+        "next comes an error of the ax channel with 40 % (p < 0.0001 that it is as good). The position shows it, too: "
+        "the device itself moves otherwise, and no sensor of the response is at fault."
+    )
+    as_good = replace(OF_AX, p_value=0.3)
+    assert "would explain it about as well (40 %, p = 0.3000)" in entry_sentence(
+        EntryPoint((ALONG_X, as_good), None, 60)
+    )
+
+
+def test_a_sensor_is_said_to_be_one():
+    said = entry_sentence(EntryPoint((OF_AX, ALONG_X), AT_SENSOR, 60))
+    assert said.startswith("What re-tuning leaves enters as an error of the ax channel: 40 % of it")
+    assert said.endswith("the fault is in how the response is measured, not in how the device moves.")
+
+
+@pytest.mark.parametrize("entry", [None, EntryPoint((), None, 0), EntryPoint((ALONG_X,), None, 39)])
+def test_where_too_little_is_there_no_entry_is_said(entry):
+    assert entry_sentence(entry) == ""
+
+
+def test_states_are_said_with_share_and_chance():
+    assert states_sentence([StateMismatch("ax", "fx", (1.0, 256.0), RUBS)]) == (
+        "It is tied to a state: ax, driven by fx, by the sign of v (86 % of what is missing, p < 0.0001)."
+    )
+    assert states_sentence([]) == ""
+
+
+def test_the_page_gets_both_sentences(friction_found):
+    entry, states = localisation_sentences(friction_found.local)
+    assert entry.startswith("What re-tuning leaves enters as a force along x")
+    assert "by the sign of v" in states

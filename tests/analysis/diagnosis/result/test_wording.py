@@ -1,0 +1,264 @@
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
+from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text, place_words
+from analysis.diagnosis.result.findings import BlackBox
+from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.wording import (
+    black_box_sentence,
+    confirmation_sentence,
+    effect_sentence,
+    effect_title,
+    inseparable_sentence,
+    next_experiment_sentence,
+    remainder_sentence,
+    rival_sentences,
+    share_sentence,
+    verdict_sentence,
+)
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
+
+PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, "near v = 0", 0.8, 1e-9)
+ERRORS = Errors(0.5, 0.36, 0.0266, 0.0265)
+RIVALS = (
+    Rival("stribeck_friction", 0.3, True, ""),
+    Rival("viscous_damping", 0.002, False, "it leaves 4.1 times the noise"),
+)
+DRY = NamedEffect(
+    "coulomb_friction", "mechanism", "x", 0.9, 0.68, {"level": Estimate(0.211, "N", (0.20, 0.22))}, RIVALS
+)
+MOVED = MovedNumber("damping fx", 0.35, "N s/m", 2.1)
+
+
+def diagnosis(verdict, effects=(), mismatch=(PLACE,), remainder=(), errors=ERRORS, next_=None):
+    return Diagnosis(verdict, mismatch, effects, {}, remainder, Fit(errors, errors), "free simulation", next_)
+
+
+def test_an_effect_is_named_with_its_place_number_and_signature():
+    sentence = effect_sentence(DRY, "the missing force flips its sign with the velocity")
+    assert sentence == (
+        "Dry friction on the x drive, 0.21 N [0.20, 0.22]: the missing force flips its sign with the velocity."
+    )
+
+
+@pytest.mark.parametrize("name", EFFECT_NAMES, ids=lambda one: one.name)
+def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out_its_main_number(name):
+    assert name.name in EFFECT_WORDS
+    assert "_" not in noun_of(name.name)
+    numbers = {p.name: Estimate(0.1234, p.unit_in(False, "m/s^2")) for p in name.parameters}
+    effect = NamedEffect(name.name, name.place, "x", 1.0, 1.0, numbers)
+    sentence = effect_sentence(effect, "this is seen")
+    assert "12" in sentence.split(":")[0]
+    assert "_" not in sentence
+    assert "{" not in sentence
+    assert sentence.endswith("this is seen.")
+
+
+def test_words_are_only_for_effects_and_numbers_that_there_are():
+    for name, words in EFFECT_WORDS.items():
+        known = {p.name for p in EFFECTS_BY_NAME[name].parameters}
+        assert {*words.numbers, *words.shares} <= known
+
+
+def test_nouns_are_told_apart():
+    nouns = [words.noun for words in EFFECT_WORDS.values()]
+    assert len(set(nouns)) == len(nouns)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda one: one.name)
+def test_a_signature_of_the_catalogue_ends_the_sentence_that_names_it(effect):
+    assert not effect.signature.endswith(".")
+    assert effect.signature[:1].islower()
+
+
+def test_an_effect_that_nobody_has_words_for_is_called_by_its_own_name():
+    effect = NamedEffect("odd_thing", "mechanism", None, 1.0, 1.0, {"size": Estimate(0.5, "N")})
+    assert effect_sentence(effect) == "Odd thing on all drives, 0.500 N."
+
+
+@pytest.mark.parametrize(
+    ("place", "axis", "single", "words"),
+    [
+        ("mechanism", "x", False, "on the x drive"),
+        ("mechanism", None, False, "on all drives"),
+        ("mechanism", None, True, "on the drive"),
+        ("actuator", "y", False, "in the y actuator"),
+        ("sensor", "ax", False, "in the ax channel"),
+        ("sensor", None, False, "in all channels"),
+        ("hand", None, False, "at the handle"),
+    ],
+)
+def test_places_are_said_as_people_say_them(place, axis, single, words):
+    assert place_words(place, axis, single) == words
+
+
+def test_several_numbers_are_each_explained():
+    numbers = {"coulomb": Estimate(0.15, "N"), "static": Estimate(0.21, "N"), "speed": Estimate(0.0045, "m/s")}
+    assert numbers_text("stribeck_friction", numbers) == (
+        "0.150 N in motion, 0.210 N at rest, a transition over 4.50 mm/s"
+    )
+
+
+def test_a_share_of_samples_is_read_as_per_cent():
+    assert numbers_text("lost_samples", {"fraction": Estimate(0.02, "1", (0.018, 0.022))}) == "2.0 % [1.8, 2.2] of all"
+
+
+def test_the_verdict_names_what_is_missing_and_what_it_brings():
+    assert verdict_sentence(diagnosis("explained", (DRY,))) == (
+        "Missing in the model: dry friction on the x drive. The error on held-out data falls from 36 % of the signal "
+        "(re-tuned without it) to 2.66 % (with it), 1.00 times what noise alone would leave (2.65 %)."
+    )
+
+
+def test_the_verdict_says_where_more_is_missing():
+    said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)))
+    assert said.startswith("Missing in the model: dry friction on the x drive, but that is not all.")
+    assert said.endswith("and a mismatch remains.")
+
+
+def test_wrong_parameters_are_another_answer_than_missing_physics():
+    said = verdict_sentence(diagnosis("parameters"), (MOVED,))
+    assert said.startswith(
+        "No physics is missing; numbers of the model are off: damping fx +0.350 N s/m (2.1 standard deviations)."
+    )
+    assert "falls from 50 % of the signal (as given) to 36 % (re-tuned)" in said
+
+
+def test_without_a_mismatch_the_model_is_confirmed():
+    clean = Errors(0.027, 0.027, 0.027, 0.0265)
+    assert verdict_sentence(diagnosis("no_mismatch", mismatch=(), errors=clean)) == (
+        "The model answers as the device does: as it was given, its error on held-out data is 2.7 % of the signal, "
+        "1.02 times what noise alone would leave (2.65 %)."
+    )
+
+
+def test_a_mismatch_without_a_name_gets_none():
+    said = verdict_sentence(diagnosis("unexplained"))
+    assert said.startswith("Model and device disagree, and no effect of the catalogue explains it.")
+    assert not any(words.noun in said for words in EFFECT_WORDS.values())
+
+
+def test_unknown_errors_and_unknown_noise_are_said():
+    unknown = Errors(None, None, None, None)
+    assert "is not known" in verdict_sentence(diagnosis("explained", (DRY,), errors=unknown))
+    assert "is not known" in verdict_sentence(diagnosis("no_mismatch", mismatch=(), errors=unknown))
+    quiet = replace(ERRORS, noise=None)
+    assert verdict_sentence(diagnosis("explained", (DRY,), errors=quiet)).endswith(
+        "; what noise alone would leave is not known."
+    )
+
+
+def test_an_error_that_does_not_fall_is_not_said_to():
+    worse = Errors(0.3, 0.3, 0.31, 0.02)
+    assert "goes from 30 % of the signal" in verdict_sentence(diagnosis("explained", (DRY,), errors=worse))
+
+
+def test_rivals_come_with_why_they_were_passed_over():
+    assert rival_sentences(DRY) == ("Viscous damping (probability < 0.01): it leaves 4.1 times the noise.",)
+
+
+def test_of_two_that_cannot_be_told_apart_both_are_named():
+    assert inseparable_sentence(DRY) == (
+        "These data cannot tell dry friction from friction that is larger at rest (Stribeck): both are named "
+        "(probabilities: dry friction 0.68, friction that is larger at rest (Stribeck) 0.30)."
+    )
+    assert inseparable_sentence(replace(DRY, rivals=())) == ""
+
+
+def test_share_and_probability_are_said():
+    assert share_sentence(DRY) == (
+        "It accounts for 90 % of the mismatch that re-tuning leaves; the probability that this is its name is 0.68."
+    )
+
+
+def test_what_is_left_is_named_by_its_worst_places():
+    assert remainder_sentence(diagnosis("explained", (DRY,))) == "Nothing significant is left unexplained."
+    places = tuple(replace(PLACE, share=share) for share in (0.1, 0.8, 0.3, 0.2, 0.05))
+    said = remainder_sentence(diagnosis("partly_explained", (DRY,), remainder=places))
+    assert said.startswith(
+        "Still unexplained: ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001); "
+    )
+    assert said.endswith("; and 2 smaller places.")
+
+
+def test_the_next_recording_says_what_it_would_tell_apart():
+    wanted = NextExperiment("hapteq record slow.toml --out slow.h5", ("coulomb_friction", "stribeck_friction"),
+                            "only slow motion shows the hump")  # fmt: skip
+    assert next_experiment_sentence(diagnosis("explained", (DRY,), next_=wanted)) == (
+        "The recording that would tell dry friction and friction that is larger at rest (Stribeck) apart: hapteq "
+        "record slow.toml --out slow.h5. Only slow motion shows the hump."
+    )
+    assert next_experiment_sentence(diagnosis("explained", (DRY,))) == (
+        "No further recording is foreseen to tell apart what these data cannot."
+    )
+    assert next_experiment_sentence(diagnosis("explained", (replace(DRY, rivals=()),))) == ""
+
+
+@pytest.mark.parametrize(
+    ("test", "physics", "end"),
+    [
+        (0.02, 0.05, "The black box predicts better: the data hold something that was not named."),
+        (0.05, 0.02, "The physics predicts better."),
+        (0.05, 0.05, "the physics leaves 5 %: no better."),
+    ],
+)
+def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
+    said = black_box_sentence(BlackBox("ARX", 12, test, physics), named=True)
+    assert said.startswith("A black box (ARX, 12 numbers), fitted to the same samples, leaves")
+    assert said.endswith(end)
+    assert "the re-tuned model leaves" in black_box_sentence(BlackBox("ARX", 12, test, physics), named=False)
+
+
+def test_held_out_data_that_do_not_confirm_are_said_not_to():
+    fit = Errors(0.5, 0.36, 0.027, 0.0265)
+    assert confirmation_sentence(fit, ERRORS) == ""
+    assert confirmation_sentence(fit, replace(ERRORS, after=0.4)).startswith("The held-out data do not confirm this")
+    assert confirmation_sentence(fit, replace(ERRORS, after=0.06)) == (
+        "The held-out data confirm this only in part: 2.26 times the noise is left there, 1.02 times the noise on what "
+        "was fitted."
+    )
+    assert confirmation_sentence(fit, Errors(None, None, None, None)) == ""
+
+
+def test_numbers_of_the_model_that_moved_too_far_are_doubted():
+    assert retuned_sentence(()) == ""
+    assert retuned_sentence((MOVED,) * 6).endswith("(2.1 standard deviations) and 2 more.")
+    assert doubtful_sentences((MOVED,)) == ()
+    (far,) = doubtful_sentences((replace(MOVED, deviations=-3.4),))
+    assert far.startswith("The damping fx was moved by 3.4 standard deviations of its calibration: either")
+    (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0),))
+    assert "of its calibration, as far as it may: either" in edge
+
+
+def test_many_doubtful_numbers_are_counted_in_one_sentence():
+    moved = (*(replace(MOVED, deviations=4.0) for _ in range(8)), *(replace(MOVED, deviations=-3.5) for _ in range(3)))
+    (said,) = doubtful_sentences(moved)
+    assert said.startswith("11 numbers were moved by 3 standard deviations of their calibration or more, 8 of them")
+
+
+def test_a_relative_change_is_read_as_per_cent():
+    assert MovedNumber("mass of the mode at 82 Hz", -0.021, "1", -2.1).text == (
+        "mass of the mode at 82 Hz −2.1 % (2.1 standard deviations)"
+    )
+
+
+def test_the_title_of_an_effect_stands_alone():
+    assert effect_title(DRY) == "dry friction on the x drive"
+
+
+def test_faults_of_a_whole_sensor_need_no_place():
+    turned = NamedEffect("sensor_misalignment", "sensor", None, 1.0, 0.98, {"degrees": Estimate(8.7, "deg")})
+    assert effect_title(turned) == "a turned sensor"
+    assert effect_title(replace(turned, effect="sensor_gain", parameters={"gain": Estimate(1.1, "1")})) == (
+        "a wrong sensor gain in all channels"
+    )
+
+
+def test_numbers_that_are_off_by_little_are_said_to_be():
+    said = verdict_sentence(diagnosis("parameters"))
+    assert said.startswith(
+        "No physics is missing; numbers of the model are off, each within its calibration's standard deviation. The"
+    )

@@ -1,0 +1,165 @@
+"""The search as a whole, over a few effects of a small simulated device: what must not change its answer, and what
+must. On two axes, friction at the first one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.result.named_effects import EXACT
+from analysis.diagnosis.search.explain import NOTICED, worthwhile
+from analysis.diagnosis.search.search import ONLY_REFINES
+from equalizer.effects.catalogue import CATALOGUE, EFFECTS
+from equalizer.effects.effect import PlacedEffect
+from equalizer.signals.signal import Signal
+
+AMONG = ("coulomb_friction", "hardening_stiffness", "force_gain", "constant_force")
+
+
+def found_in(recording, model, among=AMONG):
+    others = tuple(effect.name for effect in CATALOGUE if effect.name not in among)
+    return diagnose([recording], model, DiagnosisSettings(without=others), map, lambda what, share: None)
+
+
+def named(found):
+    return [(one.effect, one.axis) for one in found.diagnosis.effects]
+
+
+def level(found):
+    return found.diagnosis.effects[0].parameters["level"].value
+
+
+@pytest.fixture(scope="module")
+def rubs(diagnosed):
+    """One axis, rubbing."""
+    return diagnosed.recorded(1)
+
+
+@pytest.fixture(scope="module")
+def found(rubs, diagnosed):
+    return found_in(rubs, diagnosed.device(1))
+
+
+def test_friction_is_found_to_its_interval_and_the_noise(found, diagnosed):
+    assert found.diagnosis.verdict == "explained"
+    assert named(found) == [("coulomb_friction", "x")]
+    assert level(found) == pytest.approx(diagnosed.FRICTION_N, rel=5e-3)
+    test = found.diagnosis.fit.test
+    assert test.after == pytest.approx(test.noise, rel=0.08)
+
+
+def test_an_interval_holds_the_truth_and_claims_no_more_than_a_law_is_exact_to(found, diagnosed):
+    estimate = found.diagnosis.effects[0].parameters["level"]
+    low, high = estimate.ci95
+    assert low < diagnosed.FRICTION_N < high
+    assert 2 * EXACT * estimate.value <= high - low < 0.1 * estimate.value
+
+
+def test_the_same_recording_gives_the_same_answer(found, rubs, diagnosed):
+    again = found_in(rubs, diagnosed.device(1))
+    assert again.diagnosis == found.diagnosis
+
+
+def test_another_seed_gives_the_same_name(diagnosed):
+    other = found_in(diagnosed.recorded(1, seed=9), diagnosed.device(1))
+    assert named(other) == [("coulomb_friction", "x")]
+    assert level(other) == pytest.approx(diagnosed.FRICTION_N, rel=5e-3)
+
+
+def test_a_device_without_anything_missing_has_no_mismatch(diagnosed):
+    found = found_in(diagnosed.recorded(1, ()), diagnosed.device(1))
+    assert found.diagnosis.verdict == "no_mismatch"
+    assert found.diagnosis.effects == ()
+
+
+def test_no_strength_is_no_name(diagnosed):
+    nothing = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.0}),)
+    assert named(found_in(diagnosed.recorded(1, nothing), diagnosed.device(1))) == []
+
+
+def test_an_effect_that_is_not_asked_for_changes_nothing(found, rubs, diagnosed):
+    more = found_in(rubs, diagnosed.device(1), (*AMONG, "sensor_drift"))
+    assert named(more) == named(found)
+    assert level(more) == pytest.approx(level(found), rel=1e-3)
+
+
+def test_without_the_true_name_no_other_explains(rubs, diagnosed):
+    other = found_in(rubs, diagnosed.device(1), AMONG[1:])
+    assert other.diagnosis.verdict in ("unexplained", "partly_explained")
+
+
+def test_a_mirrored_axis_rubs_alike(rubs, diagnosed, found):
+    mirrored = replace(
+        rubs,
+        command=turned(rubs.command, -1.0),
+        response=turned(rubs.response, -1.0),
+        position=turned(rubs.position, -1.0),
+    )
+    other = found_in(mirrored, diagnosed.device(1))
+    assert named(other) == named(found)
+    assert level(other) == pytest.approx(level(found), rel=1e-4)
+
+
+def test_a_constant_force_is_mirrored_with_its_axis(diagnosed):
+    pull = (PlacedEffect(EFFECTS["constant_force"], (0,), {"force": 0.3}),)
+    pulled = diagnosed.recorded(1, pull)
+    mirrored = replace(
+        pulled,
+        command=turned(pulled.command, -1.0),
+        response=turned(pulled.response, -1.0),
+        position=turned(pulled.position, -1.0),
+    )
+    forces = []
+    for one in (pulled, mirrored):
+        other = found_in(one, diagnosed.device(1))
+        assert named(other) == [("constant_force", "x")]
+        forces.append(other.named[0].values["force"])
+    assert forces == pytest.approx([0.3, -0.3], rel=0.01)
+
+
+def turned(signal: Signal, factor: float) -> Signal:
+    return replace(signal, samples=factor * signal.samples)
+
+
+def test_where_axes_change_places_the_answer_does(diagnosed):
+    among = ("coulomb_friction", "hardening_stiffness")
+    two = diagnosed.recorded(2)
+    swapped = replace(two, **{name: swap(getattr(two, name)) for name in ("command", "response", "position")})
+    one, other = (found_in(each, diagnosed.device(2), among) for each in (two, swapped))
+    assert named(one) == [("coulomb_friction", "x")]
+    assert named(other) == [("coulomb_friction", "y")]
+    assert level(other) == pytest.approx(level(one), rel=1e-3)
+
+
+def swap(signal: Signal) -> Signal:
+    return replace(signal, samples=np.ascontiguousarray(signal.samples[:, ::-1]))
+
+
+def test_commands_in_another_order_explain_nothing(rubs, diagnosed):
+    shuffled = np.random.default_rng(1).permutation(rubs.command.samples)
+    lost = replace(rubs, command=replace(rubs.command, samples=shuffled))
+    other = found_in(lost, diagnosed.device(1))
+    assert other.diagnosis.verdict == "unexplained"
+    assert named(other) == []
+
+
+def test_a_refined_law_is_not_named_for_the_plain_one_that_was_to_be_left_out(rubs, diagnosed):
+    found = found_in(rubs, diagnosed.device(1), ("asymmetric_friction", "hardening_stiffness"))
+    assert (found.diagnosis.verdict, named(found)) == ("unexplained", [])
+    assert ONLY_REFINES in found.remarks
+
+
+def test_a_refined_law_is_named_where_its_refinement_shows(diagnosed):
+    uneven = PlacedEffect(EFFECTS["asymmetric_friction"], (0,), {"level_positive": 0.3, "level_negative": 0.1})
+    found = found_in(diagnosed.recorded(1, (uneven,)), diagnosed.device(1), ("asymmetric_friction",))
+    assert named(found) == [("asymmetric_friction", "x")]
+
+
+@pytest.mark.parametrize(("left", "worth"), [(1.13, False), (1.02, True)])
+def test_an_effect_that_leaves_the_one_bad_channel_as_bad_is_not_added(standing_at, left, worth):
+    """Three channels whose noise was taken for larger than it is make up for the worst one."""
+    base = standing_at([1.16, 0.9, 0.9, 0.95])
+    better = standing_at([left, 0.9, 0.9, 0.94], "quadratic_damping")
+    assert base.standing.chosen_by - better.standing.chosen_by > NOTICED
+    assert worthwhile(base, better) is worth

@@ -1,0 +1,145 @@
+"""Play that rattles, told by the band powers of the response; what does not rattle is left alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
+from analysis.diagnosis.errors.band_power import BandPower
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.standing import Standing
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.result.impact_remainder import impact_remainder
+from analysis.diagnosis.result.wording import summary_lines
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.impacts import rattling
+from analysis.diagnosis.search.irregular import irregular
+from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.verdict import judge
+from equalizer.effects.backlash import EFFECT as PLAY
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.coulomb_friction import EFFECT as DRY
+from equalizer.effects.effect import PlacedEffect
+from study.challenge.draw_case import draw_case
+
+GAP_M, AXIS = 5e-5, 1
+LOOSE = (
+    PlacedEffect(
+        PLAY, (AXIS,), {"gap": GAP_M, "motor_mass": 0.06, "contact_stiffness": 2e5, "contact_damping": 5.0}
+    ),
+)  # fmt: skip
+
+
+def searched(real, effects, repeats=True):
+    """The recording before a search has found anything: arena, explanation, floors."""
+    recording = real.recorded(2, effects)
+    if not repeats:
+        recording = replace(recording, segments=tuple(replace(one, period=0) for one in recording.segments))
+    chosen = measure_of([recording], real.device(2))
+    arena = Arena(chosen.measure.shortened(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
+    given = arena.contender(evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
+    whole = arena.confirmed(given)  # as a search hands it over: with the sealed samples
+    return arena, Explanation(whole, whole, whole, (), ()), chosen.floors
+
+
+@pytest.fixture(scope="module")
+def loose(diagnosed):
+    return searched(diagnosed, LOOSE)
+
+
+@pytest.fixture(scope="module")
+def told(loose):
+    return rattling(*loose, CATALOGUE)
+
+
+def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
+    (claim,) = told.after.fitted.hypothesis.claims
+    assert (claim.effect.name, claim.sites) == ("backlash", (AXIS,))
+    values = told.after.fitted.hypothesis.placed()[0].values
+    assert values["gap"] == pytest.approx(GAP_M, rel=0.1)
+
+
+def test_it_is_as_far_from_the_record_as_chance_takes_it(told):
+    assert judge(told).verdict == "explained"
+    assert told.after.standing.seen < 2.5 < told.retuned.standing.seen
+    assert np.all(told.statistic.chance >= 0.05)
+
+
+def test_its_numbers_come_with_errors(told):
+    errors = told.statistic.errors
+    assert errors.shape == told.after.fitted.hypothesis.point.shape
+    assert np.all((errors > 0) & (errors < 0.5))
+
+
+def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sample(loose):
+    arena = loose[0]
+    apart = tuple(replace(one, values={**one.values, "gap": GAP_M * (1 + 1e-9)}) for one in LOOSE)
+    courses = [arena.whole.residuals(arena.tuning.model, effects) for effects in (LOOSE, apart)]
+    power = BandPower(arena.whole)
+    off = power.misfits(power.predicted(courses[0]) - power.predicted(courses[1]))
+    assert max(off.fit.max(), off.choose.max(), off.test.max()) < 0.2
+    assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
+
+
+def test_what_is_left_is_said_by_channel_and_not_by_the_course_of_blows(loose, told):
+    assert impact_remainder(loose[0].whole, told) == ()
+    further = replace(told, after=replace(told.after, standing=Standing(*np.array([[1, 4, 1, 1.0]] * 3))))
+    (left,) = impact_remainder(loose[0].whole, further)
+    assert (left.output, left.band_hz) == ("ay", (0.0, 500.0))
+    assert left.share == pytest.approx(4 * told.statistic.chance[1])
+    assert judge(further).verdict == "partly_explained"
+
+
+def test_a_device_that_repeats_is_left_alone(diagnosed):
+    rubs = searched(diagnosed, (PlacedEffect(DRY, (0,), {"level": 0.2}),))
+    assert not irregular(*rubs)
+    assert rattling(*rubs, CATALOGUE) is None
+
+
+def test_without_play_in_the_catalogue_nothing_is_named(loose):
+    assert rattling(*loose, [one for one in CATALOGUE if one.name != "backlash"]) is None
+
+
+def test_where_nothing_repeats_peaks_give_rattle_away(diagnosed):
+    assert irregular(*searched(diagnosed, LOOSE, repeats=False))
+    assert not irregular(*searched(diagnosed, (), repeats=False))
+
+
+def test_the_whole_diagnosis_says_what_was_compared(diagnosed):
+    kept = ("backlash", "loose_joint", "extra_mode")
+    others = tuple(one.name for one in CATALOGUE if one.name not in kept)
+    recording = diagnosed.recorded(2, LOOSE)
+    found = diagnose([recording], diagnosed.device(2), DiagnosisSettings(others), map, lambda said, share: None)
+    (effect,) = found.diagnosis.effects
+    assert (effect.effect, effect.axis) == ("backlash", "y")
+    low, high = effect.parameters["gap"].ci95
+    assert low < effect.parameters["gap"].value < high
+    assert found.diagnosis.fit.test.after < 0.4 * found.diagnosis.fit.test.retuned
+    assert diagnosis_from_json(diagnosis_to_json(found.diagnosis)) == found.diagnosis
+    lines = " ".join(summary_lines(found))
+    assert "Its blows cannot be predicted one by one" in lines
+    assert "the power of each channel in each half octave" in lines
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [9002, 9003, 9005])
+def test_play_in_a_simulated_bench_is_named_with_its_gap(seed):
+    case = draw_case(seed, ["backlash"])
+    found = diagnose([case.recording], case.model, DiagnosisSettings(), map, lambda said, share: None)
+    (effect,) = found.diagnosis.effects
+    (truth,) = case.truth
+    assert (effect.effect, effect.axis) == ("backlash", truth.axis)
+    assert effect.parameters["gap"].value == pytest.approx(truth.values["gap"], rel=0.06)
+    assert found.diagnosis.verdict == "explained"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decoy", ["creep", "stiffness_in_time", "crossed_axes", "bending_sensor", "force_hysteresis"])
+def test_what_is_no_play_is_not_taken_for_it(decoy):
+    case = draw_case(9102, [decoy])
+    found = diagnose([case.recording], case.model, DiagnosisSettings(), map, lambda said, share: None)
+    assert "backlash" not in found.diagnosis.returned_set

@@ -1,0 +1,117 @@
+"""Of what a search found, only what is needed stays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.candidates import candidates
+from analysis.diagnosis.search.explain import Explanation, retuned_alone
+from analysis.diagnosis.search.patience import always
+from analysis.diagnosis.search.prune import LITTLE, pruned
+from analysis.diagnosis.search.search import searched
+from equalizer.effects.catalogue import CATALOGUE, EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+FRICTION_N = 0.15
+
+
+def placed(name, **values):
+    return PlacedEffect(EFFECTS[name], (0,), values)
+
+
+def claim(name, **values):
+    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+def one_after_the_other(arena, *claims):
+    """An explanation as a search leaves it that added these in this order."""
+    base, steps, whole = arena.contender(retuned_alone(arena)), [], None
+    for one in claims:
+        whole = one if whole is None else together(whole, one)
+        steps.append(arena.contender(evaluated(arena.measure, arena.tuning, base.fitted.deviations, whole)))
+    ends = (arena.confirmed(one) for one in (base, base, steps[-1]))
+    return Explanation(*ends, tuple((one,) for one in steps), tuple(steps))
+
+
+def names(found):
+    return [one.effect.name for one in found.after.fitted.hypothesis.claims]
+
+
+@pytest.fixture(scope="module")
+def rubbing(arena_of):
+    return arena_of((placed("coulomb_friction", level=FRICTION_N),))
+
+
+@pytest.fixture(scope="module")
+def rubbing_and_pushed(arena_of):
+    return arena_of((placed("coulomb_friction", level=FRICTION_N), placed("constant_force", force=0.2)))
+
+
+def test_a_stopgap_goes_once_the_true_law_has_its_numbers(rubbing):
+    found = one_after_the_other(
+        rubbing, claim("constant_force", force=1e-6), claim("coulomb_friction", level=FRICTION_N)
+    )
+    assert names(found) == ["constant_force", "coulomb_friction"]
+    left = pruned(rubbing, found, always)
+    assert names(left) == ["coulomb_friction"]
+    assert len(left.rounds) == len(left.steps) == 1
+    # What it was compared with stays to be told.
+    assert [one.fitted.hypothesis.claims[-1].effect.name for one in left.rounds[0]] == [
+        "coulomb_friction",
+        "constant_force",
+    ]
+
+
+def test_two_that_are_needed_stay(rubbing_and_pushed):
+    found = one_after_the_other(
+        rubbing_and_pushed, claim("constant_force", force=0.2), claim("coulomb_friction", level=FRICTION_N)
+    )
+    assert pruned(rubbing_and_pushed, found, always) is found
+
+
+def test_out_of_patience_nothing_is_fitted_again(rubbing):
+    found = one_after_the_other(
+        rubbing, claim("constant_force", force=0.1), claim("coulomb_friction", level=FRICTION_N)
+    )
+    assert names(pruned(rubbing, found, lambda: False)) == ["constant_force", "coulomb_friction"]
+
+
+@pytest.mark.parametrize(("second", "kept"), [(2.0, 1), (1.02, 2)])
+def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(rubbing, standing_at, second, kept):
+    """A share of one in twenty, once with a remainder beside and once down to the noise."""
+    alone = one_after_the_other(rubbing, claim("coulomb_friction", level=FRICTION_N))
+    friction = alone.steps[0].fitted.hypothesis
+    both = together(friction, claim("amplifier_lag", time_constant=1e-4))
+    levels = (200.0, second * 200 ** (LITTLE / 2), second)
+    base, first, last = (standing_at(level).standing for level in levels)
+    steps = (replace(alone.steps[0], standing=first), replace(alone.steps[0], standing=last))
+    steps = (steps[0], replace(steps[1], fitted=replace(steps[1].fitted, hypothesis=both)))
+    found = replace(
+        alone,
+        retuned=replace(alone.retuned, standing=base),
+        after=replace(steps[1], standing=last),
+        steps=steps,
+        rounds=((steps[0],), (steps[1],)),
+    )
+    assert len(pruned(rubbing, found, lambda: False).steps) == kept
+
+
+def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, diagnosed):
+    """From below a whole number of ticks no small step leads above it."""
+    late = 1.16 / diagnosed.RATE_HZ
+    arena = arena_of((placed("transport_delay", delay=late),))
+    base = retuned_alone(arena)
+    starts = [
+        one.placed()[-1].values["delay"]
+        for one in candidates([EFFECTS["transport_delay"]], gather_evidence(arena.measure, arena.tuning, base)[0])
+    ]
+    assert any(start < 1 / diagnosed.RATE_HZ for start in starts)
+    assert any(start > 1 / diagnosed.RATE_HZ for start in starts)
+    found = searched(arena, CATALOGUE, lambda what, share: None).found
+    assert names(found) == ["transport_delay"]
+    assert found.after.fitted.hypothesis.placed()[-1].values["delay"] == pytest.approx(late, rel=0.01)
+    assert np.nanmax(found.after.standing.test) < 1.1
