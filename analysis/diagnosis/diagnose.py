@@ -10,16 +10,15 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.assemble_findings import assembled
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
-from analysis.diagnosis.search.explain import Progress
 from analysis.diagnosis.search.impacts import rattling
 from analysis.diagnosis.search.learn_clean_floor import learned_from
-from analysis.diagnosis.search.patience import Patience, always
+from analysis.diagnosis.search.patience import always
 from analysis.diagnosis.search.rivalry import Arena
-from analysis.diagnosis.search.screening import Mapper
 from analysis.diagnosis.search.search import Searched, searched
 from analysis.diagnosis.search.search_beside_sound import searched_beside_sound
 from analysis.diagnosis.search.seen_directly import seen_directly
 from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

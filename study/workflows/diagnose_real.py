@@ -13,10 +13,9 @@ from analysis.diagnosis.errors.played_errors import PlayedError, played_error
 from analysis.diagnosis.result.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
-from analysis.diagnosis.search.explain import Progress
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.search.patience import Patience
 from analysis.diagnosis.search.verdict import EXPLAINED
+from analysis.diagnosis.types import Patience, Progress
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError

@@ -10,9 +10,8 @@ import numpy as np
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.search.explain import Progress
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.search.screening import Mapper
+from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from analysis.diagnosis.types import Mask
 from equalizer.signals.lockin import ComplexArray
 
-BoolArray = npt.NDArray[np.bool_]
 _SILENT = 3e-3
 """Amplitude of a line, of the strongest of its input, below which it counts as silent."""
 
@@ -21,12 +21,12 @@ _SILENT = 3e-3
 class DetectionLines:
     """Each (lines,), within the driven band."""
 
-    driven: BoolArray
-    odd: BoolArray
+    driven: Mask
+    odd: Mask
     """Silent lines that only odd distortion reaches."""
-    even: BoolArray
+    even: Mask
     """Silent lines that only even distortion reaches."""
-    either: BoolArray
+    either: Mask
     """Silent lines that both reach, because even lines were driven, too."""
     step: int
     """Greatest common divisor of the driven lines' numbers: lines between its multiples detect noise only."""

@@ -2,8 +2,8 @@
 learned of a band on one is known on another."""
 
 import numpy as np
-import numpy.typing as npt
 
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 Band = tuple[float, float]
@@ -16,7 +16,7 @@ def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
     return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
 
 
-def within(frequency_hz: FloatArray, band_hz: Band) -> npt.NDArray[np.bool_]:
+def within(frequency_hz: FloatArray, band_hz: Band) -> Mask:
     """(lines,): lower edge included, upper edge excluded."""
     return np.asarray((frequency_hz >= band_hz[0] * (1 - 1e-9)) & (frequency_hz < band_hz[1] * (1 - 1e-9)))
 

@@ -4,12 +4,10 @@ for what."""
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
-
-Mask = npt.NDArray[np.bool_]
 
 FLOOR = 0.002
 """No model is trusted better than this share of a channel's rms; added to the noise as if it were some."""

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import KEPT_BACK, Mask, Observed, measured_of, roles
+from analysis.diagnosis.data.observed import KEPT_BACK, Observed, measured_of, roles
+from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 

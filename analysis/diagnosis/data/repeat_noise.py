@@ -10,10 +10,10 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from analysis.diagnosis.data.channel_noise import ChannelNoise, SegmentNoise
-from analysis.diagnosis.data.detection_lines import BoolArray
 from analysis.diagnosis.data.periods import Periods, look_samples, look_spectra
 from analysis.diagnosis.data.quiet_noise import hiss_at_rest
 from analysis.diagnosis.data.rounding import rounded_noise, rounding_step
+from analysis.diagnosis.types import Mask
 from equalizer.identification.noise_floor import over_neighbours, spread_over_looks
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -67,7 +67,7 @@ def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray,
     return density + rounding, rounding
 
 
-def quietest(variance: FloatArray, freedom: FloatArray) -> BoolArray:
+def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
     """Which rows are as quiet as the quietest of their column. Both (rows, channels)."""
     least = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
@@ -92,7 +92,7 @@ def _spread(
     return density, freedom
 
 
-def _moved(samples: FloatArray, periods: Sequence[Periods]) -> BoolArray:
+def _moved(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
     """(segments, channels): where a channel moves over its steps of rounding; all where it never does."""
     steps = np.array([rounding_step(channel) for channel in samples.T])
     moved = np.array([look_samples(samples, one).std(axis=(0, 1)) >= _STEPS_MOVED * steps for one in periods])
@@ -100,8 +100,8 @@ def _moved(samples: FloatArray, periods: Sequence[Periods]) -> BoolArray:
 
 
 def _no_more_than_rest(
-    recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: BoolArray
-) -> tuple[FloatArray, BoolArray]:
+    recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: Mask
+) -> tuple[FloatArray, Mask]:
     """The density, capped by the hiss at rest in channels whose segments varied and where all are louder than it."""
     none = np.zeros(len(varied), dtype=np.bool_)
     hiss = hiss_at_rest(recording, samples)

@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import welch
 
-from analysis.diagnosis.data.observed import Mask
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.standing import Standing
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, OCTAVES = 1.0, 0.5

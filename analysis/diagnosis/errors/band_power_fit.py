@@ -12,7 +12,7 @@ from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.hypothesis import Hypothesis, Number
 from analysis.diagnosis.errors.output_error import bounded_step
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.search.screening import Mapper
+from analysis.diagnosis.types import Mapper
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 

@@ -4,12 +4,12 @@ The sandwich of Huber (1967) and White (1980), its middle summed over stretches 
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, fitting, own_columns
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 STRETCH_S = 0.5
@@ -35,7 +35,7 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
 
 
-def _at_an_end(hypothesis: Hypothesis) -> npt.NDArray[np.bool_]:
+def _at_an_end(hypothesis: Hypothesis) -> Mask:
     ends = [number.bounds for number in hypothesis.numbers]
     held = [np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(hypothesis.point, ends, strict=True)]
     return np.array(held, dtype=np.bool_)

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Mask
 from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.signal import fftconvolve
 
-from analysis.diagnosis.data.observed import Mask
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50

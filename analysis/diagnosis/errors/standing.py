@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Mask, Observed
+from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 _TINY = 1e-6

@@ -7,12 +7,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import BoolArray, DetectionLines, detection_lines, held_samples
+from analysis.diagnosis.data.detection_lines import DetectionLines, detection_lines, held_samples
 from analysis.diagnosis.data.frequency_cells import Band, octaves_between, within
 from analysis.diagnosis.data.line_statistics import excess
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.localisation.driven_looks import DrivenLook, driven_looks
+from analysis.diagnosis.types import Mask
 from equalizer.identification.experiments import instrument_of
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -113,7 +114,7 @@ def _cells(look: DrivenLook, signal: Signal) -> list[Distortion]:
     return cells
 
 
-def _kinds(look: DrivenLook, channel: int, inside: BoolArray, where: _Where, whole: bool) -> list[Distortion]:
+def _kinds(look: DrivenLook, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
     power, error = np.abs(look.mean[:, channel]) ** 2, look.error[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[inside & look.lines.driven])))
     found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
@@ -134,12 +135,12 @@ def _kinds(look: DrivenLook, channel: int, inside: BoolArray, where: _Where, who
     ]
 
 
-def _silent(look: DrivenLook, inside: BoolArray) -> list[tuple[Kind, BoolArray, int]]:
+def _silent(look: DrivenLook, inside: Mask) -> list[tuple[Kind, Mask, int]]:
     """Kinds of detection lines, those in the band, and how many lines of the band that kind of distortion reaches."""
     numbers = np.arange(1, len(inside) + 1)
     multiple = inside & (numbers % look.lines.step == 0)
     odd = numbers // look.lines.step % 2 == 1
-    kinds: list[tuple[Kind, BoolArray, int]] = [
+    kinds: list[tuple[Kind, Mask, int]] = [
         ("odd", np.asarray(inside & look.lines.odd), int((multiple & odd).sum())),
         ("even", np.asarray(inside & look.lines.even), int((multiple & ~odd).sum())),
         ("either", np.asarray(inside & look.lines.either), int(multiple.sum())),

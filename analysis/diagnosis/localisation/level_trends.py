@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import BoolArray
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.data.line_statistics import two_sided
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 PRESENT = 0.001
@@ -83,7 +83,7 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
 
 
 def _course(
-    levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: BoolArray
+    levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: Mask
 ) -> tuple[float | None, float | None]:
     """Slope and p-value. Where nothing was seen at a level, the limit of what would have been bounds the slope: from
     below where that is the lowest level, from above where it is the highest."""

@@ -7,6 +7,7 @@ from typing import Literal
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.gather_evidence import gather_evidence
+from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.distortion import Distortions, distortion
 from analysis.diagnosis.localisation.entries import entries_of
@@ -15,8 +16,6 @@ from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Predict
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.residual_spectra import residual_spectra
 from analysis.diagnosis.localisation.tied_states import tied_errors, tied_forces
-from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import Contender
 
 Cells = Mapping[str, tuple[MismatchCell, ...]]
 _DERIVATIVES: Mapping[str, Literal[0, 1, 2]] = {
@@ -36,42 +35,41 @@ class Localisation:
 
 
 def localised(
-    measure: ErrorMeasure, tuning: Tuning, found: Explanation, floors: tuple[NoiseFloor, ...], cells: Cells
+    measure: ErrorMeasure, tuning: Tuning, stages: Mapping[str, Fitted], floors: tuple[NoiseFloor, ...], cells: Cells
 ) -> Localisation:
-    """Of the first recording, which stands for the device."""
+    """Of the first recording, which stands for the device. stages: see `Explanation.stages`."""
     left = any(cell.significant for cell in cells["retuned"])
-    entry = _entry(measure, tuning, found.retuned, floors[0]) if left else None
-    stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
-    states = {stage: _states(measure, tuning, one, cells[stage], entry) for stage, one in stages.items()}
+    entry = _entry(measure, tuning, stages["retuned"], floors[0]) if left else None
+    states = {stage: _states(measure, tuning, fitted, cells[stage], entry) for stage, fitted in stages.items()}
     return Localisation(states, entry, distortion(measure.records[0].recording, floors[0]))
 
 
-def _entry(measure: ErrorMeasure, tuning: Tuning, contender: Contender, floor: NoiseFloor) -> EntryPoint | None:
+def _entry(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor) -> EntryPoint | None:
     if measure.name != "free simulation":
         return None
     record = measure.records[0]
     recording, p = record.recording, record.recording.response.samples.shape[1]
-    predicted = record.measured - contender.fitted.residuals[0] * measure.unit
+    predicted = record.measured - fitted.residuals[0] * measure.unit
     position = predicted[:, p:] if predicted.shape[1] > p else None
     spectra = residual_spectra(recording, Prediction(predicted[:, :p], position), floor, record.fit | record.choose)
     if spectra is None:
         return None
-    model, beside = tuning.tuned(contender.fitted.deviations), spectra.residual.shape[2] > p
+    model, beside = tuning.tuned(fitted.deviations), spectra.residual.shape[2] > p
     entries = entries_of(model, recording, spectra.frequency_hz, beside)
-    kinds = {_DERIVATIVES.get(one) for one in recording.response.quantities}
+    kinds = {_DERIVATIVES.get(quantity) for quantity in recording.response.quantities}
     return entry_point(spectra, entries, kinds.pop() if len(kinds) == 1 else None)
 
 
 def _states(
     measure: ErrorMeasure,
     tuning: Tuning,
-    contender: Contender,
+    fitted: Fitted,
     cells: tuple[MismatchCell, ...],
     entry: EntryPoint | None,
 ) -> tuple[StateMismatch, ...]:
     if not any(cell.significant for cell in cells):
         return ()
-    recording, evidence = measure.records[0].recording, gather_evidence(measure, tuning, contender.fitted)[0]
+    recording, evidence = measure.records[0].recording, gather_evidence(measure, tuning, fitted)[0]
     best = entry.ranking[0] if entry is not None and entry.ranking else None
     if best is not None and best.place == "sensor":
         channels = recording.response.channels if best.axis is None else (best.axis,)

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import BoolArray
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.data.line_statistics import noncentral_f_sf
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.closed_testing import closed_adjusted
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
+from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -81,7 +81,7 @@ def mismatch_cells(
     recording: Recording,
     prediction: Prediction,
     floor: NoiseFloor,
-    used: BoolArray | None = None,
+    used: Mask | None = None,
     margin: Margin | None = None,
 ) -> tuple[MismatchCell, ...]:
     """used: (n,), the samples that count; None = all. Empty where the noise is not known.

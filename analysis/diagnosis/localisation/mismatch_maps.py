@@ -8,10 +8,10 @@ import numpy as np
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.output_error import Fitted
+from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import Margin, MismatchCell, Prediction, mismatch_cells
-from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import Contender
 
 Cells = tuple[MismatchCell, ...]
 
@@ -31,17 +31,18 @@ class Maps:
 
 
 def maps_of(
-    measure: ErrorMeasure, found: Explanation, floors: tuple[NoiseFloor, ...], learned: CleanFloor | None = None
+    measure: ErrorMeasure,
+    stages: Mapping[str, Fitted],
+    floors: tuple[NoiseFloor, ...],
+    learned: CleanFloor | None = None,
 ) -> Maps:
-    """learned: what is no mismatch, from clean recordings."""
-    stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
-    return Maps({stage: cells_of(measure, one, floors, learned) for stage, one in stages.items()})
+    """stages: see `Explanation.stages`. learned: what is no mismatch, from clean recordings."""
+    return Maps({stage: cells_of(measure, fitted, floors, learned) for stage, fitted in stages.items()})
 
 
-def whole_mismatch(measure: ErrorMeasure, contender: Contender) -> tuple[Mismatch, ...]:
+def whole_mismatch(measure: ErrorMeasure, stands: Standing) -> tuple[Mismatch, ...]:
     """One row for the worst channel over the whole band, where no cell can be told apart from its neighbours."""
     record = measure.records[0].recording
-    stands = contender.standing
     errors = np.fmax(np.maximum(stands.fit, stands.choose), stands.test)
     worst = int(np.argmax(errors))
     names = (*record.response.channels, *(() if record.position is None else record.position.channels))
@@ -53,11 +54,11 @@ def whole_mismatch(measure: ErrorMeasure, contender: Contender) -> tuple[Mismatc
 
 
 def cells_of(
-    measure: ErrorMeasure, contender: Contender, floors: tuple[NoiseFloor, ...], learned: CleanFloor | None = None
+    measure: ErrorMeasure, fitted: Fitted, floors: tuple[NoiseFloor, ...], learned: CleanFloor | None = None
 ) -> Cells:
     margin = Margin(learned=learned or CleanFloor())
     cells: list[MismatchCell] = []
-    for record, residuals, floor in zip(measure.records, contender.fitted.residuals, floors, strict=True):
+    for record, residuals, floor in zip(measure.records, fitted.residuals, floors, strict=True):
         p = record.recording.response.samples.shape[1]
         predicted = record.measured - residuals * measure.unit
         position = predicted[:, p:] if predicted.shape[1] > p else None

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.data.channel_noise import ChannelNoise
-from analysis.diagnosis.data.detection_lines import BoolArray, detection_lines, held_samples
+from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
 from analysis.diagnosis.data.frequency_cells import Band, driving_inputs, octaves_between, within
 from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods, spectra
+from analysis.diagnosis.types import Mask
 from equalizer.identification.experiments import instrument_of
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
@@ -65,7 +66,7 @@ _HEARD = 0.1
 nothing is a matter of a degree of misalignment, and judged by the loudest."""
 
 
-def residual_lines(recording: Recording, seen: Observation, used: BoolArray) -> list[ResidualLines]:
+def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[ResidualLines]:
     """used: (n,), the samples that count. Segments without a whole period or window of them are left out."""
     whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
     periods = {one.index: one for one in settled_periods(recording)}
@@ -104,7 +105,7 @@ def _of_periods(recording: Recording, seen: Observation, periods: Periods) -> li
     return found
 
 
-def _of_windows(recording: Recording, seen: Observation, segment: Segment, whole: BoolArray) -> list[ResidualLines]:
+def _of_windows(recording: Recording, seen: Observation, segment: Segment, whole: Mask) -> list[ResidualLines]:
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     starts = [
         s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if whole[s : s + length].all()

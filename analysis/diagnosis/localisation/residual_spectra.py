@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.data.channel_noise import ChannelNoise
-from analysis.diagnosis.data.detection_lines import BoolArray, detection_lines, held_samples
+from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
+from analysis.diagnosis.types import Mask
 from equalizer.identification.experiments import instrument_of
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
@@ -37,7 +38,7 @@ def residual_spectra(
     recording: Recording,
     prediction: Prediction,
     floor: NoiseFloor,
-    used: BoolArray | None = None,
+    used: Mask | None = None,
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
     """Of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the noise
@@ -70,12 +71,12 @@ def residual_spectra(
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
 
 
-def _within(periods: Periods, whole: BoolArray) -> Periods:
+def _within(periods: Periods, whole: Mask) -> Periods:
     starts = tuple(start for start in periods.starts if whole[start : start + periods.length].all())
     return Periods(periods.index, periods.segment, starts, periods.settled)
 
 
-def _windows(recording: Recording, whole: BoolArray) -> list[Periods]:
+def _windows(recording: Recording, whole: Mask) -> list[Periods]:
     """Each a look of its own, for windows are not alike."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
     found = []

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import BoolArray
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.localisation.block_permutation import IntArray
 from analysis.diagnosis.localisation.mismatch_cells import LEVEL, MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import Disturbance, State, StateRegion, state_regions
+from analysis.diagnosis.types import Mask
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.placing import axis_letter
 from equalizer.signals.recording import Recording
@@ -92,7 +92,7 @@ def _says_something(region: StateRegion) -> bool:
     return region.by == "sign" or region.share > _CROWDED * region.occupied
 
 
-def _strata(recording: Recording, used: BoolArray, driven: FloatArray) -> IntArray:
+def _strata(recording: Recording, used: Mask, driven: FloatArray) -> IntArray:
     """Number of the segment; -1 where samples do not count, or next to nothing drives them. (n,)"""
     n = len(driven)
     strata = np.full(n, -1, dtype=np.int64)

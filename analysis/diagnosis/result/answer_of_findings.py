@@ -10,7 +10,7 @@ from analysis.diagnosis.result.localisation_words import localisation_sentences
 from analysis.diagnosis.result.own_numbers import own_numbers
 from analysis.diagnosis.result.real_answer import DrawnExcerpt, HeldOutStretch, RealAnswer
 from analysis.diagnosis.result.wording import answer_of, capital, effect_title, inseparable_sentence, remainder_sentence
-from analysis.diagnosis.search.screening import Mapper
+from analysis.diagnosis.types import Mapper
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

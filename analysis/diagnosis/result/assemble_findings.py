@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.noise_floor import NoiseFloor
-from analysis.diagnosis.data.observed import Mask
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.gather_evidence import gather_evidence
@@ -29,6 +28,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import learned_sentence
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.signals.recording import Recording
@@ -48,8 +48,8 @@ def assembled(
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
-    maps, courses = maps_of(measure, found, floors, learned), _courses(measure, found, names)
-    local = localised(measure, tuning, found, floors, maps.cells)
+    maps, courses = maps_of(measure, found.stages, floors, learned), _courses(measure, found, names)
+    local = localised(measure, tuning, found.stages, floors, maps.cells)
     proposal = _proposal(arena, found, judged)
     document = _document(arena, found, judged, (maps, local), proposal)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
@@ -110,14 +110,14 @@ def _document(
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
-        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before)),
+        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.standing)),
         effects=named_effects(found, number_errors(arena, found), said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
         else impact_remainder(measure, found)
         or mismatch_rows(maps.cells["after"], local.states["after"])
-        or whole_mismatch(measure, found.after),
+        or whole_mismatch(measure, found.after.standing),
         fit=errors_of(measure, found),
         error=measure.name,
         next_experiment=None if proposal is None else proposal.document,

@@ -7,11 +7,11 @@ has numbers.
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Mask
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.standing import rms_over
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 SEEN = 20_000

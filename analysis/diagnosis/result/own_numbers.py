@@ -11,7 +11,7 @@ from analysis.diagnosis.errors.tuning import Tuning, tuning_of
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.real_answer import OwnNumber
 from analysis.diagnosis.search.rivalry import Arena, sensitivity_at
-from analysis.diagnosis.search.screening import Mapper
+from analysis.diagnosis.types import Mapper
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

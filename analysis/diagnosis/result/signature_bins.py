@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 _BINS, _LAW_BINS = 30, 120
@@ -13,9 +14,7 @@ _RESTING = 0.01
 """Of the range, to either side of where a channel is most."""
 
 
-def binned(
-    at: FloatArray, values: FloatArray, used: npt.NDArray[np.bool_], rate_hz: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def binned(at: FloatArray, values: FloatArray, used: Mask, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Abscissa, mean and its standard error per bin; half the bins hold as many samples each, half are as wide, so that
     both the middle and the ends are seen. at, values, used: (n,)"""
     blocks = (np.flatnonzero(used) / (_BLOCK_S * rate_hz)).astype(int)
@@ -39,9 +38,7 @@ def binned_law(at: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArr
     return means[0], means[1]
 
 
-def running_rms(
-    seconds: FloatArray, values: FloatArray, used: npt.NDArray[np.bool_]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def running_rms(seconds: FloatArray, values: FloatArray, used: Mask) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time, rms and its standard error in equal stretches of the time that counts."""
     parts = [part for part in np.array_split(np.flatnonzero(used), _BINS) if len(part)]
     rms = np.array([float(np.sqrt(np.mean(values[part] ** 2))) for part in parts])

@@ -10,9 +10,9 @@ from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.result.named_effects import BESIDE_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
-from analysis.diagnosis.search.patience import Patience
 from analysis.diagnosis.search.rivalry import Arena, Contender, sensitivity_at
 from analysis.diagnosis.search.without_step import without_step
+from analysis.diagnosis.types import Patience
 from equalizer.signals.signal import FloatArray
 
 UNDETERMINED = 5.0

@@ -1,6 +1,6 @@
 """From a model and what was observed to the physics that the model lacks: re-tune, screen, fit, choose, add, prune."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,11 @@ from analysis.diagnosis.search.clock_drift_by_trial import clock_drift_by_trial
 from analysis.diagnosis.search.families import excludes
 from analysis.diagnosis.search.no_answer import silences
 from analysis.diagnosis.search.parsimony import plainest_first
-from analysis.diagnosis.search.patience import OutOfPatienceError, Patience, always, impatient
+from analysis.diagnosis.search.patience import OutOfPatienceError, always, impatient
 from analysis.diagnosis.search.rivalry import Arena, Contender, contest, refine, sensitivity_at
 from analysis.diagnosis.search.same_within_errors import excess
 from analysis.diagnosis.search.screening import screen
+from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
@@ -33,9 +34,6 @@ WORTHWHILE = 0.15
 """Share of what is left above the noise that an effect must take to be added,"""
 NOTICED = 0.003
 """and so much in mean log error power."""
-
-Progress = Callable[[str, float], None]
-"""What is being done, and the share of all that is done."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +67,10 @@ class Explanation:
     """An effect that was not to be named, where nothing but refinements of it explains as much."""
     undetermined: tuple[str, ...] = ()
     """Effects that were found, and are not named: the recordings leave their numbers open."""
+
+    @property
+    def stages(self) -> dict[str, Fitted]:
+        return {"before": self.before.fitted, "retuned": self.retuned.fitted, "after": self.after.fitted}
 
 
 def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Explanation:

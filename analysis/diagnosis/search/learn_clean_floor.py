@@ -13,10 +13,10 @@ from analysis.diagnosis.errors.tuning import Tuning, tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import cells_of
-from analysis.diagnosis.search.explain import Progress, retuned_alone
+from analysis.diagnosis.search.explain import retuned_alone
 from analysis.diagnosis.search.rivalry import Arena, Contender
-from analysis.diagnosis.search.screening import Mapper
 from analysis.diagnosis.search.sound_recordings import SoundRecordings, sound_recording
+from analysis.diagnosis.types import Mapper, Progress
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -132,7 +132,7 @@ def _lesson(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: 
     whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
     arena = Arena(whole.shortened(), whole, tuning, map_)
     retuned = arena.confirmed(arena.contender(retuned_alone(arena)))
-    cells = cells_of(whole, retuned, chosen.floors)
+    cells = cells_of(whole, retuned.fitted, chosen.floors)
     return _Lesson(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
 
 

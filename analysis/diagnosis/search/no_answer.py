@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Mask
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.standing import rms_over
 from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.types import Mask
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 

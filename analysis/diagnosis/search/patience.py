@@ -2,10 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
-from analysis.diagnosis.search.screening import Mapper
-
-Patience = Callable[[], bool]
-"""Whether to go on."""
+from analysis.diagnosis.types import Mapper, Patience
 
 OUT_OF_TIME = (
     "The time for the search ran out before it was done: a further effect, or a better fit of the last one, was not "

@@ -4,10 +4,10 @@ import numpy as np
 
 from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation, worthwhile
-from analysis.diagnosis.search.patience import Patience
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.verdict import as_good_as_noise, shares_taken, worth_naming
 from analysis.diagnosis.search.without_step import without_step
+from analysis.diagnosis.types import Patience
 
 LITTLE = 0.1
 """Share of the mismatch that a further effect must take where more than noise is left with it, too: no law is exact,

@@ -11,8 +11,9 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis, alike, without_clai
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting, sensitivity
 from analysis.diagnosis.errors.standing import Standing, standing
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.search.screening import Mapper, Screened
+from analysis.diagnosis.search.screening import Screened
 from analysis.diagnosis.search.sound_recordings import SoundRecordings
+from analysis.diagnosis.types import Mapper
 from equalizer.effects.effect import AxisForce, JointForce
 
 MOST_FITTED, LEAST_FITTED = 10, 4

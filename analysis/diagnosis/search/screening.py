@@ -1,6 +1,6 @@
 """Which hypotheses are worth a fit: how much of what is left each could take, at one simulation apiece."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +9,8 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, together
 from analysis.diagnosis.errors.output_error import BOUND, Fitted, Sensitivity, bounded_step, fitting
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.types import Mapper
 
-Mapper = Callable[..., Iterable[object]]
-"""`map`, or one that works in parallel and keeps the order."""
 WEAKEST, STRONGEST = 0.1, 6.0
 """Factors by which a start's strength may be wrong."""
 

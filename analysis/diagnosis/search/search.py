@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.search.explain import Explanation, Progress, explain
+from analysis.diagnosis.search.explain import Explanation, explain
 from analysis.diagnosis.search.no_answer import foresees_nothing
-from analysis.diagnosis.search.patience import OUT_OF_TIME, Patience, always
+from analysis.diagnosis.search.patience import OUT_OF_TIME, always
 from analysis.diagnosis.search.prune import pruned
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.verdict import Judgement, judge
+from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 
 SHOWN = 1.25

@@ -6,13 +6,13 @@ from dataclasses import replace
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.standing import standing
-from analysis.diagnosis.search.explain import CLEAN, Explanation, Progress
+from analysis.diagnosis.search.explain import CLEAN, Explanation
 from analysis.diagnosis.search.learn_clean_floor import Learned, floored
 from analysis.diagnosis.search.no_answer import foresees_nothing
-from analysis.diagnosis.search.patience import Patience
 from analysis.diagnosis.search.rivalry import Arena, Contender, refine
 from analysis.diagnosis.search.search import Searched, searched
 from analysis.diagnosis.search.verdict import EXPLAINED, Judgement
+from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Mask
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, claimed
+from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.lattice import lattice_step
 from equalizer.signals.recording import Recording

@@ -1,0 +1,18 @@
+"""Types that all folders of the diagnosis share."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+Mask = npt.NDArray[np.bool_]
+"""Which samples, or which lines of a spectrum, count."""
+
+Mapper = Callable[..., Iterable[object]]
+"""`map`, or a function that works in parallel and keeps the order."""
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done, and the share of the whole work that is done."""
+
+Patience = Callable[[], bool]
+"""Asked before each piece of a search: whether to go on."""
