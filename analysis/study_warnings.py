@@ -8,7 +8,7 @@ from analysis.catch_trials import CatchTally, wilson_interval
 from analysis.detection import directions_below_detection
 from analysis.threshold_table import ThresholdTable
 from analysis.thresholds import RunEnd, Threshold
-from analysis.wording import listed
+from analysis.wording import listed, signed
 from protocols.staircase_rule import StaircaseRule
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
@@ -154,7 +154,7 @@ def _better_than_chance(percent_correct: float, trials: int) -> bool:
 
 def _biased(rows: Sequence[Threshold]) -> str:
     leaning = [
-        f"{_run(row)} (criterion {row.criterion:+.2f})"
+        f"{_run(row)} (criterion {signed(row.criterion)})"
         for row in rows
         if row.criterion is not None and abs(row.criterion) > STRONG_BIAS
     ]

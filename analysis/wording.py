@@ -6,8 +6,22 @@ NONE = "–"
 _NAMED = 12
 
 
+def typeset(formatted: str) -> str:
+    """A formatted number as people read it: with the minus sign (U+2212), and a zero without one.
+
+    Every number for people that can be negative goes through here. Files for programs, and what may be copied into a
+    command, keep the ASCII "-".
+    """
+    return formatted.replace("-", "−") if float(formatted) else formatted.replace("-", "")
+
+
 def number(value: float | None, digits: int = 2) -> str:
-    return NONE if value is None else f"{value:.{digits}f}"
+    return NONE if value is None else typeset(f"{value:.{digits}f}")
+
+
+def signed(value: float, digits: int = 2) -> str:
+    """With its sign, also where it is positive."""
+    return typeset(f"{value:+.{digits}f}")
 
 
 CUT_NOTE = (

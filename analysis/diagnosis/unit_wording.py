@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.wording import typeset
+
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
 _KEPT = (0.01, 1e4)
 """Between these a unit needs no prefix, unless people always give it one."""
@@ -85,6 +87,5 @@ def _decimals(value: float, interval: tuple[float, float] | None) -> int:
 
 def _number(value: float, decimals: int) -> str:
     if value and (abs(value) >= 1e6 or decimals > 5):
-        return f"{value:.3g}"
-    text = f"{value:.{decimals}f}"
-    return text.replace("-", "−") if float(text) else text.replace("-", "")
+        return typeset(f"{value:.3g}")
+    return typeset(f"{value:.{decimals}f}")

@@ -11,6 +11,7 @@ from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes, say_nothing_to_draw
+from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
 _ROUNDED = " A missing force is known only as fast as noise lets it be, so that corners look rounder than they are."
@@ -81,8 +82,11 @@ def _in_words(signature: Signature) -> str:
     size = float(np.sqrt(np.mean(signature.measured**2)))
     apart = float(np.sqrt(np.mean((signature.measured - law) ** 2)))
     share = f"{100 * apart / size:.2g} %" if size else "nothing"
+    first, last = (
+        f"{typeset(f'{signature.measured[end]:.3g}')} at {typeset(f'{signature.measured_at[end]:.3g}')}"
+        for end in (0, -1)
+    )
     return (
-        f"{signature.of[:1].upper()}{signature.of[1:]} against {signature.along}: from {signature.measured[0]:.3g} at "
-        f"{signature.measured_at[0]:.3g} to {signature.measured[-1]:.3g} at {signature.measured_at[-1]:.3g}. The "
-        f"fitted law differs from the dots by {share} of their size, rms."
+        f"{signature.of[:1].upper()}{signature.of[1:]} against {signature.along}: from {first} to {last}. The fitted "
+        f"law differs from the dots by {share} of their size, rms."
     )

@@ -10,6 +10,7 @@ from matplotlib.typing import LineStyleType
 
 from analysis.ellipsoid import EllipsoidResult
 from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, say_nothing_to_draw
+from analysis.wording import number
 
 _COLUMNS = 6
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
@@ -68,7 +69,7 @@ def _draw_panels(above: Axes, below: Axes, here: list[EllipsoidResult], directio
 
 
 def _label(ratio: float, tilt_deg: float) -> str:
-    return f"\n1 : {ratio:.2f}, tilt {tilt_deg:.0f}°"
+    return f"\n1 : {ratio:.2f}, tilt {number(tilt_deg, 0)}°"
 
 
 def _half_height(result: EllipsoidResult) -> float:

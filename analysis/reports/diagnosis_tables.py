@@ -10,7 +10,7 @@ from analysis.diagnosis.result.retuned_numbers import all_numbers
 from analysis.diagnosis.result.wording import capital, ended, error_text
 from analysis.diagnosis.unit_wording import probability_text, share_text, value_text
 from analysis.reports.page import Table
-from analysis.wording import NONE, p_value
+from analysis.wording import NONE, p_value, signed
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
@@ -103,7 +103,7 @@ def retuned_table(found: Findings) -> Table | None:
     alone = all_numbers(found.tuning, found.explanation.retuned.fitted.deviations)
     final = all_numbers(found.tuning, found.explanation.after.fitted.deviations)
     rows = tuple(
-        (before.name, before.size, f"{before.deviations:+.2f}", after.size, f"{after.deviations:+.2f}")
+        (before.name, before.size, signed(before.deviations), after.size, signed(after.deviations))
         for before, after in zip(alone, final, strict=True)
     )
     header = ("Number", "Re-tuned", "Standard deviations", "With what was found", "Standard deviations")

@@ -1,6 +1,6 @@
 """The methods of a study in words, with the numbers of its protocol."""
 
-from analysis.wording import listed
+from analysis.wording import listed, typeset
 from protocols.preparation import DemoSettings, PracticeSettings
 from protocols.staircase_rule import StaircaseRule, StepChange
 from protocols.study_protocol import StudyProtocol
@@ -51,14 +51,14 @@ def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
 
 def _task(protocol: StudyProtocol) -> str:
     trial, directions = protocol.trial, protocol.directions
-    first, second = (directions.symmetry_deg + side for side in (45, -45))
+    first, second, middle = (typeset(f"{directions.symmetry_deg + side:g}") for side in (45, -45, 0))
     limit = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
     told = "was told" if trial.feedback == "after_answer" else "was not told"
     return (
         f"Every trial played one {_PLAYED[protocol.stimulus.quantity]} along one of two orthogonal directions, at "
-        f"{first:g}° (1) and "
-        f"{second:g}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
-        f"{directions.symmetry_deg:g}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
+        f"{first}° (1) and "
+        f"{second}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
+        f"{middle}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
         f"which of the two it was, {limit}, and {told} whether that was right."
         + (
             " A void trial came again with the same stimulus: after pauses and faults, and where the participant asked "

@@ -11,6 +11,7 @@ from analysis.figures.real_held_out import error_rows
 from analysis.proof.injected import InjectedOutcome
 from analysis.reports.injected_section import injected_section
 from analysis.reports.page import Page, Section, Table, render_page
+from analysis.wording import typeset
 
 VERDICT_WORDS = {
     "no_mismatch": "no mismatch",
@@ -131,7 +132,7 @@ def number_sentence(number: OwnNumber) -> str:
     off = 100 * (number.value / number.nominal - 1)
     inside = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
     known = value_text(number.nominal, number.unit)
-    return f"{said}; known by other means is {known}, {off:+.2g} % off{inside[number.holds_nominal]}."
+    return f"{said}; known by other means is {known}, {typeset(f'{off:+.2g}')} % off{inside[number.holds_nominal]}."
 
 
 def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:

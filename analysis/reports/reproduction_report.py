@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.reproduction.document import FigureFindings, Finding, PlayedRow, Reproduction
+from analysis.wording import number
 
 BANNER = (
     "Everything here was simulated: the device, and those who answered. The simulation was set up to show the features "
@@ -128,9 +129,9 @@ def _played_tables(reproduction: Reproduction) -> tuple[Table, ...]:
 
 def _numbers(row: PlayedRow) -> tuple[str, ...]:
     return (
-        f"{row.flatness_db:.2f} dB",
-        f"{row.coupling_db:.1f} dB",
-        f"{row.median_coupling_db:.1f} dB",
+        f"{number(row.flatness_db)} dB",
+        f"{number(row.coupling_db, 1)} dB",
+        f"{number(row.median_coupling_db, 1)} dB",
         f"{row.axis_error_deg:.1f}°",
         f"{100 * row.error:.1f} %",
     )

@@ -7,7 +7,7 @@ from analysis.equalized_delivery import deliveries
 from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
-from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number
+from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number, signed
 from protocols.staircase import to_db
 
 
@@ -126,7 +126,7 @@ def _beside_direction(
     if felt_n is None or told_n is None or felt_bound or told_bound:
         yield NONE
     else:
-        yield f"{to_db(told_n) - to_db(felt_n):+.1f}"
+        yield signed(to_db(told_n) - to_db(felt_n), 1)
 
 
 def _direction(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:

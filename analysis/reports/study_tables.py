@@ -8,7 +8,7 @@ from analysis.repeated_trials import OFTEN_WORDS
 from analysis.reports.page import Table
 from analysis.study_analysis import StudyAnalysis
 from analysis.thresholds import RunEnd, Threshold
-from analysis.wording import CUT_NOTE, NONE, count, marked_if_cut, number, p_value
+from analysis.wording import CUT_NOTE, NONE, count, marked_if_cut, number, p_value, signed
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
@@ -87,8 +87,8 @@ def pair_table(analysis: StudyAnalysis) -> Table:
         rows=tuple(
             (
                 f"{pair.second} − {pair.first}",
-                f"{pair.difference:+.2f}",
-                f"{pair.lower:+.2f} to {pair.upper:+.2f}",
+                signed(pair.difference),
+                f"{signed(pair.lower)} to {signed(pair.upper)}",
                 p_value(pair.p),
             )
             for pair in comparisons.pairs
@@ -181,8 +181,8 @@ def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
             (
                 f"{result.frequency_hz:g} Hz", result.along.replace("_", " "), number(result.amplitude_n),
                 number(result.phasor.on_axis_mps2), f"1 : {number(result.moments.normalised_axes[1])}",
-                f"{result.moments.tilt_deg:.0f}°", f"1 : {number(result.phasor.ellipticity)}",
-                f"{result.phasor.tilt_deg:.0f}°", number(result.phasor.off_axis_ratio),
+                f"{number(result.moments.tilt_deg, 0)}°", f"1 : {number(result.phasor.ellipticity)}",
+                f"{number(result.phasor.tilt_deg, 0)}°", number(result.phasor.off_axis_ratio),
                 f"{100 * result.phasor.harmonic_share:.1f} %",
             )
             for result in results

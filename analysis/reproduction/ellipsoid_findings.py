@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from analysis.ellipsoid import EllipsoidResult
 from analysis.reproduction.document import FigureFindings, Finding
+from analysis.wording import number
 
 ALIKE = 1.25
 """Couplings whose largest is at most so many times the smallest are nearly the same."""
@@ -43,7 +44,7 @@ def _coupling(result: EllipsoidResult) -> Finding:
     return Finding(
         what=f"{result.frequency_hz:g} Hz",
         published="drawn, no number",
-        here=f"{along}mean squares: axes 1 : {axes[1]:.2f}, tilt {result.moments.tilt_deg:.0f}°",
+        here=f"{along}mean squares: axes 1 : {axes[1]:.2f}, tilt {number(result.moments.tilt_deg, 0)}°",
         value=ratio,
         unit="1",
         as_published=None,

@@ -6,6 +6,7 @@ import numpy as np
 
 from analysis.reproduction.document import FigureFindings, Finding
 from analysis.reproduction.played_response import PlayedResponse, played_row
+from analysis.wording import number
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
@@ -82,7 +83,7 @@ _DIFFERS = (
     "paper, drive one frequency at a time and far above it; a signal of all frequencies at once is weaker at each and "
     "pays more. Both are in the table, beside a twin of the device without friction.",
     "The accelerometer's mounting is off by about 1° and 1 %, and a model identified from it holds that: coupling of "
-    "the true motion cannot fall much below -30 dB, with or without friction.",
+    "the true motion cannot fall much below −30 dB, with or without friction.",
     "How much a place in the workspace changes the response is a matter of our geometry; the paper does not say how "
     "far off the centre its third row was taken. The fourth row is ours.",
 )
@@ -94,7 +95,7 @@ def _resonance(rows: EqualizedRows) -> Finding:
     return Finding(
         what=f"Rise and fall along the axes, {low:g} to {high:g} Hz",
         published="the resonance near 11 Hz is essentially removed",
-        here=f"{before:.1f} dB without, {after:.1f} dB with the equalizer",
+        here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer",
         value=after,
         unit="dB",
         as_published=after <= REMOVED * before,
@@ -108,7 +109,7 @@ def _peaks(rows: EqualizedRows) -> Finding:
     return Finding(
         what="Fall of the coupling peaks, centre",
         published="up to an order of magnitude, that is 20 dB",
-        here=f"{fall.min():.0f} to {fall.max():.0f} dB, by channel",
+        here=f"{number(fall.min(), 0)} to {number(fall.max(), 0)} dB, by channel",
         value=float(fall.max()),
         unit="dB",
         as_published=bool(low <= fall.max() <= high),
@@ -121,7 +122,7 @@ def _worst(what: str, before: PlayedResponse, after: PlayedResponse) -> Finding:
     return Finding(
         what=what,
         published="",
-        here=f"{first:.1f} dB without, {second:.1f} dB with the equalizer",
+        here=f"{number(first, 1)} dB without, {number(second, 1)} dB with the equalizer",
         value=second,
         unit="dB",
         as_published=None,
@@ -133,8 +134,8 @@ def _edge_flat(rows: EqualizedRows) -> Finding:
     return Finding(
         what="Flatness at the edge, model of the centre",
         published="remains fairly flat",
-        here=f"{before:.1f} dB without, {after:.1f} dB with the equalizer (centre: "
-        f"{played_row(rows.equalized).flatness_db:.1f} dB)",
+        here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer (centre: "
+        f"{number(played_row(rows.equalized).flatness_db, 1)} dB)",
         value=after,
         unit="dB",
         as_published=after <= before / 2,
@@ -148,7 +149,7 @@ def _edge_coupling(rows: EqualizedRows) -> Finding:
     return Finding(
         what="Coupling at the edge, model of the centre",
         published="still a minor improvement",
-        here=f"{before:.1f} dB without, {after:.1f} dB with the equalizer, worst line",
+        here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer, worst line",
         value=before - after,
         unit="dB",
         as_published=0 < before - after < centre / 2,
@@ -161,7 +162,7 @@ def _blended(rows: EqualizedRows) -> Finding:
     return Finding(
         what="The same place, forces blended between models of other places (ours)",
         published="named as a possibility, not tried",
-        here=f"flatness {found.flatness_db:.1f} dB, coupling {found.coupling_db:.1f} dB",
+        here=f"flatness {number(found.flatness_db, 1)} dB, coupling {number(found.coupling_db, 1)} dB",
         value=found.coupling_db,
         unit="dB",
         as_published=None,
@@ -173,8 +174,8 @@ def _friction(rows: EqualizedRows) -> Finding:
     return Finding(
         what="What friction costs, all frequencies at once (ours)",
         published="",
-        here=f"flatness {with_it.flatness_db:.2f} dB and coupling {with_it.coupling_db:.1f} dB with friction; "
-        f"{without.flatness_db:.2f} dB and {without.coupling_db:.1f} dB on the twin without",
+        here=f"flatness {number(with_it.flatness_db)} dB and coupling {number(with_it.coupling_db, 1)} dB with "
+        f"friction; {number(without.flatness_db)} dB and {number(without.coupling_db, 1)} dB on the twin without",
         value=with_it.error,
         unit="1",
         as_published=None,

@@ -6,6 +6,7 @@ import numpy as np
 
 from analysis.reproduction.document import FigureFindings, Finding
 from analysis.reproduction.study_findings import LIMIT_RULE
+from analysis.wording import signed
 from equalizer.identification.coupling_onset import CouplingOnset
 from equalizer.identification.frequency_bands import FrequencyBand
 from equalizer.identification.frequency_response import FrequencyResponse
@@ -151,7 +152,7 @@ def _slope(response: FrequencyResponse) -> Finding | None:
     return Finding(
         what=f"Slope along the axes, {low:g} to {high:g} Hz",
         published="rises: friction and damping rule below 10 Hz",
-        here=f"{slope:+.1f} dB per octave (a free mass: 0)",
+        here=f"{signed(slope, 1)} dB per octave (a free mass: 0)",
         value=slope,
         unit="dB",
         as_published=slope > 1.0,

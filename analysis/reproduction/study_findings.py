@@ -7,6 +7,7 @@ from analysis.comparisons import PairDifference
 from analysis.reproduction.document import FigureFindings, Finding
 from analysis.study_analysis import StudyAnalysis
 from analysis.threshold_table import frequency_name
+from analysis.wording import signed
 
 SIGNIFICANT_P = 0.05
 LIKE = 0.25
@@ -105,7 +106,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
         published=published,
-        here=f"{pair.difference:+.2f} N, p {_p(pair.p)} (all pairs at once)",
+        here=f"{signed(pair.difference)} N, p {_p(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
         as_published=up and (pair.p < SIGNIFICANT_P) == significant,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.wording import number, typeset
 from equalizer.signals.clock_offset import NoOffsetError, offset_by_correlation
 from study.importing.functions import Value
 from study.importing.import_map import ClockMap
@@ -48,7 +49,8 @@ def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Lo
         offset_s, how = _by_trigger(first, other)
     else:
         offset_s, how = clock.offset_s, "as the map states"
-    say(f"Clock '{clock.name}' is moved by {offset_s * 1e3:.4g} ms to that of '{first.clock.name}', {how}.")
+    moved_ms = typeset(f"{offset_s * 1e3:.4g}")
+    say(f"Clock '{clock.name}' is moved by {moved_ms} ms to that of '{first.clock.name}', {how}.")
     return replace(other, base=replace(other.base, offset_s=offset_s))
 
 
@@ -62,7 +64,7 @@ def _by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
         kind = "" if isinstance(error, NoOffsetError) else "correlation is not possible: "
         raise ImportProblemError(f"clock '{clock.name}' cannot be aligned: {kind}{error}") from error
     turned = ", its sign turned" if found.correlation < 0 else ""
-    how = f"found by correlating {clock.align} with {clock.align_to} ({found.correlation:.3f} there{turned})"
+    how = f"found by correlating {clock.align} with {clock.align_to} ({number(found.correlation, 3)} there{turned})"
     return found.offset_s, how
 
 

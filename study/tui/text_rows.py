@@ -22,4 +22,4 @@ def _cell(text: str, width: int, right: bool) -> str:
 
 def _are_numbers(cells: list[str]) -> bool:
     filled = [cell for cell in cells if cell not in ("", "–")]
-    return bool(filled) and all(cell.lstrip("≥<-+ ")[:1].isdigit() for cell in filled)
+    return bool(filled) and all(cell.lstrip("≥<−+ ")[:1].isdigit() for cell in filled)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.wording import typeset
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality, worst_quality
 from equalizer.plant.model_response import model_response
@@ -220,7 +221,9 @@ def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
 
 
 def _mm(place_m: Vector | None) -> str:
-    return "(place not known)" if place_m is None else "({:g}, {:g}, {:g}) mm".format(*(1e3 * part for part in place_m))
+    return (
+        "(place not known)" if place_m is None else f"({', '.join(typeset(f'{1e3 * part:g}') for part in place_m)}) mm"
+    )
 
 
 def _sentence(text: str) -> str:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.wording import typeset
 from equalizer.plant.mechanical_model import Tolerance
 from equalizer.signals.signal import FloatArray
 from study.workflows.write_twin import WrittenTwin
@@ -66,7 +67,7 @@ def _modes_hz(written: WrittenTwin) -> list[float]:
 
 
 def _words(values: FloatArray) -> str:
-    return ", ".join(f"{value:.3g}" for value in values)
+    return ", ".join(typeset(f"{value:.3g}") for value in values)
 
 
 def _about(tolerance: Tolerance | None, name: str) -> str:

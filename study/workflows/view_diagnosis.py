@@ -11,7 +11,7 @@ from analysis.diagnosis.result.wording import (
     rival_sentences,
     verdict_sentence,
 )
-from analysis.wording import NONE, listed
+from analysis.wording import NONE, listed, p_value
 from study.session.archive_views import DiagnosisView
 from study.session.printable import printable
 from study.store.diagnosis_file import read_diagnosis
@@ -59,14 +59,8 @@ def _mismatch(mismatch: Mismatch) -> tuple[str, ...]:
         "all" if mismatch.amplitude is None else f"{mismatch.amplitude:g}",
         mismatch.state or "",
         _percent(mismatch.share),
-        _p_value(mismatch.p_value),
+        p_value(mismatch.p_value),
     )
-
-
-def _p_value(p_value: float) -> str:
-    if p_value >= 1e-3:
-        return f"{p_value:.3f}"
-    return f"{p_value:.1e}" if p_value else "< 1e-300"
 
 
 def _errors(record: str, errors: Errors) -> tuple[str, ...]:

@@ -78,7 +78,7 @@ def test_a_liking_for_one_answer_is_named(able, protocol):
     ]
     (liking,) = warnings(leaning, protocol)
     assert liking.startswith("A liking for one of the two answers, which raises a threshold, shows in s01 at ")
-    assert "(criterion -" in liking
+    assert "(criterion −" in liking
 
 
 def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
@@ -18,7 +19,7 @@ def region_in_words(
         return f"{when} {'the record' if one_stratum else 'each segment'}"
     if kind == "position":
         named, factor = _READABLE.get(unit, (unit, 1.0))
-        return f"near {symbol} = {centre * factor:.2g} {named}".rstrip()
+        return f"near {symbol} = {typeset(f'{centre * factor:.2g}')} {named}".rstrip()
     if low and not high:
         return f"near {symbol} = 0" if kind == "velocity" else f"where |{symbol}| is small"
     return f"where |{symbol}| is large" if high else f"at middling |{symbol}|"

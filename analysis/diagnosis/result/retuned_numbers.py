@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.errors.output_error import BOUND
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.unit_wording import value_text
-from analysis.wording import listed
+from analysis.wording import listed, typeset
 from equalizer.signals.signal import FloatArray
 
 MOVED = 1.0
@@ -35,8 +35,8 @@ class MovedNumber:
     def size(self) -> str:
         """The change, with its sign."""
         sign = "+" if self.change >= 0 else ""
-        size = f"{100 * self.change:.2g} %" if self.unit == "1" else value_text(self.change, self.unit)
-        return f"{sign}{size}".replace("-", "−")
+        size = f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else value_text(self.change, self.unit)
+        return f"{sign}{size}"
 
 
 def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:

@@ -157,7 +157,7 @@ def test_an_acceleration_that_cannot_be_meant_is_named_with_its_line(plants, pla
 
 def test_models_of_several_places_need_a_place(plan):
     refused = refusal(with_models(plan, "left", "right"), WrongUseError)
-    assert "left.h5 (-30, 0, 0) mm; right.h5 (30, 0, 0) mm" in refused.happened
+    assert "left.h5 (−30, 0, 0) mm; right.h5 (30, 0, 0) mm" in refused.happened
     assert "--at X Y Z" in refused.do_now
 
 
