@@ -34,6 +34,7 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
         response=_joined([part.response for part in parts]),
         position=_all_or_none([part.position for part in parts]),
         excitation=_all_or_none([part.excitation for part in parts]),
+        condition=_all_or_none([part.condition for part in parts]),
         hold=first.hold,
         segments=tuple(segments),
         meta=meta,

@@ -59,6 +59,8 @@ class Recording:
     segments: tuple[Segment, ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
     """JSON values: place, sensor and its frame, feedback, grip, operator, provenance."""
+    condition: Signal | None = None
+    """(n, q): what was known beside, such as a temperature, a pressure, a setting."""
 
     @property
     def sample_rate_hz(self) -> float:

@@ -29,6 +29,7 @@ def signals_of(recording: Recording) -> dict[str, Signal]:
         "response": recording.response,
         "position": recording.position,
         "excitation": recording.excitation,
+        "condition": recording.condition,
     }
     return {name: signal for name, signal in every.items() if signal is not None}
 

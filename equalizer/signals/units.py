@@ -1,4 +1,4 @@
-"""Units written in ASCII and what they are in SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `g` (standard gravity)."""
+"""Units written in ASCII and what they are in SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity)."""
 
 import math
 import re
@@ -14,11 +14,13 @@ class UnknownUnitError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What a unit means: a value in it, times `factor`, is in `si`."""
+    """What a unit means: a value in it, times `factor`, plus `offset`, is in `si`."""
 
     si: str
     factor: float
     dimension: Dimension
+    offset: float = 0.0
+    """Only of a temperature that stands alone: in a product, `degC` is a difference."""
 
 
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
@@ -37,6 +39,9 @@ _PREFIXABLE: dict[str, Dimension] = {
     "ohm": (1, 2, -3, -2, 0, 0),
     "T": (1, 0, -2, -1, 0, 0),
 }
+_FORCE, _LENGTH = _PREFIXABLE["N"], _PREFIXABLE["m"]
+_POUND, _INCH = 0.45359237, 0.0254
+_POUND_FORCE = _POUND * 9.80665
 _FIXED: dict[str, Unit] = {
     "1": Unit("1", 1.0, (0, 0, 0, 0, 0, 0)),
     "%": Unit("1", 1e-2, (0, 0, 0, 0, 0, 0)),
@@ -44,11 +49,26 @@ _FIXED: dict[str, Unit] = {
     "min": Unit("s", 60.0, (0, 0, 1, 0, 0, 0)),
     "deg": Unit("rad", math.pi / 180, (0, 0, 0, 0, 0, 1)),
     "rev": Unit("rad", 2 * math.pi, (0, 0, 0, 0, 0, 1)),
+    "turn": Unit("rad", 2 * math.pi, (0, 0, 0, 0, 0, 1)),
     "rpm": Unit("rad/s", 2 * math.pi / 60, (0, 0, -1, 0, 0, 1)),
     "g": Unit("m/s^2", 9.80665, (0, 1, -2, 0, 0, 0)),
+    "in": Unit("m", _INCH, _LENGTH),
+    "ft": Unit("m", 12 * _INCH, _LENGTH),
+    "lb": Unit("kg", _POUND, (1, 0, 0, 0, 0, 0)),
+    "oz": Unit("kg", _POUND / 16, (1, 0, 0, 0, 0, 0)),
+    "lbf": Unit("N", _POUND_FORCE, _FORCE),
+    "ozf": Unit("N", _POUND_FORCE / 16, _FORCE),
+    "kgf": Unit("N", 9.80665, _FORCE),
+    "psi": Unit("Pa", _POUND_FORCE / _INCH**2, _PREFIXABLE["Pa"]),
+    "bar": Unit("Pa", 1e5, _PREFIXABLE["Pa"]),
+    "degC": Unit("K", 1.0, _PREFIXABLE["K"], 273.15),
+    "degF": Unit("K", 5 / 9, _PREFIXABLE["K"], 459.67 * 5 / 9),
 }
-KNOWN_UNITS = ("deg", "g", "rpm", "rev", "min", "%")
-"""Accepted beside SI; `g` is standard gravity, never a gram."""
+KNOWN_UNITS = (
+    "deg", "g", "rpm", "rev", "turn", "min", "%", "in", "ft", "lbf", "ozf", "kgf", "lb", "oz", "psi", "bar",
+    "degC", "degF",
+)  # fmt: skip
+"""Accepted beside SI; `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf` forces."""
 
 ALLOWED = (
     "allowed are SI symbols in ASCII (N, N m, m, rad, m/s, m/s^2, rad/s^2, V, A, kg, s, Hz, 1 ...; "
@@ -70,13 +90,18 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
 }
 """What the SI unit of a well-known quantity may be; any other word may be used with any unit."""
 
-_NOT_ASCII = {"²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "µ": "u", "μ": "u", "°": "deg", "·": " ", "Ω": "ohm"}
+UNSTATED = "1"
+"""Taken where a file states no unit: its numbers stay as they are."""
+
+_NOT_ASCII = {"²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "µ": "u", "μ": "u", "°": "deg", "·": " ", "-": " ", "Ω": "ohm"}
 
 
 def parse_unit(text: str) -> Unit:
     """Read a product such as `N m s/rad`. Raises UnknownUnitError with what is allowed."""
     if not text.strip():
         raise UnknownUnitError(f"the unit is missing; {ALLOWED}")
+    if text.strip() in _FIXED:
+        return _FIXED[text.strip()]
     symbols: dict[str, int] = {}
     factor = 1.0
     dimension: Dimension = (0,) * 6
@@ -90,10 +115,14 @@ def parse_unit(text: str) -> Unit:
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
-    """Raises UnknownUnitError where a well-known quantity has a unit of something else."""
+    """Raises UnknownUnitError where a well-known quantity has a unit of something else. A quantity of unknown scale
+    (unit 1) may be any."""
     fitting = QUANTITY_UNITS.get(quantity)
-    if fitting and unit.si not in fitting:
-        raise UnknownUnitError(f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(fitting)}")
+    if fitting and unit.si not in (*fitting, UNSTATED):
+        hint = "; as a force write lbf, ozf or kgf" if quantity == "force" and unit.si == "kg" else ""
+        raise UnknownUnitError(
+            f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(fitting)}{hint}"
+        )
 
 
 def quantity_of(si: str) -> str:
@@ -104,6 +133,7 @@ def quantity_of(si: str) -> str:
 _QUANTITY_OF = {
     "N": "force", "N m": "torque", "m": "position", "rad": "angle", "m/s": "velocity", "rad/s": "velocity",
     "m/s^2": "acceleration", "rad/s^2": "acceleration", "V": "voltage", "A": "current", "s": "time",
+    "K": "temperature", "Pa": "pressure",
 }  # fmt: skip
 
 

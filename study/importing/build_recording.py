@@ -1,6 +1,6 @@
 """Files and a map to one recording in SI units, with everything said that was done on the way."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import recording_problems
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, quantity_of
+from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.alignment import Logger, aligned
 from study.importing.arrays import Arrays, read_arrays
 from study.importing.budget import Budget
@@ -21,7 +21,7 @@ from study.importing.map_segments import segments_of
 from study.importing.namespace import of_file
 from study.importing.part_signals import Key, PartSignals, part_signals
 from study.importing.said import Said
-from study.importing.time_base import time_base
+from study.importing.time_base import NUMBERED_HZ, time_base
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,7 @@ def build_recording(
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = said.sentences([part.label for part in planned])
-    return Built(recording, notes)
+    return Built(recording, (*notes, *_said_of_units(wanted)))
 
 
 class _Counter:
@@ -96,6 +96,7 @@ def _part(wanted: ImportMap, files: PartFiles, said: Said, counter: _Counter, bu
 class _ChannelUnit:
     si: str
     factor: float
+    offset: float
     quantity: str
 
 
@@ -107,11 +108,23 @@ def _units(wanted: ImportMap) -> dict[Key, _ChannelUnit]:
 
 def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     try:
-        unit = parse_unit(channel.unit)
+        unit = parse_unit(channel.unit.strip() or UNSTATED)
         check_quantity(channel.quantity, unit)
     except UnknownUnitError as error:
         raise ImportProblemError(f"channel '{channel.name}': {error}") from error
-    return _ChannelUnit(unit.si, unit.factor, channel.quantity or quantity_of(unit.si))
+    return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or quantity_of(unit.si))
+
+
+def _said_of_units(wanted: ImportMap) -> Iterator[str]:
+    """What the map leaves to be believed: units of what it computes, and channels that have none."""
+    for computed in (entry for entry in wanted.computed if entry.role != "helper"):
+        yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
+    every: tuple[ChannelMap | ComputedMap, ...] = (*wanted.channel, *wanted.computed)
+    bare = [f"{entry.role} '{entry.name}'" for entry in every if entry.role != "helper" and not entry.unit.strip()]
+    if bare:
+        yield f"No unit is stated for {', '.join(bare)}: the numbers are kept as they are (unit {UNSTATED})."
+    if any(clock.unknown for clock in wanted.clock):
+        yield f"No time is known: samples are numbered, at {NUMBERED_HZ:g} Hz."
 
 
 def _joined(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
@@ -127,10 +140,15 @@ def _joined(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _Channel
         response=response,
         position=_signal("position", wanted, parts, units),
         excitation=_signal("excitation", wanted, parts, units),
+        condition=_signal("condition", wanted, parts, units),
         hold=Hold(wanted.hold),
         segments=segments,
-        meta={**wanted.meta, "title": wanted.title, "parts": facts},
+        meta={**wanted.meta, **_time_facts(wanted), "title": wanted.title, "parts": facts},
     )
+
+
+def _time_facts(wanted: ImportMap) -> dict[str, str]:
+    return {"time": "unknown"} if any(clock.unknown for clock in wanted.clock) else {}
 
 
 def _require_one_rate(parts: Sequence[_Part]) -> None:
@@ -150,7 +168,7 @@ def _signal(role: str, wanted: ImportMap, parts: Sequence[_Part], units: dict[Ke
         return None
     told = [units[role, name] for name in names]
     columns = [
-        np.concatenate([part.signals.columns[role, name] for part in parts]) * unit.factor
+        np.concatenate([part.signals.columns[role, name] for part in parts]) * unit.factor + unit.offset
         for name, unit in zip(names, told, strict=True)
     ]
     return Signal(

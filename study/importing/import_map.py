@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 Resampling = Literal["", "held", "band-limited", "linear"]
-SignalRole = Literal["command", "response", "position", "excitation", "helper"]
+SignalRole = Literal["command", "response", "position", "excitation", "condition", "helper"]
 Kind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest"]
 
 
@@ -40,6 +40,9 @@ class ClockMap:
     time_unit: Annotated[str, Field(description="Unit of the stamps; needed with `time`.")] = ""
     rate_hz: Annotated[float, Field(ge=0, description="Rate of a clock without stamps.")] = 0.0
     rate: Annotated[str, Field(description="The same as an expression, in hertz, for a rate that is in the file.")] = ""
+    unknown: Annotated[
+        bool, Field(description="Whether no time is known: samples are numbered, at 1 Hz, and meta says so.")
+    ] = False
     gap_s: Annotated[
         float,
         Field(ge=0, description="Stamps further apart are a gap. Default: three times the median step."),
@@ -67,11 +70,17 @@ class ChannelMap:
     """One channel, from an array or an expression over arrays; all its samples are on one clock."""
 
     role: Annotated[
-        SignalRole, Field(description="What it is; a `helper` is for computed channels only and is not written.")
+        SignalRole,
+        Field(
+            description="What it is. A `condition` was known beside (temperature, pressure, a setting); a `helper` is "
+            "for computed channels only and is not written."
+        ),
     ]
     name: Annotated[str, Field(min_length=1, max_length=64, description="Of the channel in the recording.")]
     value: Annotated[str, Field(description="Name of an array, or an expression over arrays.")]
-    unit: Annotated[str, Field(description="Of `value`; converted to SI. `1` for a plain number.")] = ""
+    unit: Annotated[str, Field(description="Of `value`; converted to SI. Default `1`: not stated, a plain number.")] = (
+        ""
+    )
     quantity: Annotated[
         str, Field(description='"force", "acceleration", ... Default: the usual word for the unit.')
     ] = ""
@@ -92,7 +101,7 @@ class ComputedMap:
     role: Annotated[SignalRole, Field(description="As for a channel.")]
     name: Annotated[str, Field(min_length=1, max_length=64, description="Of the channel in the recording.")]
     value: Annotated[str, Field(description="Expression over channels, by name; `clock_s` is the reference time.")]
-    unit: Annotated[str, Field(description="Of `value`.")] = ""
+    unit: Annotated[str, Field(description="Of `value`. Default `1`: not stated, a plain number.")] = ""
     quantity: Annotated[str, Field(description="As for a channel.")] = ""
 
 

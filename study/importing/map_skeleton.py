@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from study.importing.array_groups import groups_in
 from study.importing.arrays import Arrays
-from study.importing.header_units import unit_in
+from study.importing.signal_words import named, roles_of, unit_in
 
 _LEAST_SAMPLES = 16
 _CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}
@@ -22,8 +23,14 @@ def map_skeleton(arrays: Arrays) -> str:
     return "\n".join(_lines(arrays)) + "\n"
 
 
-def _lines(arrays: Arrays) -> Iterator[str]:
+def _lines(whole: Arrays) -> Iterator[str]:
+    groups = groups_in(whole.by_name, _LEAST_SAMPLES)
+    inside = [name for name in whole.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
+    common = {name: array for name, array in whole.by_name.items() if name not in inside}
+    first = {name: whole.by_name[full] for name, full in groups.names.items()}
+    arrays = Arrays(whole.path, {**first, **common})
     clocks = [name for name, array in arrays.by_name.items() if _is_time(name, array)]
+    roles = _roles(arrays, clocks)
     yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
@@ -37,15 +44,32 @@ def _lines(arrays: Arrays) -> Iterator[str]:
             yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
         elif array.ndim == 1:
             own = [clock for clock in clocks if arrays.by_name[clock].shape == array.shape]
-            yield from _channel((name, name, name), _shape(array.shape), own[0] if own and len(clocks) > 1 else "")
+            clock = own[0] if own and len(clocks) > 1 else ""
+            yield from _channel((name, name, name), _shape(array.shape), clock, roles.get(name, ""))
         elif array.ndim == 2:
             yield from _table(name, array.shape)
         else:
             yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {_quoted(name)}[0, 0]"
+    yield from _parts(groups.prefixes)
     yield ""
     yield "[[segment]]"
     yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
     yield "split = { fit = 0.5, test = 0.5 }"
+
+
+def _roles(arrays: Arrays, clocks: list[str]) -> dict[str, str]:
+    """By name, where the names and units of all channels say them; else none."""
+    channels = [name for name, array in arrays.by_name.items() if array.size >= _LEAST_SAMPLES and name not in clocks]
+    found = roles_of([named(name) for name in channels])
+    return dict(zip(channels, found, strict=True)) if found else {}
+
+
+def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
+    if prefixes:
+        yield "\n# Several runs are in the file: their arrays are named without the prefix above."
+    for prefix in prefixes:
+        yield "\n[[part]]"
+        yield f"prefix = {json.dumps(prefix)}"
 
 
 def _is_time(name: str, array: npt.NDArray[Any]) -> bool:
@@ -66,26 +90,26 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
         return
     yield "\n[[clock]]"
     rates = [name for name, array in arrays.by_name.items() if array.size == 1 and _words(name) & _RATE_WORDS]
-    yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000"
+    yield f"rate = {json.dumps(rates[0])}           # in hertz" if rates else "# rate_hz = 1000, or unknown = true"
 
 
 def _table(name: str, shape: tuple[int, ...]) -> Iterator[str]:
     rows_are_channels = shape[0] < shape[1]
     for number in range(min(shape)):
         index = f"[{number}]" if rows_are_channels else f"[:, {number}]"
-        yield from _channel((f"{name}{number + 1}", f"{_quoted(name)}{index}", name), _shape(shape), "")
+        yield from _channel((f"{name}{number + 1}", f"{_quoted(name)}{index}", name), _shape(shape), "", "")
 
 
-def _channel(names: tuple[str, str, str], shape: str, clock: str) -> Iterator[str]:
+def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
     """names: of the channel, its value, the array's own."""
     name, value, header = names
-    plain, unit = unit_in(header)
+    told = named(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
-    yield 'role = ""                 # command, response, position, excitation, helper'
-    yield f"name = {json.dumps(plain if name == header else name)}"
+    yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
+    yield f"name = {json.dumps(told.name if name == header else name)}"
     yield f"value = {json.dumps(value)}"
-    yield f'unit = {json.dumps(unit)}                 # as in the file: "N", "m/s^2", "deg", "V"'
+    yield f'unit = {json.dumps(told.unit):20s} # as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
         yield f"clock = {json.dumps(clock)}"
 

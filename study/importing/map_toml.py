@@ -139,11 +139,14 @@ def _holds(found: ImportMap) -> Iterator[str]:
 
 def _clock_contradictions(found: ImportMap) -> Iterator[str]:
     for clock in found.clock:
-        ways = [bool(clock.time), bool(clock.rate_hz), bool(clock.rate)]
+        ways = [bool(clock.time), bool(clock.rate_hz), bool(clock.rate), clock.unknown]
         if sum(ways) > 1:
-            yield f"clock '{clock.name}' says its time more than once; one of time, rate_hz, rate"
+            yield f"clock '{clock.name}' says its time more than once; one of time, rate_hz, rate, unknown"
         if sum(ways) == 0:
-            yield f"clock '{clock.name}' has no rate: give its rate_hz, its rate as an expression, or its time stamps"
+            yield (
+                f"clock '{clock.name}' has no rate: give its rate_hz, its rate as an expression, or its time stamps; "
+                "where no time is known, unknown = true"
+            )
         if clock.time and not clock.time_unit.strip():
             yield f"clock '{clock.name}' has no time_unit; stamps need their unit, as in time_unit = \"s\""
         if bool(clock.align) != bool(clock.align_to):

@@ -11,8 +11,8 @@ from study.importing.arrays import Arrays
 from study.importing.budget import Budget
 from study.importing.expression import evaluate
 from study.importing.functions import Clock, Value
-from study.importing.header_units import unit_in
 from study.importing.map_errors import ImportProblemError, suggestion
+from study.importing.signal_words import unit_in
 
 _SHOWN = 24
 

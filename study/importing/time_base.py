@@ -19,6 +19,8 @@ UNEVEN = 0.02
 LEFT_OUT = 0.02
 """A uniform logger leaves out rows at no more than this share of its steps: more, and its stamps were rounded."""
 _PLAIN_DIGITS = (4, 5, 6)
+NUMBERED_HZ = 1.0
+"""Rate of samples whose time is not known."""
 MOST_SAMPLES = 10**8
 """Of a recording: a day at 1 kHz. A wrong stamp would fill the memory with what is missing."""
 
@@ -65,7 +67,7 @@ def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
     """Without its offset to other clocks. Raises ImportProblemError."""
     if clock.time:
         return _from_stamps(clock, names)
-    rate_hz = clock.rate_hz or names.number(clock.rate)
+    rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
     return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)

@@ -38,7 +38,9 @@ def read_recording(path: Path) -> Recording:
             return problems.attempt(lambda: _signal(file, name, rate_hz), None)
 
         command, response = signal("command"), signal("response")
-        position, excitation = (signal(name) if name in file else None for name in ("position", "excitation"))
+        position, excitation, condition = (
+            signal(name) if name in file else None for name in ("position", "excitation", "condition")
+        )
         device = problems.attempt(lambda: text_attribute(file, "device"), "")
         hold = problems.attempt(lambda: _hold(text_attribute(file, "hold", Hold.ZERO_ORDER.value)), Hold.ZERO_ORDER)
         segments: tuple[Segment, ...] = problems.attempt(lambda: _segments(file), ())
@@ -46,7 +48,7 @@ def read_recording(path: Path) -> Recording:
         meta: dict[str, Any] = problems.attempt(lambda: _meta(file), {})
     if problems.found or command is None or response is None:
         raise UnusableFileError(path, KIND, tuple(problems.found))
-    recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta)
+    recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta, condition)
     if wrong := recording_problems(recording):
         raise UnusableFileError(path, KIND, wrong)
     return recording
@@ -97,7 +99,7 @@ def _signal(file: Any, name: str, rate_hz: float) -> Signal:
         signal = Signal(samples, rate_hz, text_or_list(quantity), text_or_list(unit), channels)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
-    scale, si = [], []
+    scale, offset, si = [], [], []
     for channel, word, text in zip(signal.channels, signal.quantities, signal.units, strict=True):
         try:
             parsed = parse_unit(text)
@@ -105,8 +107,9 @@ def _signal(file: Any, name: str, rate_hz: float) -> Signal:
         except ValueError as error:
             raise ValueError(f"{name}, channel '{channel}': {error}") from error
         scale.append(parsed.factor)
+        offset.append(parsed.offset)
         si.append(parsed.si)
-    return Signal(samples * np.array(scale), rate_hz, signal.quantity, tuple(si), channels)
+    return Signal(samples * np.array(scale) + np.array(offset), rate_hz, signal.quantity, tuple(si), channels)
 
 
 def _one_each(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:

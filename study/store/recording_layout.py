@@ -1,6 +1,7 @@
 """What a recording's file holds: the format `hapteq-recording`, version 1."""
 
 from equalizer.signals.recording import SEGMENT_KINDS, Hold
+from equalizer.signals.units import UNSTATED
 from study.store.layout import Entry
 
 FORMAT, VERSION = "hapteq-recording", 1
@@ -16,18 +17,20 @@ LAYOUT = (
     Entry("response", "(n, p) float32 or float64", "what came out, taken at t_k just before `command[k]` is written"),
     Entry("position", "(n, d) float32 or float64", "taken with the response", False),
     Entry("excitation", "(n, m) float32 or float64", "the part of the command that was decided beforehand", False),
+    Entry("condition", "(n, q) float32 or float64", "what was known beside: temperature, pressure, a setting", False),
     Entry("time_s", "(n) float32 or float64", "time stamps, where the device kept them", False),
     Entry("segments", "rows of `start, stop, kind, amplitude, period, role`", "samples outside are rest", False),
     Entry(
         "meta",
         "group of attributes, each JSON text",
-        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (a weight on it), provenance",
+        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (a weight on it), provenance; "
+        "`time` is `unknown` where samples are only numbered (then sample_rate_hz is 1)",
         False,
     ),
 )
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
-    Entry("unit", "attribute, text or list", "likewise; converted to SI on reading"),
+    Entry("unit", "attribute, text or list", f"likewise; converted to SI on reading; `{UNSTATED}` where none is known"),
     Entry(
         "channels", "attribute, text or list", "one name per column; one text lists them (`fx, fy, fz`), or is numbered"
     ),

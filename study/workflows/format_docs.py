@@ -153,7 +153,7 @@ def write_documents(folder: Path) -> None:
 def _recordings() -> Iterable[str]:
     yield "## Recording (`.h5`)"
     yield _table(recording_layout.LAYOUT)
-    yield "Each of `command`, `response`, `position`, `excitation` carries:"
+    yield "Each of `command`, `response`, `position`, `excitation`, `condition` carries:"
     yield _table(recording_layout.SIGNAL_ATTRIBUTES)
     yield "A row of `segments`:"
     yield _table(recording_layout.SEGMENT_FIELDS)

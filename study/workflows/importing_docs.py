@@ -98,7 +98,10 @@ uniform rate ([file formats](formats.md)). What was done to the samples is print
 (`meta/import`): what was resampled and how, which clock was moved and by how much, how many samples are missing. What
 cannot be understood is refused by name, and then nothing is written. `hapteq validate MAP.toml` checks a map.
 
-* **Units** are never guessed: a channel without one is refused. {ALLOWED[0].upper()}{ALLOWED[1:]}.
+* **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
+  unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
+* **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
+* **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so.
 * **Resampling** is never done unasked. `held`: a command that stays until the next one. `band-limited`: a signal that
   was sampled behind a filter; flat to {FLAT_TO:.0%} of the lower Nyquist frequency, what is above the new one is taken
   out. `linear`: straight lines. Between uniform rates the band-limited way is exact to 1e-4 of the amplitude up to four
@@ -109,7 +112,11 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Clocks** of several loggers are brought to the first by `offset_s`, by a trigger that both saw, or by correlating
   one motion that both saw. The offset is said. Where nothing agrees, or two offsets agree equally well, it is refused.
 * **Parts**: several files, or several groups of arrays in one file (`prefix`), go one after another; the state of the
-  device jumps between them. `meta/parts` says where each begins and ends.
+  device jumps between them. `meta/parts` says where each begins and ends. Where names of arrays begin alike (`run1__u`,
+  `run1__y`, `run2__u`, ...; `run1/force`, ...) the map that is proposed has a part for each run.
+* **Names** are understood in headers and in the map that is proposed: force, load, torque, position, displacement,
+  stroke, angle, theta, speed, velocity, omega, acceleration, voltage, current, temperature, with a unit in brackets or
+  at the end (`displacement_mm`, `omega_rad_s`, `torque_Nm`). Without forces, currents and voltages are commands.
 * **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
 
 With `hold = "zero-order"`, `command[k]` is held from t_k to t_(k+1) and `response[k]` is taken just before. With

@@ -42,6 +42,8 @@ def recognise_recording(content: FileContent) -> str | None:
     ]
     if found.position is not None:
         parts.append(_count(len(found.position.channels), "position"))
+    if found.condition is not None:
+        parts.append(_count(len(found.condition.channels), "condition"))
     if found.segments:
         parts.append(_count(len(found.segments), "segment"))
     return ", ".join(parts)

@@ -27,6 +27,11 @@ def test_a_position_that_one_part_lacks_is_left_out():
     assert join([with_position, with_position], {}).position is not None
 
 
+def test_conditions_follow_each_other():
+    warm = replace(part(4, 1.0), condition=Signal(np.full((4, 1), 293.0), 1000.0, "temperature", "K", ("motor",)))
+    assert len(join([warm, warm], {}).condition) == 8
+
+
 def test_nothing_cannot_be_joined():
     with pytest.raises(ValueError, match="nothing to join"):
         join([], {})

@@ -32,6 +32,18 @@ from equalizer.signals.units import ALLOWED, KNOWN_UNITS, UnknownUnitError, chec
         ("g/V", "m/s^2/V", 9.80665),
         ("1/m", "1/m", 1.0),
         ("%", "1", 0.01),
+        ("in", "m", 0.0254),
+        ("ft/s", "m/s", 0.3048),
+        ("lbf", "N", 4.4482216152605),
+        ("lbf in", "N m", 0.1129848290276167),
+        ("ozf in", "N m", 0.0070615518142260),
+        ("lb", "kg", 0.45359237),
+        ("oz in^2", "kg m^2", 1.8289978339325e-5),
+        ("psi", "Pa", 6894.757293168361),
+        ("turn", "rad", 2 * math.pi),
+        ("rev/s", "rad/s", 2 * math.pi),
+        ("kgf", "N", 9.80665),
+        ("N m/turn", "N m/rad", 1 / (2 * math.pi)),
     ],
 )
 def test_a_known_unit_becomes_si(text, si, factor):
@@ -51,7 +63,7 @@ def test_g_is_standard_gravity_and_never_a_gram():
         parse_unit("mg")
 
 
-@pytest.mark.parametrize("text", ["furlong", "N//m", "m/s^0", "/s", "m^", "degC", "N\nm^x", "[N]"])
+@pytest.mark.parametrize("text", ["furlong", "N//m", "m/s^0", "/s", "m^", "degX", "N\nm^x", "[N]"])
 def test_an_unknown_unit_is_refused_by_name_with_what_is_allowed(text):
     with pytest.raises(UnknownUnitError) as refused:
         parse_unit(text)
@@ -71,7 +83,16 @@ def test_a_product_after_a_stroke_is_refused_because_it_can_be_read_two_ways():
 
 
 @pytest.mark.parametrize(
-    ("text", "meant"), [("m/s²", "m/s^2"), ("µm", "um"), ("°", "deg"), ("m/s2", "m/s^2"), ("m/s**2", "m/s^2")]
+    ("text", "meant"),
+    [
+        ("m/s²", "m/s^2"),
+        ("µm", "um"),
+        ("°", "deg"),
+        ("m/s2", "m/s^2"),
+        ("m/s**2", "m/s^2"),
+        ("lbf-ft", "lbf ft"),
+        ("°C", "degC"),
+    ],
 )
 def test_a_unit_that_is_nearly_right_gets_a_suggestion(text, meant):
     with pytest.raises(UnknownUnitError) as refused:
@@ -84,6 +105,26 @@ def test_a_quantity_in_the_unit_of_another_is_refused():
     check_quantity("brightness", parse_unit("V"))
     with pytest.raises(UnknownUnitError, match="the quantity 'force' cannot be in m; it is in N or N m"):
         check_quantity("force", parse_unit("mm"))
+
+
+def test_a_mass_is_no_force_and_the_force_is_named():
+    with pytest.raises(UnknownUnitError, match="cannot be in kg; it is in N or N m; as a force write lbf, ozf or kgf"):
+        check_quantity("force", parse_unit("lb"))
+
+
+def test_a_quantity_of_unknown_scale_may_be_any():
+    for quantity in ("position", "force", "acceleration"):
+        check_quantity(quantity, parse_unit("1"))
+
+
+@pytest.mark.parametrize(("text", "value", "kelvin"), [("degC", 20.0, 293.15), ("degF", 68.0, 293.15), ("K", 5.0, 5.0)])
+def test_a_temperature_alone_has_an_offset(text, value, kelvin):
+    unit = parse_unit(text)
+    assert value * unit.factor + unit.offset == pytest.approx(kelvin)
+
+
+def test_a_temperature_in_a_product_is_a_difference():
+    assert (parse_unit("N/degC").si, parse_unit("N/degC").offset) == ("N/K", 0.0)
 
 
 def test_the_usual_word_for_a_unit():

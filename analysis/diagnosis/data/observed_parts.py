@@ -87,6 +87,7 @@ def part_of(recording: Recording, start: int, stop: int) -> Recording:
         response=recording.response.part(start, stop),
         position=_part(recording.position, start, stop),
         excitation=_part(recording.excitation, start, stop),
+        condition=_part(recording.condition, start, stop),
         time_s=None if recording.time_s is None else recording.time_s[start:stop],
         segments=tuple(segments),
     )

@@ -74,7 +74,6 @@ def test_nothing_is_said_where_nothing_was_done(files):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"command": ""}, "Channel 'fx': the unit is missing; allowed are SI symbols"),
         ({"unit": "Newton"}, "Channel 'fx': 'Newton' is not a unit known here"),
         ({"quantity": "voltage"}, "Channel 'fx': the quantity 'voltage' cannot be in N; it is in V"),
         (
@@ -92,8 +91,6 @@ def test_nothing_is_said_where_nothing_was_done(files):
 )
 def test_a_channel_that_is_not_understood_is_named(files, change, sentence):
     text = map_text()
-    if "command" in change:
-        text = text.replace('unit = "N"', 'unit = ""')
     if "unit" in change:
         text = text.replace('unit = "N"', f'unit = "{change["unit"]}"')
     if "quantity" in change:
@@ -405,3 +402,39 @@ def test_a_stamp_that_jumps_a_million_seconds_is_refused_before_the_memory_is_fu
 def test_a_rate_that_makes_more_samples_than_anyone_can_hold_is_refused(files):
     text = map_text("rate_hz = 1000", 'resample = "held"', 'resample = "linear"', "rate_hz = 1e12\n")
     assert "0.399 s at 1e+12 Hz are 3.99e+11 samples, more than 1e+08" in refusal(text, files())
+
+
+def test_a_channel_without_a_unit_keeps_its_numbers_and_says_so(files):
+    text = map_text().replace('unit = "N"', "").replace('unit = "g"', 'quantity = "position"')
+    found = built(text, files())
+    assert (found.recording.command.unit, found.recording.response.unit) == ("1", "1")
+    assert (found.recording.command.quantity, found.recording.response.quantity) == ("1", "position")
+    np.testing.assert_array_equal(found.recording.command.samples[:, 0], U)
+    assert found.notes == (
+        "No unit is stated for command 'fx', response 'ax': the numbers are kept as they are (unit 1).",
+    )
+
+
+def test_the_unit_of_a_computed_channel_is_said(files):
+    end = '[[computed]]\nrole = "position"\nname = "x"\nvalue = "integral(integral(ax))"\nunit = "in"\n'
+    found = built(map_text(end=end), files())
+    assert found.notes == ("Computed: position 'x' = integral(integral(ax)), in in.",)
+    assert found.recording.position.unit == "m"
+
+
+def test_a_condition_is_read_in_si_and_kept(files):
+    end = '[[channel]]\nrole = "condition"\nname = "motor"\nvalue = "warm"\nunit = "degC"\n'
+    found = built(map_text(end=end), files(u=U, y=Y, warm=np.full(N, 20.0))).recording
+    assert (found.condition.quantity, found.condition.unit, found.condition.channels) == (
+        "temperature",
+        "K",
+        ("motor",),
+    )
+    np.testing.assert_allclose(found.condition.samples, 293.15)
+
+
+def test_samples_without_time_are_numbered_and_meta_says_so(files):
+    found = built(map_text(clock="unknown = true"), files())
+    assert (found.recording.sample_rate_hz, found.recording.meta["time"]) == (1.0, "unknown")
+    assert found.notes == ("No time is known: samples are numbered, at 1 Hz.",)
+    assert "time" not in built(map_text(), files()).recording.meta

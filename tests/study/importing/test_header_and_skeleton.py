@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 
 from study.importing.arrays import Arrays, read_arrays
+from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map
-from study.importing.header_units import unit_in
 from study.importing.import_map import CsvMap
 from study.importing.map_skeleton import map_skeleton
 from study.importing.map_toml import parse_map
+from study.importing.signal_words import named, unit_in
 from study.store.file_errors import UnusableFileError
 
 
@@ -32,6 +33,11 @@ def test_a_header_is_a_name_and_a_unit(header, expected):
         ("time [s],fx [N],ax [m/s^2]", ["command", "response"]),
         ("t (ms),fx (N),x (mm),ax (g)", ["command", "position", "response"]),
         ("time_s [s],torque [N m],angle [deg]", ["command", "response"]),
+        ("time_s,force_N,displacement_mm", ["command", "response"]),
+        ("t [ms],motor current [A],shaft speed [rpm],shaft angle [turn]", ["command", "response", "position"]),
+        ("time_s,MotorTorque_Nm,omega_rad_s,theta_rad", ["command", "response", "position"]),
+        ("time [s],force,position", ["command", "response"]),
+        ("time [s],fx [lbf],temp [degC],ax [g]", ["command", "condition", "response"]),
     ],
 )
 def test_a_header_with_units_needs_no_map(tmp_path, header, roles):
@@ -42,8 +48,9 @@ def test_a_header_with_units_needs_no_map(tmp_path, header, roles):
 
 @pytest.mark.parametrize(
     "header",
-    ["time [s],fx,ax [m/s^2]", "fx [N],ax [m/s^2]", "time [s],u [V],y [V]", "time [s],fx [N],temp [K],ax [g]",
-     "time [s],fx [N],fy [N]", "time [furlong],fx [N],ax [g]"],
+    ["time [s],fx,ax [m/s^2]", "fx [N],ax [m/s^2]", "time [s],u [V],y [V]", "time [s],fx [N],speed [K],ax [g]",
+     "time [s],fx [N],fy [N]", "time [s],phase_A,speed [rpm]", "time [s],force [V],ax [g]", "time,force [N],ax [g]",
+     "time [furlong],fx [N],ax [g]"],
 )  # fmt: skip
 def test_a_header_that_leaves_something_open_is_not_guessed_at(tmp_path, header):
     assert header_map(arrays(tmp_path, header)) is None
@@ -83,3 +90,51 @@ def test_a_completed_skeleton_is_a_map(tmp_path):
     found = parse_map(complete, tmp_path / "m.toml")
     assert found.clock[0].rate == "fs"
     assert [(channel.role, channel.name) for channel in found.channel] == [("command", "u"), ("response", "y")]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "quantity", "sure"),
+    [
+        ("u_mm", "mm", "position", False), ("displacement_mm", "mm", "position", True),
+        ("omega_rad_s", "rad/s", "velocity", True), ("a_mps2", "m/s^2", "acceleration", False),
+        ("torque_Nm", "N m", "torque", True), ("phase_A", "A", "current", False), ("speed [N]", "N", "force", False),
+        ("force", "", "force", True), ("voltage_raw", "", "voltage", True), ("knob", "", "", True),
+        ("alpha_deg", "deg", "angle", False), ("load [furlong]", "", "force", False),
+    ],
+)  # fmt: skip
+def test_quantity_and_unit_are_read_out_of_a_name(name, unit, quantity, sure):
+    found = named(name)
+    assert (found.unit, found.quantity, found.sure) == (unit, quantity, sure)
+
+
+def runs(*names):
+    return {name: np.random.default_rng(1).normal(size=40) for name in names}
+
+
+@pytest.mark.parametrize(
+    ("names", "prefixes"),
+    [
+        (("A01__u_mm", "A01__y_N", "A02__u_mm", "A02__y_N"), ("A01__", "A02__")),
+        (("pos_0p06_1__u_Nm", "pos_0p06_1__omega_rad_s", "neg_2__u_Nm", "neg_2__omega_rad_s"),
+         ("pos_0p06_1__", "neg_2__")),
+        (("run1/force", "run1/speed", "run2/force", "run2/speed"), ("run1/", "run2/")),
+        (("run1_force", "run1_speed", "run2_force", "run2_speed"), ("run1_", "run2_")),
+        (("daq_force", "daq_t", "drive_speed", "drive_t"), ()),
+        (("motor_force", "motor_speed", "load_force", "load_speed"), ()),
+        (("force", "speed"), ()),
+    ],
+)  # fmt: skip
+def test_several_runs_in_a_file_are_proposed_as_parts(tmp_path, names, prefixes):
+    text = map_skeleton(Arrays(tmp_path / "a.npz", runs(*names) | {"fs": np.array(100.0)}))
+    assert [line for line in text.splitlines() if line.startswith("prefix")] == [f'prefix = "{p}"' for p in prefixes]
+    assert text.count("[[channel]]") == (len(names) // len(prefixes) if prefixes else len(names))
+
+
+def test_a_proposal_for_several_runs_needs_a_device_and_no_more(tmp_path):
+    arrays = runs("A01__u_mm", "A01__y_N", "A02__u_mm", "A02__y_N")
+    np.savez(tmp_path / "a.npz", fs_Hz=100.0, **arrays)
+    text = map_skeleton(read_arrays(tmp_path / "a.npz", CsvMap())).replace('device = ""', 'device = "rig"')
+    found = build_recording(parse_map(text, tmp_path / "m.toml"), [tmp_path / "a.npz"]).recording
+    assert (found.command.unit, found.response.unit, found.sample_rate_hz, len(found)) == ("N", "m", 100.0, 80)
+    np.testing.assert_allclose(found.response.samples[40:, 0], arrays["A02__u_mm"] / 1000)
+    assert [part["prefix"] for part in found.meta["parts"]] == ["A01__", "A02__"]

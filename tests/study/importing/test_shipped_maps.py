@@ -139,6 +139,7 @@ def test_what_the_import_of_the_rack_did_is_said(imported, shared):
     assert found.notes == (
         "Clock 'drive' is moved by 0 ms to that of 'daq', as the map states.",
         "rack: resampled from 1500 Hz to 2000 Hz, band-limited, flat to 660 Hz.",
+        "Computed: position 'rack' = integral(rack), in m.",
     )
     logged = np.load(shared / "recordings" / "rack_drive" / "rack_drive.npz")
     stroke_m = -np.sum(logged["drive_speed_rpm"]) * 20 / 1000 / 60 / 1500

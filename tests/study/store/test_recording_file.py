@@ -47,6 +47,7 @@ def recordings(draw):
         response=signal("a", "acceleration", "m/s^2", draw(st.integers(1, 3))),
         position=signal("x", "position", "m", 2) if draw(st.booleans()) else None,
         excitation=signal("f", "force", "N", inputs) if draw(st.booleans()) else None,
+        condition=signal("t", "temperature", "K", 2) if draw(st.booleans()) else None,
         time_s=np.cumsum(np.full(n, 1e-3)) if draw(st.booleans()) else None,
         hold=draw(st.sampled_from(Hold)),
         segments=segments,
@@ -69,7 +70,7 @@ def test_a_written_recording_is_read_back_whole(tmp_path_factory, recording, pre
     path = tmp_path_factory.mktemp("recordings") / "a.h5"
     write_recording(path, recording, precision=precision)
     read = read_recording(path)
-    for name in ("command", "response", "position", "excitation"):
+    for name in ("command", "response", "position", "excitation", "condition"):
         assert same(getattr(read, name), getattr(recording, name)), name
     for name in ("device", "hold", "segments", "meta"):
         assert getattr(read, name) == getattr(recording, name)
@@ -93,6 +94,7 @@ def recording():
         np.arange(200) * 1e-3,
         segments=(Segment(0, 100, "multisine", 1.5, 50, "fit"), Segment(120, 200, "sweep", 1.0, 0, "test")),
         meta={"place_m": [0.0, 0.1, 0.0], "sensor": {"name": "ADXL335"}},
+        condition=signal("temperature", "K", ("motor",)),
     )
 
 

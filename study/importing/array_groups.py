@@ -1,0 +1,45 @@
+"""Several runs in one file: arrays whose names begin alike, as in `run1__u, run1__y, run2__u, run2__y`."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy.typing as npt
+
+_SEPARATORS = ("__", "/", ".", "_", " ")
+_LOOSE = ("_", " ", ".")
+"""Separators that names have for other reasons too: a prefix before one of them must hold a number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Groups:
+    prefixes: tuple[str, ...]
+    """In the order of the file; empty where the file holds one run."""
+    names: Mapping[str, str]
+    """Of the first run's arrays: the name without its prefix, and the whole one. All others belong to no run."""
+
+
+def groups_in(arrays: Mapping[str, npt.NDArray[Any]], least: int) -> Groups:
+    """Runs are told by the most arrays that they share; each must hold one of `least` samples or more."""
+    long_ones = [name for name, array in arrays.items() if array.size >= least]
+    found = [_grouped(tuple(arrays), long_ones, separator) for separator in _SEPARATORS]
+    return max(found, key=lambda groups: len(groups.prefixes) * len(groups.names))
+
+
+def _grouped(names: Sequence[str], long_ones: Sequence[str], separator: str) -> Groups:
+    members: dict[str, list[str]] = {}
+    for name in names:
+        before, between, after = name.rpartition(separator) if separator == "/" else name.partition(separator)
+        if before and after and (separator not in _LOOSE or any(letter.isdigit() for letter in before)):
+            members.setdefault(before + between, []).append(after)
+    alike = Counter(tuple(sorted(rest)) for rest in members.values())
+    usual, count = alike.most_common(1)[0] if alike else ((), 0)
+    prefixes = [
+        prefix
+        for prefix, rest in members.items()
+        if tuple(sorted(rest)) == usual and any(prefix + name in long_ones for name in rest)
+    ]
+    if count < 2 or len(prefixes) < 2:
+        return Groups((), {})
+    return Groups(tuple(prefixes), {name: prefixes[0] + name for name in members[prefixes[0]]})
