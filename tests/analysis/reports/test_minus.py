@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.diagnosis.real_answer import OwnNumber
-from analysis.diagnosis.state_words import region_in_words
-from analysis.diagnosis.wording import summary_lines
+from analysis.diagnosis.localisation.state_words import region_in_words
+from analysis.diagnosis.result.real_answer import OwnNumber
+from analysis.diagnosis.result.wording import summary_lines
 from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.figures.study_pictures import study_pictures
 from analysis.reports.diagnosis_report import render_diagnosis_report
