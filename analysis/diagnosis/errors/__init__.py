@@ -2,7 +2,7 @@
 
 In this order: `choose_measure` picks one of the error measures (`free_simulation`, `windows`, `predicted_force`;
 `band_power` for impacts, `coloured_measure` beside clean recordings) behind `error_measure`; `tuning` holds the model's
-own open numbers and `hypothesis` those of added effects; `output_error` fits both by least squares; `standing` and
-`intervals` say how good the fit is; `gather_evidence` turns what it leaves into a missing force (`unexplained_motion`,
-`missing_force`, `transfer`).
+own open numbers and `hypothesis` those of added effects; `output_error` fits both by least squares and says what motion
+and force the fit leaves unexplained (`unexplained_motion`, `missing_force`, `transfer`); `standing` and `intervals` say
+how good the fit is.
 """

@@ -13,6 +13,7 @@ from analysis.diagnosis.data.growth import runs_away
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.tuning import Tuning
+from equalizer.effects.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
@@ -175,3 +176,8 @@ def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: 
         step[out] = np.clip(wanted[out], low[out], high[out])
         held |= out
     return np.clip(step, low, high)
+
+
+def gather_evidence(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Evidence, ...]:
+    """What starting values are drawn from: the motion and the force that a fit leaves unexplained, one per record."""
+    return measure.evidence(tuning.tuned(fitted.deviations), fitted.hypothesis.placed(), fitted.residuals)

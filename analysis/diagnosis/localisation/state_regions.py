@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.localisation.block_permutation import IntArray, block_length, permutation_p_values
-from analysis.diagnosis.localisation.state_words import dependence_in_words, region_in_words
+from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
 StateKind = Literal["position", "velocity", "command", "response", "time"]
@@ -19,6 +19,7 @@ _CONCENTRATED = 1.5
 _LEAST_SHARE = 0.05
 """Of the power that means over bins must explain."""
 _TINY = np.finfo(np.float64).tiny
+_READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,3 +182,30 @@ def _by_magnitude(state: State) -> bool:
 
 def _has_sign(state: State) -> bool:
     return state.kind in ("position", "velocity")
+
+
+# Regions of state in words.
+def region_in_words(
+    kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, one_stratum: bool
+) -> str:
+    """bins: first and last of the region, and how many there are. centre: mean state of the mismatch in it."""
+    first, last, count = bins
+    low, high = first == 0, last == count - 1
+    if kind == "time":
+        when = "midway through" if low == high else "late in" if high else "early in"
+        return f"{when} {'the record' if one_stratum else 'each segment'}"
+    if kind == "position":
+        named, factor = _READABLE.get(unit, (unit, 1.0))
+        return f"near {symbol} = {typeset(f'{centre * factor:.2g}')} {named}".rstrip()
+    if low and not high:
+        return f"near {symbol} = 0" if kind == "velocity" else f"where |{symbol}| is small"
+    return f"where |{symbol}| is large" if high else f"at middling |{symbol}|"
+
+
+def dependence_in_words(symbol: str, means: FloatArray) -> str:
+    """means: over bins of equal filling, in the order of the state."""
+    lower, upper = means[: len(means) // 2].mean(), means[len(means) // 2 :].mean()
+    larger = max(abs(lower), abs(upper))
+    if larger > 0 and lower * upper < 0 and min(abs(lower), abs(upper)) > larger / 3:
+        return f"by the sign of {symbol}"
+    return f"depending on {symbol}"

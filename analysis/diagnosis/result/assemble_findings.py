@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.noise_floor import NoiseFloor
-from analysis.diagnosis.document import Diagnosis
+from analysis.diagnosis.document import Diagnosis, Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import without_claim
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation, localised
 from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
@@ -18,7 +17,6 @@ from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
 from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.error_table import channel_errors, errors_of
 from analysis.diagnosis.result.findings import BlackBox, Course, Findings, Signature
-from analysis.diagnosis.result.impact_remainder import impact_remainder
 from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.result.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.result.signature_curves import Names, signature_of
@@ -27,7 +25,7 @@ from analysis.diagnosis.search.determined import number_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import learned_sentence
 from analysis.diagnosis.search.rivalry import Arena
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import BY_CHANCE, Judgement
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
@@ -191,3 +189,22 @@ def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature
 def _strength(values: Values) -> float:
     """By the main number, which comes first."""
     return abs(next(iter(values.values())))
+
+
+# Where play does not explain how strong the response is. Its course does not count: no simulation predicts blows.
+def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
+    """One row for each channel that is further off than chance takes it; the share is the rms logarithm of the ratio of
+    amplitudes."""
+    if found.statistic is None:
+        return ()
+    record, standing = measure.records[0].recording, found.after.standing
+    names = (*record.response.channels, *(() if record.position is None else record.position.channels))
+    worst = np.maximum(standing.fit, standing.choose)
+    return tuple(
+        Mismatch(
+            names[c], "+".join(record.command.channels), (0.0, record.sample_rate_hz / 2), None, None,
+            min(float(worst[c] * found.statistic.chance[c]), 1.0), 0.0,
+        )
+        for c in np.argsort(-worst).tolist()
+        if worst[c] > BY_CHANCE
+    )  # fmt: skip

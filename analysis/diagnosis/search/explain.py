@@ -5,12 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
-from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
-from analysis.diagnosis.search.candidates import candidates
-from analysis.diagnosis.search.clock_drift_by_trial import NAME as DRIFTS
-from analysis.diagnosis.search.clock_drift_by_trial import clock_drift_by_trial
+from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit, gather_evidence
+from analysis.diagnosis.search.candidates import CLOCK_DRIFT, candidates, clock_drift_by_trial
 from analysis.diagnosis.search.families import excludes
 from analysis.diagnosis.search.no_answer import silences
 from analysis.diagnosis.search.parsimony import plainest_first
@@ -152,7 +149,7 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
         for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
         if not any(excludes(claim, one.claims[0]) for claim in held)
     ]
-    if arena.sound is not None and not any(claim.effect.name == DRIFTS for claim in held):
+    if arena.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held):
         suggested += clock_drift_by_trial([one for one in catalogue if arena.measure.tells(one)], evidence[0])
     known = sensitivity_at(arena, base.deviations, base.hypothesis)
     step.at(0.2)

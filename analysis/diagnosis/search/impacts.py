@@ -10,17 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.data.channel_noise import ChannelNoise
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.band_power_fit import Foreseen, View, fitted, foreseen
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.errors.shaken_axis import shaken_along
 from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.search.explain import Explanation, Statistic
-from analysis.diagnosis.search.irregular import irregular
 from analysis.diagnosis.search.rivalry import Arena, Contender
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.evidence import Evidence
@@ -40,6 +39,10 @@ WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Of a gap, over that which is guessed."""
 FIRST_ROUNDS, ROUNDS = 5, 3
 RIVAL = "loose_joint"
+VARIES = 3.0
+"""Rms between periods, over the noise."""
+PEAKED = 10.0
+"""Kurtosis of what is left, where nothing repeats; 3 for noise."""
 
 
 def rattling(
@@ -179,3 +182,20 @@ def _as_good(rival: Contender, named: Contender) -> bool:
 def _whole(times: FloatArray) -> float:
     """Over the channels."""
     return float(np.sqrt(np.nanmean(times**2)))
+
+
+# Whether a response is irregular: what should repeat does not, by far more than its noise; or it is full of peaks.
+def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
+    if any(one.how == "repeats" for one in floors):
+        return any(_varies(channel) for one in floors for channel in (one.response, one.position) if channel)
+    masks = [record.fit | record.choose for record in arena.whole.records]
+    left = np.vstack([row[mask] for row, mask in zip(found.retuned.fitted.residuals, masks, strict=True)])
+    if not len(left):
+        return False
+    left = left - left.mean(axis=0)
+    power = np.mean(left**2, axis=0)
+    return bool(np.any(np.mean(left**4, axis=0) > PEAKED * np.maximum(power, np.finfo(float).tiny) ** 2))
+
+
+def _varies(noise: ChannelNoise) -> bool:
+    return any(bool(np.any(one.variance > (VARIES * noise.rms) ** 2)) for one in noise.segments)

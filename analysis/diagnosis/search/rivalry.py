@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.felt_numbers import felt_numbers
 from analysis.diagnosis.errors.hypothesis import Hypothesis, alike, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting, sensitivity
 from analysis.diagnosis.errors.standing import Standing, standing
@@ -15,6 +14,7 @@ from analysis.diagnosis.search.screening import Screened
 from analysis.diagnosis.search.sound_recordings import SoundRecordings
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.effect import AxisForce, JointForce
+from equalizer.signals.signal import FloatArray
 
 MOST_FITTED, LEAST_FITTED = 10, 4
 """Hypotheses that get a first fit."""
@@ -33,6 +33,8 @@ NEARLY_CLEAN = 1.08
 """Errors of so many times the noise need no second start."""
 ALIKE = 4.0
 """Squares of the noise, in sum, that more numbers must gain over plain ones that do almost the same."""
+FELT = 0.06
+"""Change of an axis's channel, as a share of the largest that any number makes there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,3 +184,32 @@ def _varied(screened: Sequence[Screened]) -> list[Screened]:
         seen[key] = seen.get(key, -1) + 1
         ranked.append((seen[key], one))
     return [one for _, one in sorted(ranked, key=lambda pair: pair[0])]
+
+
+# Which of a model's numbers a force at an axis can feel: those that change how that axis moves.
+def felt_numbers(measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis) -> list[int]:
+    """plain: what the numbers do where no force depends on the motion. What hardly moves the axes at which such forces
+    act does the same beside them."""
+    forces = [one for one in hypothesis.placed() if isinstance(one.effect.acts, (AxisForce, JointForce))]
+    model = tuning.tuned(np.zeros(len(tuning.names)))
+    if not forces or any(isinstance(one.effect.acts, JointForce) for one in forces):
+        return list(range(len(tuning.names)))
+    reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
+    sites = {site for one in forces for site in one.sites}
+    strength = _strengths(measure, plain.columns, model.outputs)
+    felt = np.zeros(len(tuning.names), dtype=bool)
+    for site in sites:
+        in_channel = strength[:, int(np.argmax(reached[:, site]))]
+        felt |= in_channel > FELT * in_channel.max(initial=0.0)
+    return np.flatnonzero(felt).tolist()
+
+
+def _strengths(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:
+    """(t, p): rms in each response channel."""
+    squares, first = np.zeros((len(columns), outputs)), 0
+    for record in measure.records:
+        count, channels = int(record.fit.sum()), record.measured.shape[1]
+        part = columns[:, first : first + count * channels].reshape(len(columns), count, channels)[:, :, :outputs]
+        squares += np.einsum("tnc,tnc->tc", part, part)
+        first += count * channels
+    return np.sqrt(squares)

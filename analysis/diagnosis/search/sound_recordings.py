@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together, without_claim
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.standing import rms_over
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.candidates import candidates

@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.state_words import region_in_words
+from analysis.diagnosis.localisation.state_regions import region_in_words
 from analysis.diagnosis.result.real_answer import OwnNumber
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse

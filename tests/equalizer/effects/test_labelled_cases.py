@@ -8,9 +8,8 @@ import pytest
 
 from analysis.diagnosis.data.observed import observed
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
+from analysis.diagnosis.errors.output_error import evaluated, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.candidates import candidates
 from equalizer.effects.catalogue import EFFECTS

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, alike, claimed, together, without_claim
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.search.candidates import STARTS, candidates
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect

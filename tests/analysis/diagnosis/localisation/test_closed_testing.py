@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from statsmodels.stats.multitest import multipletests
 
-from analysis.diagnosis.localisation.closed_testing import closed_adjusted
+from analysis.diagnosis.localisation.mismatch_cells import closed_adjusted
 
 
 def test_one_family_is_plain_benjamini_hochberg():

@@ -2,10 +2,9 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
+from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorRule
 from analysis.diagnosis.localisation.mismatch_cells import LEVEL
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
-from analysis.diagnosis.localisation.sensor_rule import SensorRule
 from analysis.diagnosis.localisation.state_regions import StateRegion
 from analysis.diagnosis.result.localisation_words import entry_sentence, localisation_sentences, states_sentence
 

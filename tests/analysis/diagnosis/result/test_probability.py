@@ -2,7 +2,7 @@
 
 import pytest
 
-from analysis.diagnosis.result.probability import LEAST, MOST, elsewhere, probabilities
+from analysis.diagnosis.result.named_effects import LEAST, MOST, elsewhere, probabilities
 
 
 def test_nobody_is_likely_among_nobody():

@@ -3,9 +3,8 @@ import pytest
 
 from analysis.diagnosis.data.observed import observed
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import NOTHING
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from equalizer.effects.catalogue import CATALOGUE

@@ -13,11 +13,10 @@ from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.result.impact_remainder import impact_remainder
+from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.impacts import rattling
-from analysis.diagnosis.search.irregular import irregular
+from analysis.diagnosis.search.impacts import irregular, rattling
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.gather_evidence import gather_evidence
 from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.search.candidates import candidates
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.patience import always

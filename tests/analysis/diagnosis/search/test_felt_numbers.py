@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.felt_numbers import felt_numbers
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
 from analysis.diagnosis.errors.output_error import sensitivity
-from analysis.diagnosis.search.rivalry import sensitivity_at
+from analysis.diagnosis.search.rivalry import felt_numbers, sensitivity_at
 from equalizer.effects.catalogue import EFFECTS
 
 
