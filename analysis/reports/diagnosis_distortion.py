@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
-from analysis.diagnosis.localisation.level_trends import PRESENT, LevelTrend, level_trends
+from analysis.diagnosis.localisation.level_trends import LevelTrend, level_trends
 from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.settings import DISTORTION_P
 from analysis.diagnosis.unit_wording import share_text
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, listed
@@ -116,6 +117,6 @@ def _share(rms: float | None, signal: float) -> str:
 def _cell(cell: Distortion | None) -> str:
     if cell is None:
         return NONE
-    if cell.p_value < PRESENT:
+    if cell.p_value < DISTORTION_P:
         return _share(cell.rms, cell.signal_rms)
     return f"< {_share(cell.limit_rms, cell.signal_rms)}"

@@ -1,9 +1,8 @@
 """How a diagnosis was made, in words, with its own numbers."""
 
-from analysis.diagnosis.data.observed import FLOOR
-from analysis.diagnosis.errors.output_error import BOUND
-from analysis.diagnosis.localisation.mismatch_cells import LEVEL, Margin
+from analysis.diagnosis.localisation.mismatch_cells import Margin
 from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
 from analysis.wording import listed
 
 _FREE = (
@@ -66,11 +65,11 @@ def _choice(found: Findings) -> tuple[str, ...]:
         return ()
     return (
         "First the model's own numbers were re-tuned, each held by the stated standard deviation of its calibration "
-        f"and moved by at most {BOUND:g} of them. Then every effect of the catalogue was tried wherever it could be, "
-        "with starting values from what was still unexplained; the likeliest were fitted together with the model's "
-        "numbers, and the best was kept where it earned its place on data that it was not fitted to. The same was done "
-        f"for a further effect, at most three. A share of {100 * FLOOR:g} % of each channel's signal counts as noise, "
-        "because no model is better than that.",
+        f"and moved by at most {RETUNING_BOUND:g} of them. Then every effect of the catalogue was tried wherever it "
+        "could be, with starting values from what was still unexplained; the likeliest were fitted together with the "
+        "model's numbers, and the best was kept where it earned its place on data that it was not fitted to. The same "
+        f"was done for a further effect, at most three. A share of {100 * MODEL_FLOOR:g} % of each channel's signal "
+        "counts as noise, because no model is better than that.",
     )
 
 
@@ -78,5 +77,5 @@ def _map() -> str:
     return (
         f"In the map, a mismatch of {100 * Margin().share:g} % of the signal, or as much as recordings in which "
         "nothing is missing have, counts as none. Significant is what is larger beyond noise, with false discoveries "
-        f"held at {100 * LEVEL:g} % by closed testing: channel, then band, then level."
+        f"held at {100 * FALSE_DISCOVERY_RATE:g} % by closed testing: channel, then band, then level."
     )

@@ -14,7 +14,7 @@ from analysis.diagnosis.result.answer_of_findings import answer_of_findings, nam
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.search.verdict import EXPLAINED
+from analysis.diagnosis.settings import EXPLAINED_ERROR
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
@@ -75,7 +75,7 @@ def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
     """What was learned from the recording of before is wide, for one recording is little to learn from: what is more
     than the model missed then is a remainder all the same."""
     left, missed = pair.with_effects, pair.expected_left
-    if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED * missed:
+    if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED_ERROR * missed:
         return answer
     said = (
         f"Still unexplained: {100 * left:.3g} % of the signal are left on held-out data, where the model missed "

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.signal.windows import hann
 
+from analysis.diagnosis.settings import ANSWER_COHERENCE, ANSWER_DEVIATIONS
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -17,10 +18,6 @@ STRETCHES = 12
 """Per command."""
 DRIVEN = 0.01
 """Of the strongest line's power."""
-SURE = 5.0
-"""Standard deviations above what noise alone brings."""
-TELLING = 0.5
-"""A coherence that must stand out twice as far, or the recordings are too short to be judged by it."""
 SHARED_BY_WINDOW = 2.0
 """Neighbouring lines share so much of a Hann window that so many count as one."""
 RANK = 1e-6
@@ -40,7 +37,7 @@ def answer(recordings: Sequence[Recording]) -> float | None:
         return None
     found, expected, variance = (np.array(column) for column in zip(*looks, strict=True))
     spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(looks)
-    if (TELLING - expected.mean()) / spread < 2 * SURE:
+    if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
     return float(((found.mean(axis=0) - expected.mean()) / spread).max())
 

@@ -6,25 +6,24 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.diagnosis.data.answering import SURE, answer
+from analysis.diagnosis.data.answering import answer
 from analysis.diagnosis.data.carried_weight import weight_problems
-from analysis.diagnosis.data.growth import GROWTH, growth_rate, motions
+from analysis.diagnosis.data.growth import growth_rate, motions
 from analysis.diagnosis.data.observed_parts import samples_to_fit
+from analysis.diagnosis.settings import (
+    ANSWER_DEVIATIONS,
+    LARGEST_VALUE,
+    LEAST_CYCLES,
+    LEAST_SAMPLES,
+    LEAST_SAMPLES_TO_FIT,
+    MOST_GROWTH,
+    SHORTEST_S,
+    SHORTEST_SAMPLES,
+)
 from equalizer.effects.placing import PlacingError, placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-
-LEAST_SAMPLES = 256
-"""With a response, in all recordings together: fewer carry neither a fit nor a test."""
-SHORT_S, SHORT_SAMPLES = 1.5, 2000
-"""What lasts less and holds fewer does neither: one course explains it as well as another."""
-LEAST_FITTED = 64
-"""With a response, of what may be fitted to."""
-LEAST_CYCLES = 3.0
-"""Of the commands' middle frequency, in all recordings together."""
-LARGEST = 1e12
-"""SI; far beyond any device, and so that powers of it are still numbers."""
 
 
 class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
@@ -64,12 +63,12 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
         cycles = sum(_cycles(one) for one in recordings)
         if known < LEAST_SAMPLES:
             problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
-        elif known < SHORT_SAMPLES and known / recordings[0].sample_rate_hz < SHORT_S:
+        elif known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S:
             problems.append(
                 f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording; at least "
-                f"{SHORT_S:g} s or {SHORT_SAMPLES} samples are needed, one part to fit and one to test"
+                f"{SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
             )
-        elif (fitted := samples_to_fit(recordings)) < LEAST_FITTED:
+        elif (fitted := samples_to_fit(recordings)) < LEAST_SAMPLES_TO_FIT:
             problems.append(
                 f"only {fitted} samples of what may be fitted to hold a response, and a position where there is one; "
                 "the rest of it is missing, or has the role of a test"
@@ -79,7 +78,7 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
                 f"the recording holds about {cycles:.2g} cycles of what was commanded, which is too short; at least "
                 f"{LEAST_CYCLES:g} are needed, one part to fit and one to test"
             )
-        elif (sure := answer(recordings)) is not None and sure < SURE:
+        elif (sure := answer(recordings)) is not None and sure < ANSWER_DEVIATIONS:
             problems.append(
                 "the responses have nothing to do with the commands: what they share is no more than noise shares with "
                 "anything, so the recording is noise, of another device, or its command was not played"
@@ -128,7 +127,7 @@ def _absurd(recording: Recording, name: str) -> Iterator[str]:
         for channel in range(0 if signal is None else len(signal.channels)):
             assert signal is not None
             size = float(np.nanmax(np.abs(signal.samples[:, channel]), initial=0.0))
-            if size > LARGEST:
+            if size > LARGEST_VALUE:
                 yield (
                     f"{name} holds values up to {size:.3g} {signal.units[channel]} in {side} "
                     f"{signal.channels[channel]}, which no device reaches"
@@ -192,9 +191,9 @@ def _turning(recording: Recording) -> bool | None:
 def _absurd_model(model: MechanicalModel) -> Iterator[str]:
     for name in ("mass", "damping", "stiffness", "input", "output"):
         size = float(np.abs(getattr(model, name)).max())
-        if size > LARGEST:
+        if size > LARGEST_VALUE:
             yield f"the model's {name} holds {size:.3g}, which no device has"
-    if (lightest := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST:
+    if (lightest := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST_VALUE:
         yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
 
 
@@ -216,7 +215,7 @@ def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
 def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
     fastest = growth_rate(model)
     longest_s = max(len(one) / one.sample_rate_hz for one in recordings)
-    if fastest * longest_s > GROWTH:
+    if fastest * longest_s > MOST_GROWTH:
         yield (
             f"the model is unstable: undisturbed it grows e-fold in {1 / fastest:.3g} s; damping and stiffness must "
             "not be negative"

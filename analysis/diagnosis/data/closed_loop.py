@@ -2,13 +2,10 @@
 
 import numpy as np
 
+from analysis.diagnosis.settings import FED_BACK_SHARE, FORETOLD_SHARE
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
-FED_BACK = 0.1
-"""Share of the command's rms that must differ from the recorded excitation."""
-FORETOLD = 0.05
-"""Share of what a command's own past leaves of it that the responses may leave; below, they make the command."""
 PAST = 6
 """Samples of each that it is told by."""
 _LEAST = 200
@@ -20,7 +17,7 @@ def in_closed_loop(recording: Recording) -> bool:
     command = recording.command.samples
     if recording.excitation is not None:
         by_feedback = command - recording.excitation.samples
-        return bool(_rms(by_feedback) > FED_BACK * _rms(command))
+        return bool(_rms(by_feedback) > FED_BACK_SHARE * _rms(command))
     if recording.hold is not Hold.ZERO_ORDER:
         # The command before a sample already hangs on the one after it.
         return False
@@ -41,7 +38,7 @@ def _told_by(command: FloatArray, recording: Recording) -> bool:
     others = np.column_stack([seen[rows - back] for back in range(PAST)])
     alone, helped = _left(command[rows], own), _left(command[rows], np.hstack([own, others]))
     # A smooth command is told by its own past alone, and nothing can be said.
-    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD * alone)
+    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD_SHARE * alone)
 
 
 def _left(aim: FloatArray, by: FloatArray) -> float:

@@ -2,11 +2,9 @@
 
 import numpy as np
 
+from analysis.diagnosis.settings import MOST_GROWTH
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.lockin import ComplexArray
-
-GROWTH = 1.0
-"""e-foldings over the longest recording by which a model may grow by itself: rounding alone stays far below."""
 
 
 def growth_rate(model: MechanicalModel) -> float:
@@ -28,4 +26,4 @@ def motions(model: MechanicalModel) -> ComplexArray:
 
 def runs_away(model: MechanicalModel, longest_s: float) -> bool:
     """Whether undisturbed motion grows noticeably within the longest recording."""
-    return growth_rate(model) * longest_s > GROWTH
+    return growth_rate(model) * longest_s > MOST_GROWTH

@@ -5,17 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.settings import CHOOSE_SHARE, LEVELS_TO_HOLD_ONE_BACK, MODEL_FLOOR, TEST_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
-
-FLOOR = 0.002
-"""No model is trusted better than this share of a channel's rms; added to the noise as if it were some."""
-LEVELS_TO_HOLD_ONE_BACK = 3
-KEPT_BACK = 0.25
-"""Of the fitting time, from its end, where no level can be kept back for the choice between explanations."""
-TESTED = 0.25
-"""Of the whole time, from its end, where no segment has a role."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,19 +78,19 @@ def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> t
         fit[:] = False
     elif not test.any() and not tested:
         places = np.flatnonzero(fit)
-        test[places[int((1 - TESTED) * len(places)) :]] = True
+        test[places[int((1 - TEST_SHARE) * len(places)) :]] = True
         fit &= ~test
     choose = _middle_level(fitted, length) & fit
     if not choose.any():
         places = np.flatnonzero(fit)
-        choose[places[int((1 - KEPT_BACK) * len(places)) :]] = True
+        choose[places[int((1 - CHOOSE_SHARE) * len(places)) :]] = True
     return fit & ~choose, choose, test
 
 
 def noise_in_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
     """(c,): what a channel's errors are counted in: its noise, and a share of its signal below which no model goes."""
     rms = np.sqrt(np.nanmean(measured**2, axis=0))
-    return np.asarray(np.sqrt(noise**2 + (FLOOR * rms) ** 2))
+    return np.asarray(np.sqrt(noise**2 + (MODEL_FLOOR * rms) ** 2))
 
 
 def _covered(segments: list[Segment], length: int) -> Mask:

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import KEPT_BACK, Observed, measured_of, roles
+from analysis.diagnosis.data.observed import Observed, measured_of, roles
+from analysis.diagnosis.settings import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -49,7 +50,7 @@ def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
     if (choose & new).any() or not (fit & new).any():
         return fit & new, choose & new
     places = np.flatnonzero(fit & new)
-    last = places[int((1 - KEPT_BACK) * len(places)) :]
+    last = places[int((1 - CHOOSE_SHARE) * len(places)) :]
     chosen: Mask = np.zeros(len(fit), dtype=np.bool_)
     chosen[last] = True
     return fit & new & ~chosen, chosen

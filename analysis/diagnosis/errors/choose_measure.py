@@ -29,6 +29,14 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.force_views import force_views
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.windows import windows_of
+from analysis.diagnosis.settings import (
+    DIES_OUT_SHARE,
+    MOST_LEFT_OUT,
+    REST_S,
+    REST_SHARE,
+    SETTLED_CONSTANTS,
+    UNKNOWN_NOISE_SHARE,
+)
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -37,18 +45,8 @@ from equalizer.signals.signal import FloatArray
 
 Measure = Literal["free simulation", "windows", "predicted force"]
 
-DIES_OUT = 1 / 3
-"""Share of the longest record within which a plant that holds itself comes to rest."""
 DITHER = 0.02
 """Steps of a converter: with less noise than that before it, repeats do not show it."""
-GONE, SPARED = 5.0, 0.25
-"""Time constants after which a motion is gone, and the share of a recording that may be left out until then."""
-UNKNOWN_NOISE = 1e-3
-"""Share of the signal that is taken for noise where a recording cannot tell."""
-AT_REST = 0.5
-"""Of a channel's rms, what it may start with, and of its usual changes,"""
-RESTING_S = 0.02
-"""what it may change by in the first such time: an offset alone is no motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,20 +108,20 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
         return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
     if not holds:
         return Choice("windows", DRIFTS)
-    if any(_begins_moving(one) and _settling(one, model) > SPARED * len(one.command) for one in records):
+    if any(_begins_moving(one) and _settling(one, model) > MOST_LEFT_OUT * len(one.command) for one in records):
         return Choice("windows", NOT_AT_REST)
     return Choice("free simulation", "")
 
 
 def holds_itself(model: MechanicalModel, longest_s: float) -> bool:
     """Whether all motion dies out well within a recording (so that no pole is at or near the unit circle)."""
-    return _slowest(model) * DIES_OUT * longest_s > 1
+    return _slowest(model) * DIES_OUT_SHARE * longest_s > 1
 
 
 def _settled(record: Observed, model: MechanicalModel) -> Observed:
     """Without the beginning, where that is in motion and short."""
     after = _settling(record, model)
-    if after > SPARED * len(record.command) or not _begins_moving(record):
+    if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
         return record
     later = np.arange(len(record.command)) >= after
     return replace(record, fit=record.fit & later, choose=record.choose & later, test=record.test & later)
@@ -132,7 +130,7 @@ def _settled(record: Observed, model: MechanicalModel) -> Observed:
 def _settling(record: Observed, model: MechanicalModel) -> float:
     """Samples until what was at first is gone."""
     slowest = _slowest(model)
-    return GONE / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
+    return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf
 
 
 def _slowest(model: MechanicalModel) -> float:
@@ -174,14 +172,14 @@ NO_STATE = (
 
 
 def _begins_moving(record: Observed) -> bool:
-    first = max(int(RESTING_S * record.recording.sample_rate_hz), 4)
+    first = max(int(REST_S * record.recording.sample_rate_hz), 4)
     known = record.measured[np.isfinite(record.measured).all(axis=1)]
     if len(known) < 4 * first:
         return False
     means = known[: len(known) // first * first].reshape(-1, first, known.shape[1]).mean(axis=1)
     changes = np.diff(means, axis=0)
-    away = np.abs(means[0]) > AT_REST * known.std(axis=0)
-    moves = np.abs(changes[0]) > AT_REST * np.sqrt(np.mean(changes**2, axis=0))
+    away = np.abs(means[0]) > REST_SHARE * known.std(axis=0)
+    moves = np.abs(changes[0]) > REST_SHARE * np.sqrt(np.mean(changes**2, axis=0))
     return bool(np.any(away & moves))
 
 
@@ -194,7 +192,7 @@ def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatAr
     ]
     signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
     quietest = np.fmin.reduce(rows)
-    return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE * signal))
+    return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE_SHARE * signal))
 
 
 def _unrounded(floor: NoiseFloor, record: Observed) -> FloatArray:

@@ -13,12 +13,11 @@ from analysis.diagnosis.data.growth import runs_away
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
-BOUND = 4.0
-"""Standard deviations of the calibration within which the model's own numbers may be re-tuned."""
 MOVED = 0.1
 """Standard deviations that a number is moved by to see what it does."""
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
@@ -155,7 +154,8 @@ def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: Fl
 
 def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
     own = np.array([number.bounds for number in hypothesis.numbers]).reshape(-1, 2)
-    return np.concatenate([np.full(tuned, -BOUND), own[:, 0]]), np.concatenate([np.full(tuned, BOUND), own[:, 1]])
+    widest = np.full(tuned, RETUNING_BOUND)
+    return np.concatenate([-widest, own[:, 0]]), np.concatenate([widest, own[:, 1]])
 
 
 def _longest(hypothesis: Hypothesis) -> FloatArray:

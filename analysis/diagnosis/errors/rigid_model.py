@@ -13,15 +13,11 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.force_views import force_views
 from analysis.diagnosis.errors.needed_force import needed_force
 from analysis.diagnosis.errors.predicted_force import PredictedForce
+from analysis.diagnosis.settings import RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-OPEN = 0.25
-"""Of the damping and stiffness found, one standard deviation: friction and the like hide in them. Of the mass:"""
-OPEN_MASS = 0.05
-WORTH = 0.05
-"""Share of the misfit that springs must take to be there."""
 _ROUNDS = 2
 
 
@@ -71,14 +67,16 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
     shapes, aim, m = np.vstack(rows), np.vstack(aims), model.inputs
     whole, left = _least_squares(shapes, aim)
     loose, left_loose = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), aim)
-    sprung = left < (1 - WORTH) * left_loose
+    sprung = left < (1 - SPRING_SHARE) * left_loose
     mass, damping = ((one + one.T) / 2 for one in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
     stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
     # A body that pushes itself is no linear model; what makes it seem so is for the diagnosis.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
     stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
     largest = [float(np.abs(np.diagonal(one)).max()) for one in (mass, damping, stiffness)]
-    open_ = Tolerance(OPEN_MASS * largest[0], OPEN * largest[1] or None, OPEN * largest[2] or None, None)
+    open_ = Tolerance(
+        RIGID_MASS_SHARE * largest[0], RIGID_SHARE * largest[1] or None, RIGID_SHARE * largest[2] or None, None
+    )
     return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=open_)
 
 

@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh, null_space
 
+from analysis.diagnosis.settings import UNSTATED_MODES, UNSTATED_SHARE
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
-UNSTATED = Tolerance(modes=0.02)
-UNSTATED_SHARE = 0.1
-"""One standard deviation of what has no stated tolerance, as a share of the largest at any axis."""
+UNSTATED = Tolerance(modes=UNSTATED_MODES)
 DAMPING_PER_MODES = 10.0
 """A mode's damping is known so many times worse than its frequency."""
 

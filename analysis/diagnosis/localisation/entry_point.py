@@ -13,27 +13,24 @@ import numpy as np
 from scipy.stats import t as t_distribution
 
 from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra
+from analysis.diagnosis.settings import (
+    ENTRY_ANGLE,
+    ENTRY_LOUD,
+    ENTRY_PER_DIMENSION,
+    ENTRY_SENSOR_PENALTY,
+    SENSOR_ABSENT,
+    SENSOR_LEAST_LINES,
+    SENSOR_LOUD,
+    SENSOR_PRESENT,
+    SENSOR_SHOWN,
+)
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
-_ALIKE = 0.1
-"""Mean sine of the angle between two entries' whitened directions, below which they cannot be told apart."""
-_LOUD = 3.0
-"""A line counts where its residual is so many times its noise."""
 _BLOCK_LINES = 8
 """Neighbouring lines share their fate: so many count as one when two entries are compared."""
-_SENSOR_PENALTY = np.log(2.0)
-_PER_DIMENSION = 0.25
-"""What each further direction must gain, or errors of the model on other axes would be forces, too."""
 _TINY = np.finfo(np.float64).tiny
-_TELLING = 4.0
-"""Times the noise that a residual must bring to the other sensor before its absence there says something."""
-_CLEAR = 10.0
-"""Times its own noise, on a line, that the response's residual must be."""
-_LEAST_LINES = 5
-_ABSENT, _PRESENT = 0.1, 0.5
-"""Share of what the response's residual would be in position, below which it is absent and above which it is there."""
 
 
 # Position clean but response off means the response's sensor: no force moves one without the other.
@@ -56,16 +53,16 @@ def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
     response, position = np.abs(spectra.residual[:, :, :p]) ** 2, np.abs(spectra.residual[:, :, p:]) ** 2
     noise = spectra.noise[:, :, p:]
     moved = np.maximum(response - spectra.noise[:, :, :p], 0.0) / per_position[:, None]
-    telling = (moved > _TELLING * noise) & (response > _CLEAR * spectra.noise[:, :, :p])
-    if telling.sum() < _LEAST_LINES:
+    telling = (moved > SENSOR_SHOWN * noise) & (response > SENSOR_LOUD * spectra.noise[:, :, :p])
+    if telling.sum() < SENSOR_LEAST_LINES:
         return SensorRule("undecided", 0.0, 0.0)
     expected = float(np.mean((moved / noise)[telling]))
     seen = float(np.mean(((position - noise) / noise)[telling]))
     # Per line, so that a few strong lines do not speak for all.
     share = float(np.median(np.clip((position - noise)[telling] / moved[telling], 0, 2)))
-    if share < _ABSENT:
+    if share < SENSOR_ABSENT:
         return SensorRule("response sensor", expected, seen)
-    return SensorRule("motion" if share > _PRESENT else "undecided", expected, seen)
+    return SensorRule("motion" if share > SENSOR_PRESENT else "undecided", expected, seen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +112,7 @@ def entry_point(
     whitened = spectra.residual / np.sqrt(np.maximum(spectra.noise, _TINY))
     total = np.sum(np.abs(whitened) ** 2, axis=2)
     channels = whitened.shape[2]
-    loud = total / channels > _LOUD
+    loud = total / channels > ENTRY_LOUD
     rule = None if derivative is None else sensor_rule(spectra, derivative)
     if not loud.any() or not entries:
         return EntryPoint((), rule, int(loud.sum()))
@@ -128,7 +125,7 @@ def entry_point(
     best = ranked[0]
     ranking = []
     for k in ranked:
-        alike = tuple(entries[j].name for j in ranked if j != k and _angle(bases[j], bases[k]) < _ALIKE)
+        alike = tuple(entries[j].name for j in ranked if j != k and _angle(bases[j], bases[k]) < ENTRY_ANGLE)
         same = k == best or entries[best].name in alike
         p_value = 1.0 if same else _as_good(logs[k], logs[best], loud)
         explained = 1 - lefts[k][loud] / total[loud]
@@ -157,12 +154,12 @@ def _unexplained(whitened: ComplexArray, total: FloatArray, basis: ComplexArray)
 
 def _against(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
     """What is added to a score: for more dimensions, and where the rule about position and response speaks."""
-    parsimony = _PER_DIMENSION * (dimensions - 1)
+    parsimony = ENTRY_PER_DIMENSION * (dimensions - 1)
     if rule is None or rule.verdict == "undecided":
         return parsimony
     of_response_sensor = entry.place == "sensor" and not entry.of_position
     allowed = of_response_sensor if rule.verdict == "response sensor" else not of_response_sensor
-    return parsimony if allowed else parsimony + float(_SENSOR_PENALTY)
+    return parsimony if allowed else parsimony + ENTRY_SENSOR_PENALTY
 
 
 def _angle(one: ComplexArray, other: ComplexArray) -> float:

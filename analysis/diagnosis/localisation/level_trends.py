@@ -12,13 +12,10 @@ import numpy as np
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.data.line_statistics import two_sided
 from analysis.diagnosis.localisation.distortion import Distortion, Kind
+from analysis.diagnosis.settings import DISTORTION_P, STEADY_DB
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
-PRESENT = 0.001
-"""p-value below which a kind of distortion is taken to be there."""
-STEADY_DB = 1.5
-"""Per doubling of the level: less is neither rising nor falling."""
 _SCATTER_DB = 4.343
 """Of the power on a single line, one standard deviation, where distortion is random over lines."""
 
@@ -44,7 +41,7 @@ class LevelTrend:
 
     @property
     def present(self) -> bool:
-        return self.p_value < PRESENT
+        return self.p_value < DISTORTION_P
 
     @property
     def course(self) -> str:
@@ -74,7 +71,7 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
     levels = np.array([cell.amplitude for cell in cells])
     relative_db = 20 * np.log10(np.maximum(sizes, _TINY) / np.maximum(signals, _TINY))
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
-    seen = np.array([cell.p_value < PRESENT for cell in cells])
+    seen = np.array([cell.p_value < DISTORTION_P for cell in cells])
     slope, slope_p = _course(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
     if key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)

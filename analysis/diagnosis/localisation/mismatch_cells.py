@@ -14,12 +14,10 @@ from analysis.diagnosis.data.line_statistics import noncentral_f_sf
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
+from analysis.diagnosis.settings import EQUIVALENCE_MARGIN, FALSE_DISCOVERY_RATE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-
-LEVEL = 0.01
-"""Of false discoveries."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +34,7 @@ class Prediction:
 class Margin:
     """What is no mismatch: so much of the signal in a cell, and what clean recordings have, squares added."""
 
-    share: float = 0.02
+    share: float = EQUIVALENCE_MARGIN
     learned: CleanFloor = field(default_factory=CleanFloor)
 
     def of(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
@@ -74,7 +72,7 @@ class MismatchCell:
 
     @property
     def significant(self) -> bool:
-        return self.adjusted_p_value <= LEVEL
+        return self.adjusted_p_value <= FALSE_DISCOVERY_RATE
 
 
 def mismatch_cells(
@@ -142,7 +140,7 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, 
 
 def _adjusted(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
     paths = [((cell.output, cell.quantity), cell.band_hz) for cell in cells]
-    adjusted = closed_adjusted(np.array([cell.p_value for cell in cells]), paths, LEVEL)
+    adjusted = closed_adjusted(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
     return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, adjusted, strict=True))
 
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.document import Mismatch
-from analysis.diagnosis.localisation.mismatch_cells import LEVEL, MismatchCell
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.state_regions import StateRegion
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 MOST_ROWS = 40
 
@@ -26,7 +27,7 @@ def mismatch_rows(
 ) -> tuple[Mismatch, ...]:
     """Significant ones, largest share first; of the cells, the share of their signal (rms, at most 1), of the states,
     the share of the mismatch's power that sits there. What states there are is kept before what cells there are."""
-    tied = [(one.region.share, _state_row(one)) for one in states if one.region.p_value <= LEVEL]
+    tied = [(one.region.share, _state_row(one)) for one in states if one.region.p_value <= FALSE_DISCOVERY_RATE]
     found = [(cell.share, _cell_row(cell)) for cell in cells if cell.significant]
     best = sorted(tied, key=_by_share)[:most]
     best += sorted(found, key=_by_share)[: most - len(best)]

@@ -7,9 +7,10 @@ import numpy as np
 
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.localisation.block_permutation import IntArray
-from analysis.diagnosis.localisation.mismatch_cells import LEVEL, MismatchCell
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import Disturbance, State, StateRegion, state_regions
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, STATE_CROWDED, STATES_NAMED
 from analysis.diagnosis.types import Mask
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.placing import axis_letter
@@ -19,10 +20,6 @@ from equalizer.signals.signal import FloatArray
 _SEED = 20
 _DRIVEN = 0.02
 """Of the loudest segment's rms, from which on an axis counts as driven."""
-_CROWDED = 1.5
-"""Share of a mismatch in a region, over the region's share of the samples, from which on it says something."""
-_MOST = 2
-"""Per axis or channel: what hangs on one state is seen in others, too."""
 
 
 def tied_forces(
@@ -81,15 +78,17 @@ def _corrected(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tupl
         raised = [
             replace(one, region=replace(one.region, p_value=min(1.0, tests * one.region.p_value))) for one in group
         ]
-        significant = [one for one in raised if one.region.p_value <= LEVEL and _says_something(one.region)]
-        kept += sorted(significant, key=lambda one: -one.region.share)[:_MOST]
+        significant = [
+            one for one in raised if one.region.p_value <= FALSE_DISCOVERY_RATE and _says_something(one.region)
+        ]
+        kept += sorted(significant, key=lambda one: -one.region.share)[:STATES_NAMED]
     return tuple(kept)
 
 
 def _says_something(region: StateRegion) -> bool:
     if region.words.startswith("at middling"):
         return False
-    return region.by == "sign" or region.share > _CROWDED * region.occupied
+    return region.by == "sign" or region.share > STATE_CROWDED * region.occupied
 
 
 def _strata(recording: Recording, used: Mask, driven: FloatArray) -> IntArray:

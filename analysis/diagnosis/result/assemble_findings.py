@@ -25,7 +25,8 @@ from analysis.diagnosis.search.determined import number_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import learned_sentence
 from analysis.diagnosis.search.rivalry import Arena
-from analysis.diagnosis.search.verdict import BY_CHANCE, Judgement
+from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
@@ -206,5 +207,5 @@ def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatc
             min(float(worst[c] * found.statistic.chance[c]), 1.0), 0.0,
         )
         for c in np.argsort(-worst).tolist()
-        if worst[c] > BY_CHANCE
+        if worst[c] > EXPLAINED_BY_CHANCE
     )  # fmt: skip

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
+from analysis.diagnosis.settings import ENTRY_AS_GOOD_P, ENTRY_LEAST_LINES
 from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import listed, p_text
 
-FEWEST_LINES = 40
-"""Loud lines below which nothing is said of where a mismatch enters."""
-_AS_GOOD = 0.05
 _FORCE = "the drive, the mechanism and a hand all push there, and these channels cannot tell which does"
 _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shifts all channels alike"
 
@@ -23,7 +21,7 @@ def localisation_sentences(local: Localisation) -> tuple[str, ...]:
 
 def entry_sentence(entry: EntryPoint | None) -> str:
     """Empty where too little is there to say it."""
-    if entry is None or not entry.ranking or entry.lines < FEWEST_LINES:
+    if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
     best = entry.ranking[0]
     kind = "" if best.place == "sensor" else f" ({_FORCES if best.axis is None else _FORCE})"
@@ -53,7 +51,7 @@ def _next(entry: EntryPoint) -> str:
         return alike
     second = rivals[0]
     chance = p_text(second.p_value)
-    if second.p_value > _AS_GOOD:
+    if second.p_value > ENTRY_AS_GOOD_P:
         return f"{alike}; {second.name} would explain it about as well ({_percent(second)}, {chance})"
     return f"{alike}; next comes {second.name} with {_percent(second)} ({chance} that it is as good)"
 

@@ -11,28 +11,26 @@ from analysis.diagnosis.result.impact_wording import BY_CHANCE, BY_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand, only_refines
 from analysis.diagnosis.search.rivalry import Contender
-from analysis.diagnosis.search.verdict import BY_CHANCE as OF_CHANCE
 from analysis.diagnosis.search.verdict import shares_taken
+from analysis.diagnosis.settings import (
+    ELSEWHERE_HALFWAY,
+    ELSEWHERE_LEAST,
+    ELSEWHERE_MOST,
+    ELSEWHERE_STEEPNESS,
+    EXPLAINED_BY_CHANCE,
+    INTERVAL_FACTOR,
+    INTERVAL_SHARE,
+    MOST_RIVALS,
+    PROBABILITY_SCALE,
+)
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-RIVALS = 6
-BESIDE_NOISE, EXACT = 2.5, 0.005
-"""No law is exactly a device's, and what differs pulls at the numbers more than noise does: by what factor, and by what
-share of the number beside it. Set so that on a bank of simulated devices nine intervals in ten held the truth; by noise
-alone, six did (docs/proof.md)."""
 _TELLING = 0.005
 """Errors that differ by less are the same to a reader."""
-SCALE = 0.002
-"""Difference of mean log error power that makes a contender e times less likely."""
-LEAST, MOST = 0.01, 0.8
-"""Chances that none of them is right: where nothing is left but noise, and where much more is."""
-HALFWAY, STEEPNESS = 0.35, 1.5
-"""Errors so many times the noise above it are as likely a sign that none is right as that one is; and how fast that
-turns. All three are what a bank of simulated devices showed, see docs/proof.md."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +86,7 @@ def axis_of(claim: Claim, said: Said) -> str | None:
 
 def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
     contenders = found.rounds[number]
-    left = found.after.standing.seen if found.statistic is None else found.after.standing.seen / OF_CHANCE
+    left = found.after.standing.seen if found.statistic is None else found.after.standing.seen / EXPLAINED_BY_CHANCE
     chances = probabilities(contenders, left)
     best, by_name = contenders[0], _chances_of_names(contenders, chances)
     rivals: dict[str, Rival] = {}
@@ -101,7 +99,7 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
         rivals[claim.effect.name] = Rival(
             claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (said, unit))
         )
-        if len(rivals) == RIVALS:
+        if len(rivals) == MOST_RIVALS:
             break
     return tuple(rivals.values()), by_name[best.fitted.hypothesis.claims[-1].effect.name]
 
@@ -155,7 +153,9 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
 
 
 def _interval(value: float, standard_error: float) -> tuple[float, float] | None:
-    reach = float(np.hypot(1.96 * BESIDE_NOISE * standard_error, EXACT * value)) if standard_error > 0 else 0.0
+    reach = (
+        float(np.hypot(1.96 * INTERVAL_FACTOR * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
+    )
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
@@ -189,11 +189,11 @@ def probabilities(contenders: Sequence[Contender], left: float) -> tuple[float, 
     best = contenders[0]
     behind = np.array([max(one.standing.chosen_by - best.standing.chosen_by, 0.0) for one in contenders])
     refines = np.array([one is not best and only_refines(one, best) for one in contenders])
-    weights = np.where(refines, 0.0, np.exp(-behind / SCALE))
+    weights = np.where(refines, 0.0, np.exp(-behind / PROBABILITY_SCALE))
     return tuple((1 - elsewhere(left)) * float(one) for one in weights / weights.sum())
 
 
 def elsewhere(left: float) -> float:
     """The chance that what is named is not what is there, though nothing else in the catalogue does better."""
-    odds = (max(left - 1.0, 0.0) / HALFWAY) ** STEEPNESS
-    return float(LEAST + (MOST - LEAST) * odds / (1 + odds))
+    odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
+    return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

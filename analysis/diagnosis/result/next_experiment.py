@@ -15,13 +15,12 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import MOVED, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.result.experiment_menu import Experiment
+from analysis.diagnosis.settings import TELLING_GAIN
 from equalizer.effects.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
-TELLING = 10.0
-"""Gain in log likelihood below which rivals stay as good as each other."""
 RETUNED = 3
 """Steps of the rival towards the named one."""
 
@@ -50,12 +49,12 @@ def foresee(
     """The most telling for its cost first, those that tell too little last. known: (t + numbers, twice), the
     information on the rival's numbers that has been recorded so far, calibration included."""
     found = [Foreseen(one, _gain(bench, named, rival, known, one)) for one in menu]
-    return tuple(sorted(found, key=lambda one: (one.gain < TELLING, -one.gain / one.experiment.minutes)))
+    return tuple(sorted(found, key=lambda one: (one.gain < TELLING_GAIN, -one.gain / one.experiment.minutes)))
 
 
 def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None:
     """None where even the most telling recording would leave the rivals as good as each other."""
-    if best.gain < TELLING:
+    if best.gain < TELLING_GAIN:
         return None
     said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
     return NextExperiment(

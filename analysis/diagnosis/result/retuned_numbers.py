@@ -3,16 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.errors.output_error import BOUND
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED
 from analysis.diagnosis.unit_wording import value_text
 from analysis.wording import listed, typeset
 from equalizer.signals.signal import FloatArray
 
-MOVED = 1.0
-"""Standard deviations of its calibration by which a number must move to be named."""
-FAR = 3.0
-"""And to be doubted."""
 _NAMED = 4
 
 
@@ -51,7 +47,7 @@ def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ..
 
 def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
     """Those that moved by a standard deviation or more, the furthest first. deviations: (parameters,)"""
-    moved = [one for one in all_numbers(tuning, deviations) if abs(one.deviations) >= MOVED]
+    moved = [one for one in all_numbers(tuning, deviations) if abs(one.deviations) >= RETUNING_NAMED]
     return tuple(sorted(moved, key=lambda one: -abs(one.deviations)))
 
 
@@ -68,17 +64,17 @@ def retuned_sentence(moved: Sequence[MovedNumber]) -> str:
 def doubtful_sentences(moved: Sequence[MovedNumber]) -> tuple[str, ...]:
     """Numbers that left what their calibration makes likely: they may stand for physics that was not named. Many are
     counted, for all of them stand in the table of numbers."""
-    far = [one for one in moved if abs(one.deviations) >= FAR]
+    far = [one for one in moved if abs(one.deviations) >= RETUNING_DOUBTED]
     if len(far) > _NAMED:
-        edge = sum(abs(one.deviations) >= BOUND - 1e-6 for one in far)
+        edge = sum(abs(one.deviations) >= RETUNING_BOUND - 1e-6 for one in far)
         return (
-            f"{len(far)} numbers were moved by {FAR:g} standard deviations of their calibration or more"
+            f"{len(far)} numbers were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
             f"{f', {edge} of them as far as they may' if edge else ''}: "
             "either the calibration is wrong, or they stand for physics that was not named.",
         )
     return tuple(
         f"The {one.name} was moved by {abs(one.deviations):.2g} standard deviations of its calibration"
-        f"{_AS_FAR if abs(one.deviations) >= BOUND - 1e-6 else ''}: "
+        f"{_AS_FAR if abs(one.deviations) >= RETUNING_BOUND - 1e-6 else ''}: "
         "either the calibration is wrong, or it stands for physics that was not named."
         for one in far
     )

@@ -6,11 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.diagnosis.result.findings import Course
-
-FACTOR = 5.0
-"""From which, up or down, a factor is doubted;"""
-ALIKE = 0.9
-"""where measured and predicted course correlate so well."""
+from analysis.diagnosis.settings import UNIT_CORRELATION, UNIT_FACTOR
 
 
 def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
@@ -19,7 +15,7 @@ def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
     for course in courses:
         for channel, name in enumerate(course.channels):
             factor = _factor(course, channel)
-            if factor is not None and not 1 / FACTOR < factor < FACTOR:
+            if factor is not None and not 1 / UNIT_FACTOR < factor < UNIT_FACTOR:
                 found.setdefault(name, factor)
     return tuple(
         f"{name} has the course that the model foresees, but {_words(factor)}: its {_what(factor)}, the command's or "
@@ -37,7 +33,7 @@ def _factor(course: Course, channel: int) -> float | None:
     one, other = (each[known] - np.mean(each[known]) for each in (measured, predicted))
     sizes = float(np.sqrt(one @ one)), float(np.sqrt(other @ other))
     together = float(one @ other)
-    if min(sizes) == 0 or not np.isfinite(sizes).all() or abs(together) < ALIKE * sizes[0] * sizes[1]:
+    if min(sizes) == 0 or not np.isfinite(sizes).all() or abs(together) < UNIT_CORRELATION * sizes[0] * sizes[1]:
         return None
     return float(np.copysign(sizes[0] / sizes[1], together))
 
@@ -45,9 +41,9 @@ def _factor(course: Course, channel: int) -> float | None:
 def _words(factor: float) -> str:
     times = max(abs(factor), 1 / abs(factor))
     shown = f"{times:.3g}" if times < 100 else f"{times:.0f}"
-    said = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= FACTOR else []
+    said = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= UNIT_FACTOR else []
     return " and ".join([*said, *(["with the other sign"] if factor < 0 else [])])
 
 
 def _what(factor: float) -> str:
-    return "sign" if -FACTOR < factor < -1 / FACTOR else "unit"
+    return "sign" if -UNIT_FACTOR < factor < -1 / UNIT_FACTOR else "unit"

@@ -8,14 +8,11 @@ from analysis.diagnosis.result.findings import BlackBox, Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
+from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import probability_text, share_text
 from analysis.wording import listed, p_text
 
 _PLACES_NAMED = 3
-_ALIKE = 1.05
-"""Errors that differ by less count as the same."""
-_CONFIRMED = 1.25
-"""Held-out error over the error on what was fitted, both in units of the noise, up to which a fit is confirmed."""
 
 
 def effect_title(effect: NamedEffect, single: bool = False) -> str:
@@ -148,13 +145,13 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     errors = f"{error_text(box.test)} of the signal on the held-out data; {physics} leaves {error_text(box.physics)}"
     if black_box_beats(box):
         return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
-    if box.physics * _ALIKE < box.test:
+    if box.physics * SAME_TO_READERS < box.test:
         return f"{fitted} {errors}. {capital(physics)} predicts better."
     return f"{fitted} {errors}: no better."
 
 
 def black_box_beats(box: BlackBox) -> bool:
-    return box.test * _ALIKE < box.physics
+    return box.test * SAME_TO_READERS < box.physics
 
 
 def share_sentence(effect: NamedEffect) -> str:
@@ -175,7 +172,7 @@ def confirmation_sentence(fit: Errors, test: Errors) -> str:
             f"({error_text(test.retuned)} of the signal against {error_text(test.after)})."
         )
     there, here = test.after / test.noise, fit.after / fit.noise
-    if there > _CONFIRMED * max(here, 1.0):
+    if there > FIT_CONFIRMED * max(here, 1.0):
         return (
             f"The held-out data confirm this only in part: {times_text(there)} the noise is left there, "
             f"{times_text(here)} the noise on what was fitted."
@@ -225,7 +222,7 @@ def _fall(errors: Errors, *stages: tuple[str, str]) -> str:
     before, after = getattr(errors, first), getattr(errors, last)
     if before is None or after is None:
         return "how much better it predicts held-out data is not known"
-    goes = "falls" if after * _ALIKE < before else "goes"
+    goes = "falls" if after * SAME_TO_READERS < before else "goes"
     return (
         f"the error on held-out data {goes} from {error_text(before)} of the signal ({said_first}) to "
         f"{error_text(after)} ({said_last}){_noise(errors, after)}"

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed
+from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
 from equalizer.effects.clock_drift import LARGEST_PPM
 from equalizer.effects.effect import ALL_SITES, Effect, Values
 from equalizer.effects.evidence import Evidence
@@ -12,14 +13,7 @@ from equalizer.effects.other_times import read_other_times
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-STARTS = 4
-"""At most so many values of each claim are tried."""
 CLOCK_DRIFT = "clock_drift"
-OF_A_PERIOD, MOST_TRIED = 6, 120
-"""Trials differ at the recording's end by such a part of a period of the frequency below which half of the response's
-power lies; and how many there are, either way."""
-LEAST_SHARE = 1e-3
-"""Of the misfit, that a trial must take."""
 
 
 def candidates(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
@@ -28,7 +22,7 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothe
     for effect in catalogue:
         sensed = EFFECTS_BY_NAME[effect.name].place == "sensor"
         sites = range(evidence.model.outputs if sensed else evidence.model.inputs)
-        starts = [effect.starts(evidence, site)[:STARTS] for site in sites]
+        starts = [effect.starts(evidence, site)[:STARTS_PER_CLAIM] for site in sites]
         if "one" in effect.sites or len(sites) == 1:
             found += [claimed(Claim(effect, "one", (site,)), [values]) for site in sites for values in starts[site]]
         if len(sites) > 1:
@@ -38,7 +32,7 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothe
 
 
 def _all(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:
-    starts = effect.starts(evidence, ALL_SITES)[:STARTS] if "all" in effect.sites else ()
+    starts = effect.starts(evidence, ALL_SITES)[:STARTS_PER_CLAIM] if "all" in effect.sites else ()
     return [claimed(Claim(effect, "all", sites), [values]) for values in starts]
 
 
@@ -75,8 +69,8 @@ def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tup
 def _best_drift(evidence: Evidence) -> float:
     """0 where nothing is better than no drift."""
     used, noise = evidence.used > 0, evidence.noise
-    n, step = len(used), _middle_period(evidence) / OF_A_PERIOD
-    furthest = min(int(1e-6 * LARGEST_PPM * n / step), MOST_TRIED)
+    n, step = len(used), _middle_period(evidence) / CLOCK_TRIALS_PER_PERIOD
+    furthest = min(int(1e-6 * LARGEST_PPM * n / step), MOST_CLOCK_TRIALS)
     tried = 1e6 * step / n * np.arange(-furthest, furthest + 1)
 
     def left(ppm: float) -> float:
@@ -85,7 +79,7 @@ def _best_drift(evidence: Evidence) -> float:
 
     misfits = [left(float(ppm)) for ppm in tried]
     best = int(np.argmin(misfits))
-    return float(tried[best]) if misfits[best] < (1 - LEAST_SHARE) * misfits[furthest] else 0.0
+    return float(tried[best]) if misfits[best] < (1 - CLOCK_LEAST_SHARE) * misfits[furthest] else 0.0
 
 
 def _middle_period(evidence: Evidence) -> float:

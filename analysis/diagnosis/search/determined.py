@@ -7,18 +7,14 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Number
 from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.result.named_effects import BESIDE_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.rivalry import Arena, Contender, sensitivity_at
 from analysis.diagnosis.search.without_step import without_step
+from analysis.diagnosis.settings import INTERVAL_FACTOR, REPLACEMENTS_TRIED, UNDETERMINED_REACH
 from analysis.diagnosis.types import Patience
 from equalizer.signals.signal import FloatArray
 
-UNDETERMINED = 5.0
-"""An interval that reaches so many times as far as the number is from none. On the bank from 93000 on, main numbers of
-right names reached 4.5 times at most, those of eight wrong ones 6 to 27 000 times."""
-MOST_TRIED = 2
 _ABSENT = 1e-9
 
 
@@ -53,7 +49,7 @@ def _instead(arena: Arena, found: Explanation) -> Explanation | None:
     best = found.rounds[0][0]
     others = tuple(one for one in found.rounds[0] if _name(one) != _name(best))
     as_good = {_name(one): one for one in reversed(others) if both_stand(best, one)}
-    for other in sorted(as_good.values(), key=lambda one: one.standing.chosen_by)[:MOST_TRIED]:
+    for other in sorted(as_good.values(), key=lambda one: one.standing.chosen_by)[:REPLACEMENTS_TRIED]:
         rest = tuple(one for one in others if one is not other)
         instead = replace(found, after=arena.confirmed(other), rounds=((other, *rest),), steps=(other,))
         if not any(_open(arena, instead)):
@@ -84,6 +80,6 @@ def _open(arena: Arena, found: Explanation) -> Iterator[bool]:
 
 def _is_open(number: Number, at: float, error: float) -> bool:
     value, none = number.value(at), number.parameter.none or 0.0
-    reach = 1.96 * BESIDE_NOISE * abs(number.value(at + error) - value)
+    reach = 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value)
     away = abs(value - none)
-    return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= UNDETERMINED * away
+    return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= UNDETERMINED_REACH * away

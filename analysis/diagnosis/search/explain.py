@@ -15,22 +15,12 @@ from analysis.diagnosis.search.patience import OutOfPatienceError, always, impat
 from analysis.diagnosis.search.rivalry import Arena, Contender, contest, refine, sensitivity_at
 from analysis.diagnosis.search.same_within_errors import excess
 from analysis.diagnosis.search.screening import screen
+from analysis.diagnosis.settings import ADDED_GAIN, ADDED_SHARE, MOST_EFFECTS, NOISE_ALONE, SEALED_SURPRISE, SEARCH_ON
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
 RETUNING_ROUNDS = 4
-MOST_EFFECTS = 3
-CLEAN = 1.05
-"""Errors of so many times the noise, in the worst channel, count as noise alone;"""
-SURPRISING = 1.15
-"""or, on the sealed samples, as a sign that re-tuning hid something where it was fitted;"""
-MORE = 1.12
-"""and of so many, as no reason to look for a further effect: laws of real physics are never exact."""
-WORTHWHILE = 0.15
-"""Share of what is left above the noise that an effect must take to be added,"""
-NOTICED = 0.003
-"""and so much in mean log error power."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +67,7 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
     retuned = _retuned_from(arena, before)
     base = arena.contender(retuned)
     confirmed = arena.confirmed(base)
-    surprised = bool(np.nanmax(confirmed.standing.test, initial=0.0) > SURPRISING)
+    surprised = bool(np.nanmax(confirmed.standing.test, initial=0.0) > SEALED_SURPRISE)
     rounds: list[tuple[Contender, ...]] = []
     steps: list[Contender] = []
     barred = ""
@@ -87,11 +77,11 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
         rounds.append((base,))
         steps.append(base)
     surprised |= arena.sound is not None
-    more = MORE * (1.0 if arena.sound is None else arena.sound.beyond)
+    more = SEARCH_ON * (1.0 if arena.sound is None else arena.sound.beyond)
     while (
         not arena.certain
         and len(rounds) < MOST_EFFECTS
-        and (base.standing.seen > (more if rounds else CLEAN) or (surprised and not rounds))
+        and (base.standing.seen > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
     ):
         step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
@@ -162,9 +152,9 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
 def worthwhile(base: Contender, better: Contender) -> bool:
     """Where only the worst channel is above the noise, and not their mean, it must come down by half of that."""
     gained, over = base.standing.chosen_by - better.standing.chosen_by, np.log(base.standing.seen)
-    if excess(base) == 0 and over > np.log(CLEAN) and np.log(better.standing.seen) > over / 2:
+    if excess(base) == 0 and over > np.log(NOISE_ALONE) and np.log(better.standing.seen) > over / 2:
         return False
-    return gained > max(WORTHWHILE * excess(base), NOTICED)
+    return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)
 
 
 _COUNTED = ("first", "second", "third")

@@ -21,28 +21,26 @@ from analysis.diagnosis.errors.shaken_axis import shaken_along
 from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.rivalry import Arena, Contender
+from analysis.diagnosis.settings import (
+    IMPACTS_AS_GOOD,
+    IMPACTS_CALM_SPREAD,
+    IMPACTS_ERROR,
+    IMPACTS_LEAST_SPREAD,
+    IMPACTS_SHARE,
+    PEAKED_KURTOSIS,
+    VARIES_ERROR,
+)
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
-LEAST_CHANCE = 0.05
-"""Rms of the logarithm of an amplitude that counts as none: no simulation foresees it better."""
 APART, COURSES = 1e-9, 4
 """What courses of one hypothesis differ by at first, in the logarithm of a number; and how many there are."""
-CALM = 0.01
-"""What chance may do to a band that the model's own numbers are learnt from."""
-TAKEN, NEAR = 0.6, 3.0
-"""Least share of the linear model's misfit that is taken away, and most times chance that is left, on average over the
-channels, of what is chosen by and of what was sealed."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Of a gap, over that which is guessed."""
 FIRST_ROUNDS, ROUNDS = 5, 3
 RIVAL = "loose_joint"
-VARIES = 3.0
-"""Rms between periods, over the noise."""
-PEAKED = 10.0
-"""Kurtosis of what is left, where nothing repeats; 3 for noise."""
 
 
 def rattling(
@@ -97,7 +95,7 @@ def _with_chance(view: View, at: Foreseen) -> View:
         return view.predicted(at.deviations, _apart(at.hypothesis, number))
 
     spread = np.std(np.array(list(view.map_(course, range(COURSES)))), axis=0, ddof=1)
-    calm = spread < CALM
+    calm = spread < IMPACTS_CALM_SPREAD
     linear = view.predicted(at.deviations, NOTHING)
     ways = np.eye(len(at.deviations))
 
@@ -162,7 +160,7 @@ def _court(arena: Arena, best: Foreseen) -> _Court:
     one, other = (np.asarray(each) for each in arena.map_(course, range(2)))
     apart = power.misfits(one - other)
     chance = np.fmax(np.fmax(apart.fit, apart.choose), apart.test)
-    return _Court(arena, power, np.fmax(chance, LEAST_CHANCE))
+    return _Court(arena, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
 
 def _convincing(named: Contender, retuned: Contender) -> bool:
@@ -171,12 +169,12 @@ def _convincing(named: Contender, retuned: Contender) -> bool:
         for part in ("choose", "test")
         if np.isfinite(getattr(named.standing, part)).any()
     ]
-    return all(_whole(left) <= (1 - TAKEN) * _whole(of) and _whole(left) <= NEAR for of, left in pairs)
+    return all(_whole(left) <= (1 - IMPACTS_SHARE) * _whole(of) and _whole(left) <= IMPACTS_ERROR for of, left in pairs)
 
 
 def _as_good(rival: Contender, named: Contender) -> bool:
     ways = [(getattr(one.standing, part) for one in (rival, named)) for part in ("choose", "test")]
-    return all(_whole(other) <= 1.1 * _whole(own) for other, own in ways if np.isfinite(other).any())
+    return all(_whole(other) <= IMPACTS_AS_GOOD * _whole(own) for other, own in ways if np.isfinite(other).any())
 
 
 def _whole(times: FloatArray) -> float:
@@ -194,8 +192,8 @@ def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) ->
         return False
     left = left - left.mean(axis=0)
     power = np.mean(left**2, axis=0)
-    return bool(np.any(np.mean(left**4, axis=0) > PEAKED * np.maximum(power, np.finfo(float).tiny) ** 2))
+    return bool(np.any(np.mean(left**4, axis=0) > PEAKED_KURTOSIS * np.maximum(power, np.finfo(float).tiny) ** 2))
 
 
 def _varies(noise: ChannelNoise) -> bool:
-    return any(bool(np.any(one.variance > (VARIES * noise.rms) ** 2)) for one in noise.segments)
+    return any(bool(np.any(one.variance > (VARIES_ERROR * noise.rms) ** 2)) for one in noise.segments)

@@ -16,6 +16,7 @@ from analysis.diagnosis.localisation.mismatch_maps import cells_of
 from analysis.diagnosis.search.explain import retuned_alone
 from analysis.diagnosis.search.rivalry import Arena, Contender
 from analysis.diagnosis.search.sound_recordings import SoundRecordings, sound_recording
+from analysis.diagnosis.settings import LEARNED_TOO_MUCH
 from analysis.diagnosis.types import Mapper, Progress
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -25,8 +26,6 @@ from equalizer.signals.signal import FloatArray
 LEARNING = "learning from the clean recordings"
 BEGUN = 0.02
 """Of a diagnosis, that is done then."""
-MUCH = 0.3
-"""Share of the signal from which what a sound device differs by hides too much."""
 
 
 class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
@@ -165,6 +164,6 @@ def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
         "of it where in frequency more of it lies. Named is only what explains more of what is diagnosed than "
         f"{floor.beyond:.2g} times what it explains of a clean recording."
     )
-    if max(floor.channels) <= MUCH:
+    if max(floor.channels) <= LEARNED_TOO_MUCH:
         return said
     return f"{said} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."

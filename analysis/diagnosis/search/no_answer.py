@@ -6,23 +6,17 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.standing import rms_over
 from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.settings import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-NO_BETTER = 0.9
-"""Share of its signal that an explanation may leave in every channel: also where noise is no less, for then nothing
-can be told by name."""
-FAR = 3.0
-"""Times the noise."""
-SILENT = 0.3
-"""Share of the signal below which a prediction is none."""
 _TINY = 1e-300
 
 
 def foresees_nothing(measure: ErrorMeasure, contender: Contender) -> bool:
     """On the samples that decisions may see: in no channel is it better than no prediction."""
-    return bool((_left(measure, contender.fitted) >= NO_BETTER * _signal(measure)).all())
+    return bool((_left(measure, contender.fitted) >= NO_PREDICTION_SHARE * _signal(measure)).all())
 
 
 def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
@@ -32,7 +26,7 @@ def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
     most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
     claim = fitted.hypothesis.claims[-1]
     sensed = claim.sites if EFFECTS_BY_NAME[claim.effect.name].place == "sensor" else ()
-    nothing = left >= np.maximum(NO_BETTER * _signal(measure), FAR * measure.noise)
+    nothing = left >= np.maximum(NO_PREDICTION_SHARE * _signal(measure), NO_PREDICTION_ERROR * measure.noise)
     return bool(nothing[most] or any(nothing[site] for site in sensed if site < len(nothing)))
 
 

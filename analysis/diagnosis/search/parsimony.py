@@ -5,16 +5,7 @@ from collections.abc import Sequence
 from analysis.diagnosis.search.families import DRY_FRICTION
 from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
-
-REFINED = 0.006
-"""Mean log error power that a refined law must gain over the plain one that it contains,"""
-REFINED_SHARE = 0.35
-"""or as a share of what the plain law leaves above the noise: where both are wrong, the richer one errs less;"""
-RUBBED_SHARE = 0.7
-"""(dry friction: what happens while it turns round differs from device to device, and any further number takes some of
-it);"""
-HALVED = 0.7
-"""but never more than this, half of the power, which no plainness makes up for."""
+from analysis.diagnosis.settings import REFINED_FRICTION_SHARE, REFINED_GAIN, REFINED_MOST_GAIN, REFINED_SHARE
 
 
 def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
@@ -58,5 +49,5 @@ def _good_enough(plain: Contender, refined: Contender) -> bool:
         return inseparable(refined, plain)
     gained = plain.standing.chosen_by - refined.standing.chosen_by
     rubs = plain.fitted.hypothesis.claims[-1].effect.name in DRY_FRICTION
-    share = RUBBED_SHARE if rubs else REFINED_SHARE
-    return gained <= max(REFINED, min(share * excess(plain), HALVED))
+    share = REFINED_FRICTION_SHARE if rubs else REFINED_SHARE
+    return gained <= max(REFINED_GAIN, min(share * excess(plain), REFINED_MOST_GAIN))

@@ -7,12 +7,8 @@ from analysis.diagnosis.search.explain import Explanation, worthwhile
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.verdict import as_good_as_noise, shares_taken, worth_naming
 from analysis.diagnosis.search.without_step import without_step
+from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Patience
-
-LITTLE = 0.1
-"""Share of the mismatch that a further effect must take where more than noise is left with it, too: no law is exact,
-and in what a strong one leaves, any number beside it finds a little. On the bank from 93000 on, what took less was
-wrong in four of five, and seconds that were right a fifth or more."""
 
 
 def pruned(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
@@ -35,7 +31,7 @@ def _without_former(arena: Arena, found: Explanation) -> Explanation:
 
 def _without_little(arena: Arena, found: Explanation) -> Explanation:
     while len(found.steps) > 1 and not as_good_as_noise(found):
-        if shares_taken(found.retuned, found.steps)[-1] >= LITTLE:
+        if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
             break
         fewer = without_step(arena, found, len(found.steps) - 1)
         if not worth_naming(fewer):

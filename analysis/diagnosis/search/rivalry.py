@@ -12,27 +12,24 @@ from analysis.diagnosis.errors.standing import Standing, standing
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.screening import Screened
 from analysis.diagnosis.search.sound_recordings import SoundRecordings
+from analysis.diagnosis.settings import (
+    LEAST_FITTED,
+    MOST_FITTED,
+    MOST_REFINED,
+    NO_SECOND_START,
+    RICHER_LAW_SQUARES,
+    WORTH_FITTING,
+    WORTH_REFINING,
+)
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
-MOST_FITTED, LEAST_FITTED = 10, 4
-"""Hypotheses that get a first fit."""
-WORTH_FITTING = 0.2
-"""Share of the best one's foreseen gain that another must foresee."""
-MOST_REFINED = 3
-"""And a second one, with everything recomputed where they stand,"""
-WORTH_REFINING = 0.5
-"""where they gained such a share of what the best one gained."""
 FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
 MOST_REFRESHED, SETTLED, SETTLED_FAR, STALE = 4, 0.0005, 0.01, 0.5
 """What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
 noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
 deviations since, for it costs a simulation for each."""
-NEARLY_CLEAN = 1.08
-"""Errors of so many times the noise need no second start."""
-ALIKE = 4.0
-"""Squares of the noise, in sum, that more numbers must gain over plain ones that do almost the same."""
 FELT = 0.06
 """Change of an axis's channel, as a share of the largest that any number makes there."""
 
@@ -109,7 +106,7 @@ def refine(arena: Arena, fitted: Fitted) -> Fitted:
     calibration as it was, for what re-tuning had to hide may have taken it far away."""
     here, known = _refined_from(arena, fitted, None)
     here, known = _of_alike(arena, here, known)
-    if arena.contender(here).standing.seen <= NEARLY_CLEAN:
+    if arena.contender(here).standing.seen <= NO_SECOND_START:
         return here
     calibrated = evaluated(arena.measure, arena.tuning, np.zeros_like(here.deviations), here.hypothesis)
     there, _ = _refined_from(arena, calibrated, known)
@@ -125,7 +122,7 @@ def _of_alike(arena: Arena, fitted: Fitted, known: Sensitivity) -> tuple[Fitted,
     for other in alike(best[0].hypothesis):
         plain = evaluated(arena.measure, arena.tuning, best[0].deviations, other)
         samples = len(fitting(arena.measure, plain.residuals))
-        best = (plain, best[1]) if plain.cost < best[0].cost + ALIKE / samples else best
+        best = (plain, best[1]) if plain.cost < best[0].cost + RICHER_LAW_SQUARES / samples else best
     return best
 
 
@@ -154,7 +151,7 @@ def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tu
         better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
         settled = better.cost > (1 - max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))) * best.cost
         best = better
-        if (complete and settled) or (arena.contender(best).standing.seen <= NEARLY_CLEAN and settled):
+        if (complete and settled) or (arena.contender(best).standing.seen <= NO_SECOND_START and settled):
             break
         if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
             there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=True)

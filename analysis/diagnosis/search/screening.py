@@ -7,12 +7,10 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, together
-from analysis.diagnosis.errors.output_error import BOUND, Fitted, Sensitivity, bounded_step, fitting
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, bounded_step, fitting
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.settings import RETUNING_BOUND, STRONGEST_START, WEAKEST_START
 from analysis.diagnosis.types import Mapper
-
-WEAKEST, STRONGEST = 0.1, 6.0
-"""Factors by which a start's strength may be wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +52,8 @@ def _reached(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.nd
     cross = known.columns @ change
     products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
     pull = np.concatenate([known.columns @ errors - base.deviations, [float(change @ errors)]])
-    low = np.concatenate([-BOUND - base.deviations, [WEAKEST]])
-    high = np.concatenate([BOUND - base.deviations, [STRONGEST]])
+    low = np.concatenate([-RETUNING_BOUND - base.deviations, [WEAKEST_START]])
+    high = np.concatenate([RETUNING_BOUND - base.deviations, [STRONGEST_START]])
     step = bounded_step(products, pull, low, high)
     gain = 2 * float(step @ pull) - float(step @ products @ step)
     return base.cost - gain / len(errors)

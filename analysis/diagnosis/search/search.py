@@ -12,13 +12,10 @@ from analysis.diagnosis.search.patience import OUT_OF_TIME, always
 from analysis.diagnosis.search.prune import pruned
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.verdict import Judgement, judge
+from analysis.diagnosis.settings import SEALED_ALONE_ERROR, SEALED_ALONE_TIMES
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 
-SHOWN = 1.25
-"""Errors of so many times the noise on sealed samples cannot be passed over,"""
-MORE_THAN_SEEN = 1.5
-"""and so many times larger than on all others, they come from something that the others do not hold."""
 OPENED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
     "such stretch was used to find it, the second half to confirm it."
@@ -76,4 +73,4 @@ def _judged(arena: Arena, found: Explanation) -> Judgement:
 
 def _sealed_alone(found: Explanation) -> bool:
     shown = float(np.nanmax(found.retuned.standing.test, initial=0.0))
-    return shown > SHOWN and shown > MORE_THAN_SEEN * found.retuned.standing.seen
+    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * found.retuned.standing.seen

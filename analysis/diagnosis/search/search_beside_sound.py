@@ -6,12 +6,13 @@ from dataclasses import replace
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.standing import standing
-from analysis.diagnosis.search.explain import CLEAN, Explanation
+from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import Learned, floored
 from analysis.diagnosis.search.no_answer import foresees_nothing
 from analysis.diagnosis.search.rivalry import Arena, Contender, refine
 from analysis.diagnosis.search.search import Searched, searched
-from analysis.diagnosis.search.verdict import EXPLAINED, Judgement
+from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 
@@ -69,10 +70,12 @@ def _by_contrast(
 def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
     """How far the device is from sound is judged by more than it differed by then: days differ, too."""
     if named:
-        return Judgement("explained" if found.after.standing.seen <= beyond * EXPLAINED else "partly_explained", True)
-    if found.before.standing.seen <= beyond * CLEAN:
+        return Judgement(
+            "explained" if found.after.standing.seen <= beyond * EXPLAINED_ERROR else "partly_explained", True
+        )
+    if found.before.standing.seen <= beyond * NOISE_ALONE:
         return Judgement("no_mismatch", False)
-    return Judgement("parameters" if found.retuned.standing.seen <= beyond * CLEAN else "unexplained", False)
+    return Judgement("parameters" if found.retuned.standing.seen <= beyond * NOISE_ALONE else "unexplained", False)
 
 
 def _by(arena: Arena, found: Explanation) -> Explanation:

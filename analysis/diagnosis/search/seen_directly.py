@@ -7,20 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, claimed
+from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.lattice import lattice_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-WIDER = 1.5
-"""Times a sound device's steps, from which on steps are others."""
-LEAST = 8
-"""Readings at a limit, or there twice, that are no chance;"""
-USUAL = 3.0
-"""and times what a sound device has of them,"""
-SURELY = 5.0
-"""by so many standard deviations of such a count."""
 ALIKE = 1e-3
 """Share of a step by which those of channels may differ that have the same."""
 SAME = 1e-9
@@ -60,7 +53,7 @@ def _steps(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     for c in range(new.shape[1]):
         step = lattice_step(new[:, c])
         usual = max((lattice_step(one[:, c]) or 0.0 for one in sound), default=0.0)
-        if step is not None and step > WIDER * usual:
+        if step is not None and step > STEP_FACTOR * usual:
             found[c] = step
     alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
     return _where(found, alike and len(found) == new.shape[1], new.shape[1], "step")
@@ -109,7 +102,11 @@ def _begun(repeated: Mask) -> Mask:
 
 
 def _unusual(count: int, usual: float) -> bool:
-    return count >= LEAST and count > USUAL * usual and count > usual + SURELY * np.sqrt(usual)
+    return (
+        count >= READINGS_LEAST
+        and count > READINGS_FACTOR * usual
+        and count > usual + READINGS_DEVIATIONS * np.sqrt(usual)
+    )
 
 
 def _where(found: Mapping[int, float], everywhere: bool, width: int, name: str) -> Found | None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.data.answering import SURE, answer
+from analysis.diagnosis.data.answering import answer
+from analysis.diagnosis.settings import ANSWER_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -31,7 +32,7 @@ def test_noise_of_any_colour_answers_nothing(colour, seed):
         "narrow": lfilter([1.0], [1.0, -1.8, 0.98], white, axis=0),
     }[colour]
     sure = answer([recording(rng.standard_normal((12_000, 3)), noise)])
-    assert sure is not None and sure < SURE
+    assert sure is not None and sure < ANSWER_DEVIATIONS
 
 
 def test_one_channel_that_answers_weakly_is_enough():
@@ -39,7 +40,7 @@ def test_one_channel_that_answers_weakly_is_enough():
     command, response = rng.standard_normal((12_000, 3)), rng.standard_normal((12_000, 3))
     response[:, 1] += 0.3 * command[:, 2]
     sure = answer([recording(command, response)])
-    assert sure is not None and sure > 2 * SURE
+    assert sure is not None and sure > 2 * ANSWER_DEVIATIONS
 
 
 def test_a_recording_too_short_for_it_is_not_judged():
@@ -53,11 +54,11 @@ def test_gaps_in_the_response_are_left_out():
     response = 2 * command
     response[3000:5000] = np.nan
     sure = answer([recording(command, response)])
-    assert sure is not None and sure > SURE
+    assert sure is not None and sure > ANSWER_DEVIATIONS
 
 
 def test_every_labelled_case_answers_its_commands(shared):
     from study.store.recording_file import read_recording
 
     sure = answer([read_recording(shared / "cases" / "open-05.h5")])
-    assert sure is not None and sure > 10 * SURE
+    assert sure is not None and sure > 10 * ANSWER_DEVIATIONS

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import FLOOR, measured_of, noise_in_units, observed, roles
+from analysis.diagnosis.data.observed import measured_of, noise_in_units, observed, roles
+from analysis.diagnosis.settings import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -107,5 +108,5 @@ def test_decisions_do_not_reach_the_sealed_samples():
 
 def test_errors_are_counted_in_noise_and_in_a_share_of_the_signal():
     loud = np.full((100, 1), 10.0)
-    assert noise_in_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * FLOOR))
-    assert noise_in_units(loud, np.array([0.0])) == pytest.approx(10 * FLOOR)
+    assert noise_in_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * MODEL_FLOOR))
+    assert noise_in_units(loud, np.array([0.0])) == pytest.approx(10 * MODEL_FLOOR)

@@ -5,7 +5,8 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, alike, claimed, together, without_claim
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
-from analysis.diagnosis.search.candidates import STARTS, candidates
+from analysis.diagnosis.search.candidates import candidates
+from analysis.diagnosis.settings import STARTS_PER_CLAIM
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -67,7 +68,7 @@ def evidence_of(arena):
 def test_friction_in_the_data_suggests_friction_near_its_level(arena_of):
     rubs = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),)
     found = candidates([EFFECTS["coulomb_friction"]], evidence_of(arena_of(rubs)))
-    assert 1 <= len(found) <= STARTS
+    assert 1 <= len(found) <= STARTS_PER_CLAIM
     assert found[0].placed()[0].values["level"] == pytest.approx(0.2, rel=0.3)
 
 

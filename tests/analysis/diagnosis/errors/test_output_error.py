@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
-from analysis.diagnosis.errors.output_error import BOUND, bounded_step, evaluated, fit, fitting, sensitivity
+from analysis.diagnosis.errors.output_error import bounded_step, evaluated, fit, fitting, sensitivity
 from analysis.diagnosis.search.rivalry import refine
+from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -91,8 +92,8 @@ def test_numbers_stay_within_what_calibration_and_physics_allow(arena_of):
     truth = arena_of()
     far = off(truth.tuning, mass_fx=-9.0)
     found = recovered(arena_of(given=truth.tuning.tuned(far)), NOTHING)
-    assert found.deviations[0] == pytest.approx(BOUND)
-    assert np.abs(found.deviations).max() <= BOUND
+    assert found.deviations[0] == pytest.approx(RETUNING_BOUND)
+    assert np.abs(found.deviations).max() <= RETUNING_BOUND
 
 
 def test_sealed_samples_are_not_fitted_to(rubbing_arena):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from analysis.diagnosis.errors.tuning import DAMPING_PER_MODES, UNSTATED_SHARE, tuning_of
+from analysis.diagnosis.errors.tuning import DAMPING_PER_MODES, tuning_of
+from analysis.diagnosis.settings import UNSTATED_SHARE
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 

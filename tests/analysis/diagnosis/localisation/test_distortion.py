@@ -7,7 +7,8 @@ import pytest
 from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
 from analysis.diagnosis.data.noise_floor import noise_floor
 from analysis.diagnosis.localisation.distortion import distortion
-from analysis.diagnosis.localisation.level_trends import PRESENT, level_trends
+from analysis.diagnosis.localisation.level_trends import level_trends
+from analysis.diagnosis.settings import DISTORTION_P
 
 CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 
@@ -41,9 +42,9 @@ def test_invented_odd_distortion_is_recovered_with_its_size(device):
         )
         inside = silent[(silent > 3) & (silent < 199)]
         expected = np.sqrt(2 * np.mean(np.abs(extra[inside]) ** 2) * 128)
-        assert cell.p_value < PRESENT
+        assert cell.p_value < DISTORTION_P
         assert cell.rms == pytest.approx(expected, rel=0.1)
-    assert all(c.p_value > PRESENT for c in cells if c.kind in ("even", "varying"))
+    assert all(c.p_value > DISTORTION_P for c in cells if c.kind in ("even", "varying"))
 
 
 def test_odd_distortion_that_rises_is_told_from_friction_that_falls(device):

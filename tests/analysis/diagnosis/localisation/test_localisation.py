@@ -3,10 +3,10 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorRule
-from analysis.diagnosis.localisation.mismatch_cells import LEVEL
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import StateRegion
 from analysis.diagnosis.result.localisation_words import entry_sentence, localisation_sentences, states_sentence
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 ALONG_X = EntryScore("a force along x", "mechanism", "x", 1.0, 0.9, 1.0, ())
 ALONG_ALL = EntryScore("forces along several axes", "mechanism", None, 0.9, 0.95, 1.0, ())
@@ -22,7 +22,7 @@ def test_friction_is_a_force_along_its_axis_tied_to_the_sign_of_velocity(frictio
     for stage in ("before", "retuned"):
         worst = local.states[stage][0]
         assert (worst.input, worst.region.words) == ("fx", "by the sign of v")
-        assert worst.region.p_value <= LEVEL
+        assert worst.region.p_value <= FALSE_DISCOVERY_RATE
     assert not local.states["after"]
 
 

@@ -10,7 +10,8 @@ from analysis.diagnosis.errors.hypothesis import Claim, claimed
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.experiment_menu import experiment_menu
-from analysis.diagnosis.result.next_experiment import TELLING, Bench, as_document, foresee
+from analysis.diagnosis.result.next_experiment import Bench, as_document, foresee
+from analysis.diagnosis.settings import TELLING_GAIN
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import driven_axes
@@ -70,7 +71,7 @@ def test_dry_friction_and_presliding_are_told_apart_by_the_proposed_recording(fr
     truth, other = (np.hstack([one.response, one.position]) for one in played)
     measured = truth + NOISE * np.random.default_rng(1).standard_normal(truth.shape)
     cost = [float(np.sum(((measured - one) / NOISE) ** 2)) for one in (truth, other)]
-    assert cost[1] - cost[0] > 2 * TELLING
+    assert cost[1] - cost[0] > 2 * TELLING_GAIN
 
 
 def test_what_tells_most_for_its_cost_comes_first(friction):
@@ -118,7 +119,7 @@ def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     size = len(bench.tuning.names) + 1
     first, *others = foresee(bench, named, rival, np.diag([1e9] * size), menu)
     assert "strapped to the handle" in first.experiment.words
-    assert first.gain > TELLING
+    assert first.gain > TELLING_GAIN
     assert all(one.gain < first.gain / 3 for one in others)
 
 
@@ -150,4 +151,4 @@ def test_a_cheap_recording_that_tells_too_little_stands_behind_a_dear_one_that_t
     dear = replace(weight, minutes=1e6)
     first, second = foresee(bench, named, rival, known, (replace(sweep, commands=sweep.commands / 50), dear))
     assert first.experiment is dear
-    assert second.gain < TELLING < first.gain
+    assert second.gain < TELLING_GAIN < first.gain

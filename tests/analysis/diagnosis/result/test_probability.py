@@ -2,7 +2,8 @@
 
 import pytest
 
-from analysis.diagnosis.result.named_effects import LEAST, MOST, elsewhere, probabilities
+from analysis.diagnosis.result.named_effects import elsewhere, probabilities
+from analysis.diagnosis.settings import ELSEWHERE_LEAST, ELSEWHERE_MOST
 
 
 def test_nobody_is_likely_among_nobody():
@@ -10,7 +11,7 @@ def test_nobody_is_likely_among_nobody():
 
 
 def test_what_stands_alone_is_likely_but_not_certain(standing_at):
-    assert probabilities([standing_at(1.0, "force_gain")], 1.0) == pytest.approx([1 - LEAST])
+    assert probabilities([standing_at(1.0, "force_gain")], 1.0) == pytest.approx([1 - ELSEWHERE_LEAST])
 
 
 def test_the_better_one_is_the_likelier_one(standing_at):
@@ -18,12 +19,12 @@ def test_the_better_one_is_the_likelier_one(standing_at):
     chances = probabilities([standing_at(*one) for one in zip((1.0, 1.0005, 1.5), names, strict=True)], 1.0)
     assert chances[0] > chances[1] > chances[2]
     assert chances[2] < 1e-6
-    assert sum(chances) == pytest.approx(1 - LEAST)
+    assert sum(chances) == pytest.approx(1 - ELSEWHERE_LEAST)
 
 
 def test_equals_share(standing_at):
     one, other = probabilities([standing_at(2.0, "force_gain"), standing_at(2.0, "added_mass")], 1.0)
-    assert one == pytest.approx(other) == pytest.approx((1 - LEAST) / 2)
+    assert one == pytest.approx(other) == pytest.approx((1 - ELSEWHERE_LEAST) / 2)
 
 
 def test_what_is_preferred_for_its_plainness_is_no_less_likely_than_what_errs_a_little_less(standing_at):
@@ -33,11 +34,11 @@ def test_what_is_preferred_for_its_plainness_is_no_less_likely_than_what_errs_a_
 
 def test_what_only_refines_the_named_law_takes_nothing_from_it(standing_at):
     rubs, richer = standing_at(1.0004, "coulomb_friction"), standing_at(1.0, "stribeck_friction")
-    assert probabilities([rubs, richer], 1.0) == pytest.approx([1 - LEAST, 0.0])
+    assert probabilities([rubs, richer], 1.0) == pytest.approx([1 - ELSEWHERE_LEAST, 0.0])
 
 
 def test_the_more_an_explanation_leaves_the_less_likely_is_what_it_names(standing_at):
     chances = [probabilities([standing_at(left, "force_gain")], left)[0] for left in (1.0, 1.05, 1.2, 2.0, 20.0)]
     assert chances == sorted(chances, reverse=True)
     assert chances[1] > 0.9 and chances[-1] < 0.25
-    assert LEAST == elsewhere(0.9) < elsewhere(1e6) <= MOST
+    assert ELSEWHERE_LEAST == elsewhere(0.9) < elsewhere(1e6) <= ELSEWHERE_MOST

@@ -6,10 +6,11 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
-from analysis.diagnosis.search.determined import UNDETERMINED, determined
+from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.patience import always
 from analysis.diagnosis.search.search import searched
+from analysis.diagnosis.settings import UNDETERMINED_REACH
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -84,7 +85,7 @@ def test_what_has_no_number_that_could_be_none_is_not_judged(rubbing):
 
 
 def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
-    monkeypatch.setattr("analysis.diagnosis.search.determined.UNDETERMINED", UNDETERMINED * 1e-6)
+    monkeypatch.setattr("analysis.diagnosis.search.determined.UNDETERMINED_REACH", UNDETERMINED_REACH * 1e-6)
     seen = searched(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
     assert (seen.judged.verdict, seen.judged.named) == ("unexplained", False)
     assert seen.remarks == (

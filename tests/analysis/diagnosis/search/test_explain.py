@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.result.named_effects import EXACT
-from analysis.diagnosis.search.explain import NOTICED, worthwhile
+from analysis.diagnosis.search.explain import worthwhile
 from analysis.diagnosis.search.search import ONLY_REFINES
+from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.signals.signal import Signal
@@ -53,7 +53,7 @@ def test_an_interval_holds_the_truth_and_claims_no_more_than_a_law_is_exact_to(f
     estimate = found.diagnosis.effects[0].parameters["level"]
     low, high = estimate.ci95
     assert low < diagnosed.FRICTION_N < high
-    assert 2 * EXACT * estimate.value <= high - low < 0.1 * estimate.value
+    assert 2 * INTERVAL_SHARE * estimate.value <= high - low < 0.1 * estimate.value
 
 
 def test_the_same_recording_gives_the_same_answer(found, rubs, diagnosed):
@@ -161,5 +161,5 @@ def test_an_effect_that_leaves_the_one_bad_channel_as_bad_is_not_added(standing_
     """Three channels whose noise was taken for larger than it is make up for the worst one."""
     base = standing_at([1.16, 0.9, 0.9, 0.95])
     better = standing_at([left, 0.9, 0.9, 0.94], "quadratic_damping")
-    assert base.standing.chosen_by - better.standing.chosen_by > NOTICED
+    assert base.standing.chosen_by - better.standing.chosen_by > ADDED_GAIN
     assert worthwhile(base, better) is worth

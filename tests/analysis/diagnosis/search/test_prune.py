@@ -10,8 +10,9 @@ from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.search.candidates import candidates
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.patience import always
-from analysis.diagnosis.search.prune import LITTLE, pruned
+from analysis.diagnosis.search.prune import pruned
 from analysis.diagnosis.search.search import searched
+from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -85,7 +86,7 @@ def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(rubbin
     alone = one_after_the_other(rubbing, claim("coulomb_friction", level=FRICTION_N))
     friction = alone.steps[0].fitted.hypothesis
     both = together(friction, claim("amplifier_lag", time_constant=1e-4))
-    levels = (200.0, second * 200 ** (LITTLE / 2), second)
+    levels = (200.0, second * 200 ** (LAST_EFFECT_SHARE / 2), second)
     base, first, last = (standing_at(level).standing for level in levels)
     steps = (replace(alone.steps[0], standing=first), replace(alone.steps[0], standing=last))
     steps = (steps[0], replace(steps[1], fitted=replace(steps[1].fitted, hypothesis=both)))
