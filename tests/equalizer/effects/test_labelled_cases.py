@@ -22,7 +22,15 @@ WITHIN = 0.02
 """Of the main parameter: the case's own integration is not ours."""
 
 
-@pytest.mark.parametrize("case", ["open-05", "open-06", "open-07", "open-08"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param("open-05", marks=pytest.mark.slow),
+        "open-06",
+        "open-07",
+        pytest.param("open-08", marks=pytest.mark.slow),
+    ],
+)
 def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, case):
     recording = read_recording(shared / "cases" / f"{case}.h5")
     model = read_mechanical_model(shared / "cases" / f"{case}.toml")

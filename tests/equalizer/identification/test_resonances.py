@@ -9,8 +9,9 @@ from equalizer.identification.transfer_estimate import transfer_estimate
 @pytest.fixture(scope="module")
 def found(plants, synthetic):
     """From 1 to 500 Hz, five seeds."""
+    search = ResonanceSearch(draws=60)
     return [
-        find_resonances(transfer_estimate((synthetic.sweeps(plants, 1.0, 500.0, 20.0, seed=seed),)))
+        find_resonances(transfer_estimate((synthetic.sweeps(plants, 1.0, 500.0, 20.0, seed=seed),)), search)
         for seed in range(5)
     ]
 

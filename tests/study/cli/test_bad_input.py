@@ -1,4 +1,7 @@
-"""Whatever is wrong: a named error, an exit code, what to do; never a traceback. Each in a process of its own."""
+"""Whatever is wrong: a named error, an exit code, what to do; never a traceback.
+
+In this process where that tells the same: an error without a name would leave `main` and fail the test. In a process of
+its own where streams, environment or limits are at stake, and once for each kind of refusal."""
 
 import os
 import subprocess
@@ -6,6 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from study.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[3]
 PATHS = os.pathsep.join((str(ROOT), str(ROOT / "study" / "launcher")))
@@ -22,6 +27,19 @@ def hapteq(*arguments: object, cwd: Path, stdin: str | None = "", env: dict | No
         env={**os.environ, "PYTHONPATH": PATHS, **(env or {})},
         timeout=120,
     )
+
+
+@pytest.fixture
+def refused(tmp_path, monkeypatch, capsys):
+    """Runs one command in this process, in the test's folder; returns exit code, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        said = capsys.readouterr()
+        return int(code), said.out, said.err
+
+    return call
 
 
 def broken(folder: Path, name: str, text: str) -> Path:
@@ -42,17 +60,21 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_broken_file_is_named(tmp_path, name):
+def test_a_broken_file_is_named(tmp_path, refused, name):
     file, text, command, expected = CASES[name]
     path = broken(tmp_path, file, text)
-    if command == "protocol":
-        done = hapteq("protocol", "show", path, cwd=tmp_path)
-    else:
-        done = hapteq("resume", path.parent, cwd=tmp_path)
-    assert done.returncode == 1
-    assert expected in done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stdout == ""
+    asked = ("protocol", "show", path) if command == "protocol" else ("resume", path.parent)
+    code, out, err = refused(*asked)
+    assert (code, out) == (1, "")
+    assert expected in err
+
+
+def test_a_broken_file_and_a_wrong_place_end_a_program_of_their_own_alike(tmp_path):
+    path = broken(tmp_path, "a_file", "name = = 3")
+    for asked in (("protocol", "show", path), ("protocol", "lock", "sweep", "--data", path)):
+        done = hapteq(*asked, cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -78,12 +100,12 @@ def test_a_broken_file_is_named(tmp_path, name):
     ],
     ids=" ".join,
 )
-def test_a_wrong_place_is_an_error_and_nothing_more(tmp_path, arguments):
+def test_a_wrong_place_is_an_error_and_nothing_more(tmp_path, refused, arguments):
     (tmp_path / "a_file").write_text("mine\n")
-    done = hapteq(*arguments, cwd=tmp_path)
-    assert done.returncode in (1, 2, 3)
-    assert "Traceback" not in done.stderr + done.stdout
-    assert done.stderr or done.stdout
+    code, out, err = refused(*arguments)
+    assert code in (1, 2, 3)
+    assert "Traceback" not in err + out
+    assert err or out
     assert (tmp_path / "a_file").read_text() == "mine\n"
     assert [p.name for p in tmp_path.iterdir()] == ["a_file"]
 
