@@ -31,14 +31,17 @@ def lock_of(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq
     return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq)
 
 
-def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol) -> None:
-    """Raise LockError unless `protocol` is, value by value, the one that was locked."""
+def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked: str) -> None:
+    """Raise LockError unless `protocol` is, value by value, the one that was locked.
+
+    locked: when, as the reader's clock has it.
+    """
     if protocol.name != lock.name:
         raise LockError(f"the lock is that of protocol {lock.name}, not of {protocol.name}")
     now = protocol_hash(protocol)
     if now != lock.hash:
         raise LockError(
-            f"protocol {lock.name} was locked on {lock.locked_utc} and has changed since: "
+            f"protocol {lock.name} was locked on {locked} and has changed since: "
             f"its fingerprint is {now[:12]}…, the locked one {lock.hash[:12]}…"
         )
 

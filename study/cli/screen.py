@@ -1,6 +1,7 @@
 """The screen of `study` and `resume`: started from here, and what it ends with is said here."""
 
 import os
+import shutil
 import sys
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,11 @@ def has_screen() -> bool:
 def has_keys() -> bool:
     """Whether somebody may sit at a keyboard."""
     return sys.stdin is not None and sys.stdin.isatty()
+
+
+def columns() -> int | None:
+    """Of the terminal that results go to; None where they go to a file or a pipe, whose lines are not wrapped."""
+    return shutil.get_terminal_size().columns if sys.stdout is not None and sys.stdout.isatty() else None
 
 
 def open_screen(start: "AppStart", as_json: bool) -> None:

@@ -1,14 +1,19 @@
 """`hapteq sessions`: what lies in a data folder."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.screen import columns
 from study.cli.study import DataOption
+
+if TYPE_CHECKING:
+    from study.session.archive_views import SessionLine
 
 
 def sessions(
@@ -17,9 +22,6 @@ def sessions(
     as_json: JsonOption = False,
 ) -> None:
     """List all sessions, latest first: how they stand, and how far they are."""
-    from study.local_clock import machine_zone
-    from study.session.local_time import local_time
-    from study.tui.standing_words import standing_words
     from study.workflows.list_sessions import session_lines
 
     lines = session_lines(data)
@@ -29,14 +31,32 @@ def sessions(
     if not lines:
         typer.echo(f"No sessions in {data}. hapteq study begins one, hapteq rehearse makes simulated ones.", err=True)
         return
-    longest = max(len("session"), *(len(line.name) for line in lines))
-    typer.echo(f"{'session':{longest}}  {'standing':12}  {'begun':23}  {'runs':>5}  {'answers':>7}  protocol")
-    for line in lines:
-        known, begun = line.runs > 0, local_time(line.begun_utc, machine_zone)
-        typer.echo(
-            f"{line.name:{longest}}  {standing_words(line.standing):12}  {begun:23}  "
-            f"{f'{line.runs_done}/{line.runs}' if known else '':>5}  {line.answers if known else '':>7}  "
-            f"{line.protocol}{f' ({line.observer})' if line.observer else ''}".rstrip()
+    for text in _table(lines, remarks, columns()):
+        typer.echo(text)
+
+
+def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
+    from study.local_clock import machine_zone
+    from study.session.local_time import local_column
+    from study.tui.standing_words import standing_words
+    from study.tui.text_rows import aligned_rows
+
+    offset, begun = local_column([line.begun_utc for line in lines], machine_zone)
+    header = ("session", "standing", f"begun ({offset})" if offset else "begun", "runs", "answers", "protocol")
+    rows = [
+        (
+            line.name,
+            standing_words(line.standing),
+            when,
+            f"{line.runs_done}/{line.runs}" if line.runs else "",
+            str(line.answers) if line.runs else "",
+            f"{line.protocol}{f' ({line.observer})' if line.observer else ''}",
         )
+        for line, when in zip(lines, begun, strict=True)
+    ]
+    titles, *shown = aligned_rows((header, *rows), width)
+    yield from titles
+    for line, texts in zip(lines, shown, strict=True):
+        yield from texts
         if remarks and line.remark:
-            typer.echo(f"    {line.remark}")
+            yield f"    {line.remark}"

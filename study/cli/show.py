@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.screen import columns
 from study.cli.study import DataOption
 
 if TYPE_CHECKING:
@@ -54,9 +55,9 @@ def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
 
     yield describe(view.line)
     yield ""
-    yield from aligned(view.facts)
+    yield from aligned(view.facts, columns())
     if view.thresholds:
-        yield from ("", *aligned(view.thresholds))
+        yield from ("", *aligned(view.thresholds, columns()))
     for warning in view.warnings:
         yield f"\nNote: {warning}"
     if view.staircases:
@@ -80,13 +81,15 @@ def _plot(staircase: "Staircase") -> Iterable[str]:
 def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
     from study.tui.text_rows import aligned
 
+    width = columns()
+    inside = None if width is None else width - 2
     yield view.verdict
     for title, sentences in (("Effects", view.sentences), ("Rivals, and why not", view.rivals)):
         if sentences:
             yield from ("", title, *(f"  {sentence}" for sentence in sentences))
     for title, rows in (("Fit", view.fit), ("Mismatch", view.mismatch), ("What remains", view.remainder)):
         if rows:
-            yield from ("", title, *(f"  {row}" for row in aligned(rows)))
+            yield from ("", title, *(f"  {row}" for row in aligned(rows, inside)))
     yield ""
     yield from view.notes
     if view.next_experiment:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from study.cli.screen import columns
 from study.cli.study import DataOption
 
 if TYPE_CHECKING:
@@ -81,7 +82,8 @@ def _once(folder: Path, as_json: bool) -> None:
 
     from study.devices.clock import RealClock
     from study.errors import StudyError
-    from study.tui.watch_lines import changes
+    from study.tui.text_rows import hanging
+    from study.tui.watch_lines import LABEL_CELLS, changes
     from study.workflows.watch_session import follow
 
     view = follow(folder).look(RealClock().utc())
@@ -91,7 +93,8 @@ def _once(folder: Path, as_json: bool) -> None:
         typer.echo(json.dumps(asdict(view), indent=2))
         return
     for line in changes(None, view):
-        typer.echo(line)
+        for text in hanging(line, LABEL_CELLS, columns()):
+            typer.echo(text)
 
 
 def _plain(folder: Path) -> None:

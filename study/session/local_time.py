@@ -4,7 +4,8 @@ Logs, tables and JSON keep UTC. The zone is a value from outside, because this p
 `study.local_clock.machine_zone` is what screens and commands pass.
 """
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from typing import Literal
 
@@ -36,3 +37,14 @@ def local_parts(utc: str, zone: Zone, to: Detail = "seconds") -> tuple[str, str,
         return utc, "", ""
     offset = local.strftime("%z")
     return local.date().isoformat(), local.time().isoformat(to), f"{offset[:3]}:{offset[3:5]}"
+
+
+def local_column(utcs: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
+    """Times below each other: their most frequent offset for the header, and each time, with its offset where that
+    differs, such as in the other half of the year."""
+    parts = [local_parts(utc, zone, "minutes") for utc in utcs]
+    offsets = Counter(offset for _, _, offset in parts if offset)
+    usual = offsets.most_common(1)[0][0] if offsets else ""
+    return usual, tuple(
+        " ".join((date, time, offset if offset != usual else "")).strip() for date, time, offset in parts
+    )

@@ -13,6 +13,8 @@ from protocols.problem import Problem
 from protocols.recording_protocol import RecordingProtocol
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError, WrongUseError
+from study.local_clock import machine_zone
+from study.session.local_time import local_time
 from study.store.file_errors import UnusableFileError
 from study.store.regular_file import DOCUMENT_BYTES
 from study.store.text_file import read_text, write_text
@@ -137,7 +139,7 @@ def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
     except LockError as error:
         raise UnusableFileError(path, "protocol lock", (str(error),)) from error
     try:
-        check_lock(lock, protocol)
+        check_lock(lock, protocol, local_time(lock.locked_utc, machine_zone))
     except LockError as error:
         raise LockedProtocolChangedError(path, error) from error
     return lock

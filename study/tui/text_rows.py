@@ -1,19 +1,64 @@
-"""Rows of words as lines with aligned columns."""
+"""Rows of words as lines with aligned columns. Too wide for a terminal, cells wrap; none is cut."""
+
+from textwrap import wrap
 
 Rows = tuple[tuple[str, ...], ...]
 
 GAP = "  "
+LEAST_CELLS = 12
+"""Width below which no column is narrowed: a line that is still too long is wrapped by the terminal."""
 
 
-def aligned(rows: Rows) -> tuple[str, ...]:
-    """One line per row. Columns that hold numbers below the header stand on the right."""
+def aligned(rows: Rows, columns: int | None = None) -> tuple[str, ...]:
+    """A line per row, or several where cells wrap. Columns that hold numbers below the header stand on the right.
+
+    columns: of the terminal, which the widest columns give way to; None = as wide as needed.
+    """
+    return tuple(line for lines in aligned_rows(rows, columns) for line in lines)
+
+
+def aligned_rows(rows: Rows, columns: int | None = None) -> Rows:
+    """As `aligned`, the lines of each row by themselves."""
     if not rows:
         return ()
-    columns = max(map(len, rows))
-    full = [(*row, *("",) * (columns - len(row))) for row in rows]
-    widths = [max(len(row[column]) for row in full) for column in range(columns)]
-    right = [_are_numbers([row[column] for row in full[1:]]) for column in range(columns)]
-    return tuple(GAP.join(_cell(row[c], widths[c], right[c]) for c in range(columns)).rstrip() for row in full)
+    count = max(map(len, rows))
+    full = [(*row, *("",) * (count - len(row))) for row in rows]
+    right = [_are_numbers([row[place] for row in full[1:]]) for place in range(count)]
+    widths = _fitted([max(len(row[place]) for row in full) for place in range(count)], right, columns)
+    return tuple(_lines(row, widths, right) for row in full)
+
+
+def hanging(line: str, indent: int, columns: int | None) -> tuple[str, ...]:
+    """One line wrapped to the terminal, what follows under the place `indent`."""
+    if columns is None or len(line) <= columns:
+        return (line,)
+    return tuple(wrap(line, columns, subsequent_indent=" " * indent, break_on_hyphens=False))
+
+
+def _fitted(widths: list[int], right: list[bool], columns: int | None) -> list[int]:
+    """The widest column of words gives way first, down to `LEAST_CELLS`."""
+    widths = list(widths)
+    while columns is not None and (excess := sum(widths) + len(GAP) * (len(widths) - 1) - columns) > 0:
+        words = [(width, place) for place, width in enumerate(widths) if width > LEAST_CELLS and not right[place]]
+        if not words:
+            break
+        width, place = max(words)
+        next_widest = max([LEAST_CELLS, *(other for other, where in words if where != place and other < width)])
+        widths[place] = max(width - excess, next_widest)
+    return widths
+
+
+def _lines(row: tuple[str, ...], widths: list[int], right: list[bool]) -> tuple[str, ...]:
+    cells = [wrap(text, width, break_on_hyphens=False) if len(text) > width else [text]
+             for text, width in zip(row, widths, strict=True)]  # fmt: skip
+    height = max(map(len, cells))
+    return tuple(
+        GAP.join(
+            _cell(cell[line] if line < len(cell) else "", width, on_right)
+            for cell, width, on_right in zip(cells, widths, right, strict=True)
+        ).rstrip()
+        for line in range(height)
+    )
 
 
 def _cell(text: str, width: int, right: bool) -> str:

@@ -20,6 +20,8 @@ from study.tui.watch_words import (
 )
 
 BELL = "\a"
+LABEL_CELLS = 11
+"""Of the words before each line of `status`."""
 
 
 def changes(before: WatchView | None, now: WatchView) -> list[str]:

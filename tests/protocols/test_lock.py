@@ -9,6 +9,7 @@ from protocols.hashing import protocol_hash
 from protocols.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
 
 WHEN = "2024-05-01T09:00:00+00:00"
+LOCAL = "2024-05-01 11:00 +02:00"
 
 
 @pytest.fixture
@@ -17,23 +18,23 @@ def lock(threshold) -> ProtocolLock:
 
 
 def test_a_lock_fits_its_protocol(lock, threshold):
-    check_lock(lock, threshold)
+    check_lock(lock, threshold, LOCAL)
     assert lock == ProtocolLock("direction_threshold", protocol_hash(threshold), WHEN, "0.1.0")
 
 
 def test_a_changed_protocol_is_refused_with_the_date_and_both_fingerprints(lock, threshold):
     changed = replace(threshold, rests=replace(threshold.rests, after_run_s=61.0))
     with pytest.raises(LockError) as caught:
-        check_lock(lock, changed)
+        check_lock(lock, changed, LOCAL)
     assert str(caught.value) == (
-        f"protocol direction_threshold was locked on {WHEN} and has changed since: "
+        f"protocol direction_threshold was locked on {LOCAL} and has changed since: "
         f"its fingerprint is {protocol_hash(changed)[:12]}…, the locked one {lock.hash[:12]}…"
     )
 
 
 def test_a_lock_of_another_protocol_is_refused(lock, threshold):
     with pytest.raises(LockError, match="the lock is that of protocol direction_threshold, not of mine"):
-        check_lock(lock, replace(threshold, name="mine"))
+        check_lock(lock, replace(threshold, name="mine"), LOCAL)
 
 
 def test_a_lock_survives_its_file_and_says_what_it_is(lock):

@@ -1,21 +1,25 @@
 """Past sessions, latest first: one row each, with what can be done with it as keys."""
 
+from collections.abc import Mapping
+from textwrap import wrap
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
+from textual.events import Resize
 from textual.message import Message
 from textual.widgets import DataTable
 
 from study.local_clock import machine_zone
 from study.session.archive_views import SessionLine
-from study.session.local_time import local_time
+from study.session.local_time import local_column
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
 from study.tui.standing_words import STYLES, standing_words
 
-COLUMNS = (("Standing", 12), ("Begun", 23), ("Runs", 5), ("Answers", 7), ("Protocol", 40))
-"""With their widths in cells, so that nothing has to be measured in a long list. The session's name comes first."""
-_NAME = "Session"
+_NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = "Session", "Standing", "Begun", "Runs", "Answers", "Protocol"
+_FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
+"""Widths in cells, so that little has to be measured in a long list. The protocol has what is left, and wraps."""
+_LEAST_PROTOCOL, _PADDING = 10, 2
 
 AT_ONCE = 60
 """Rows: more than any terminal shows."""
@@ -41,17 +45,42 @@ class SessionTable(DataTable[Content | str]):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id, cursor_type="row", zebra_stripes=False)
         self._lines: tuple[SessionLine, ...] = ()
+        self._begun: tuple[str, ...] = ()
+        self._widths: dict[str, int] = {}
+        self._fitted_to = 0
 
     def show(self, lines: tuple[SessionLine, ...]) -> None:
         """The cursor stays on its session, as far as it is still there."""
         chosen = self._chosen
         self._lines = lines
+        offset, self._begun = local_column([line.begun_utc for line in lines], machine_zone)
+        self._widths = self._fitted(f"{_BEGUN} ({offset})" if offset else _BEGUN)
         self.clear(columns=True)
-        longest = max((len(line.name) for line in lines), default=0)
-        for title, width in ((_NAME, max(len(_NAME), longest)), *COLUMNS):
+        for title, width in self._widths.items():
             self.add_column(title, width=width)
         self._add_more(lines, chosen.name if chosen is not None else "")
         self._tell()
+
+    def on_resize(self, event: Resize) -> None:
+        if self._lines and event.size.width != self._fitted_to:
+            self.show(self._lines)
+
+    def _fitted(self, begun: str) -> dict[str, int]:
+        """By title. Answers, and then runs, give way to the protocol: the sentence below the list has them too."""
+        self._fitted_to = self.size.width
+        names, protocols = ([getattr(line, which) for line in self._lines] for which in ("name", "protocol"))
+        widths = {_NAME: max(map(len, (_NAME, *names))), _STANDING: _FIXED[_STANDING]}
+        widths |= {begun: max(map(len, (begun, *self._begun))), _RUNS: _FIXED[_RUNS], _ANSWERS: _FIXED[_ANSWERS]}
+        wanted = max(map(len, (_PROTOCOL, *protocols)))
+        for title, least in ((_ANSWERS, wanted), (_RUNS, _LEAST_PROTOCOL)):
+            if self._room(widths) < least:
+                del widths[title]
+        return widths | {_PROTOCOL: min(wanted, max(_LEAST_PROTOCOL, self._room(widths)))}
+
+    def _room(self, widths: Mapping[str, int]) -> int:
+        """What other columns leave to the protocol, beside the bar that scrolls."""
+        bar = self.styles.scrollbar_size_vertical if len(self._lines) >= self.size.height else 0
+        return self.size.width - bar - sum(widths.values()) - _PADDING * (len(widths) + 1)
 
     def _add_more(self, lines: tuple[SessionLine, ...], chosen: str) -> None:
         """A long list comes in parts, so that keys are heard in between."""
@@ -59,8 +88,9 @@ class SessionTable(DataTable[Content | str]):
             return  # a newer list came meanwhile
         have = self.row_count
         part = lines[have : have + AT_ONCE]
-        self.add_rows(_row(line) for line in part)
         for place, line in enumerate(part, start=have):
+            protocol = wrap(line.protocol, self._widths[_PROTOCOL])  # the table itself would cut it
+            self.add_row(*self._row(line, self._begun[place], "\n".join(protocol)), height=max(1, len(protocol)))
             if line.name == chosen:
                 self.move_cursor(row=place)
         if self.row_count < len(lines):
@@ -95,14 +125,9 @@ class SessionTable(DataTable[Content | str]):
         if self._chosen is not None:
             self.post_message(self.Looked(self._chosen))
 
-
-def _row(line: SessionLine) -> tuple[Content | str, ...]:
-    known = line.standing in ("finished", "unfinished", "running")
-    return (
-        Content(line.name),
-        Content.styled(standing_words(line.standing), STYLES[line.standing]),
-        local_time(line.begun_utc, machine_zone),
-        f"{line.runs_done}/{line.runs}" if known else "",
-        f"{line.answers:>7}" if known else "",
-        Content(line.protocol),
-    )
+    def _row(self, line: SessionLine, begun: str, protocol: str) -> tuple[Content | str, ...]:
+        known = line.standing in ("finished", "unfinished", "running")
+        runs = (f"{line.runs_done}/{line.runs}" if known else "",) if _RUNS in self._widths else ()
+        answers = (f"{line.answers:>7}" if known else "",) if _ANSWERS in self._widths else ()
+        standing = Content.styled(standing_words(line.standing), STYLES[line.standing])
+        return Content(line.name), standing, begun, *runs, *answers, Content(protocol)

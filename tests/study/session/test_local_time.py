@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta, timezone
 import pytest
 
 from study.local_clock import local_now, machine_zone
-from study.session.local_time import in_utc, local_parts, local_time
+from study.session.local_time import in_utc, local_column, local_parts, local_time
 
 
 def india(time: datetime) -> datetime:
@@ -55,3 +55,15 @@ def test_now_is_local(summer_and_winter):
     said = datetime.strptime(local_now(), "%Y-%m-%d %H:%M %z")
     assert said.utcoffset() in (timedelta(hours=1), timedelta(hours=2))
     assert abs(said - datetime.now(UTC)) < timedelta(days=1)
+
+
+def test_an_offset_that_times_share_stands_in_the_header_alone():
+    def summer_from_april(time):
+        return time.astimezone(timezone(timedelta(hours=2 if time.month > 3 else 1)))
+
+    utcs = ("2026-05-04T09:30:12+00:00", "2026-02-04T09:30:12+00:00", "2026-05-05T09:30:12+00:00", "no time")
+    assert local_column(utcs, summer_from_april) == (
+        "+02:00",
+        ("2026-05-04 11:30", "2026-02-04 10:30 +01:00", "2026-05-05 11:30", "no time"),
+    )
+    assert local_column((), summer_from_april) == ("", ())

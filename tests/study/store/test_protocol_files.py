@@ -7,6 +7,8 @@ import pytest
 from protocols.hashing import protocol_hash
 from protocols.lock import lock_from_json
 from study.errors import ExitCode, StudyError, WrongUseError
+from study.local_clock import machine_zone
+from study.session.local_time import local_time
 from study.store.file_errors import CannotReadError, CannotWriteError, UnusableFileError
 from study.store.protocol_files import (
     LockedProtocolChangedError,
@@ -140,7 +142,7 @@ def test_a_locked_protocol_that_changed_is_refused_before_data_come_in(mine):
     error = caught.value
     assert error.title == "This protocol is locked, and it is not the locked one"
     assert str(path) in error.happened
-    assert f"was locked on {WHEN} and has changed since" in error.happened
+    assert f"was locked on {local_time(WHEN, machine_zone)} and has changed since" in error.happened
     assert error.saved == "Nothing was changed, and no session was begun."
     assert error.do_now.startswith("Restore the locked version")
 

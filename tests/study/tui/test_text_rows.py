@@ -1,4 +1,4 @@
-from study.tui.text_rows import aligned
+from study.tui.text_rows import aligned, hanging
 
 
 def test_numbers_stand_on_the_right_and_words_on_the_left():
@@ -12,3 +12,18 @@ def test_numbers_stand_on_the_right_and_words_on_the_left():
 def test_short_rows_are_filled_up_and_nothing_is_nothing():
     assert aligned((("a", "b"), ("c",))) == ("a  b", "c")
     assert aligned(()) == ()
+
+
+def test_the_widest_column_of_words_wraps_and_numbers_never_do():
+    rows = (("what", "n", "remark"), ("short", "12345678901234", "a remark of many words that does not fit"))
+    assert aligned(rows, 45) == (
+        "what                n  remark",
+        "short  12345678901234  a remark of many words",
+        "                       that does not fit",
+    )
+    assert max(map(len, aligned(rows, 20))) > 20  # the terminal wraps what cannot be narrowed
+
+
+def test_a_long_line_goes_on_under_its_text():
+    assert hanging("Sensor     one two three", 11, 18) == ("Sensor     one two", "           three")
+    assert hanging("Sensor     one two three", 11, None) == ("Sensor     one two three",)

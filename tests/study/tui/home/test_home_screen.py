@@ -299,3 +299,21 @@ def test_help_is_one_key_away_also_while_typing(on_screen, home):
         assert "New session" in sight.text
 
     on_screen(HomeScreen(home), story)
+
+
+@pytest.mark.parametrize("width", [80, 100, 120, 200])
+def test_no_column_of_the_list_is_cut(on_screen, home, width):
+    lines = tuple(replace(line, name=f"PARTICIPANT0{line.name}") for line in home.sessions)
+    long = replace(lines[0], protocol="equalized_threshold_of_our_laboratory", begun_utc="2026-02-05T10:02:00+00:00")
+
+    async def story(sight):
+        table = sight.app.screen.query_one(SessionTable)
+        assert table.virtual_size.width <= table.size.width
+        await sight.until(lambda: "PARTICIPANT0P01_001" in sight.text)
+        for column in table.columns.values():
+            assert column.width >= len(str(column.label))
+        header, *below = sight.lines[table.region.y :]
+        place = header.index("Protocol", table.region.x)
+        assert "".join(line[place:].strip("│ ") for line in below).startswith(long.protocol)
+
+    on_screen(HomeScreen(replace(home, sessions=(long, *lines[1:]))), story, (width, 40))
