@@ -48,14 +48,14 @@ def diagnose(
     progress("measuring the noise", 0.0)
     chosen = measure_of(recordings, model, settings.clean)
     tuning = tuning_of(model, recordings[0].command.channels)
-    catalogue = [one for one in CATALOGUE if one.name not in settings.without]
-    refined = {name for one in catalogue for name in one.simpler}
+    catalogue = [effect for effect in CATALOGUE if effect.name not in settings.without]
+    refined = {name for effect in catalogue for name in effect.simpler}
     arena = Arena(chosen.measure.shortened(), chosen.measure, tuning, map_, frozenset(settings.without))
-    catalogue += [one for one in CATALOGUE if one.name in refined & arena.barred]
-    may_be_named = [one for one in catalogue if one.name not in arena.barred]
+    catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
+    may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
     if settings.clean:
         learned = learned_from(settings.clean, model, recordings, map_, progress)
-        told = [one for one in may_be_named if chosen.measure.tells(one)]
+        told = [effect for effect in may_be_named if chosen.measure.tells(effect)]
         arena = replace(arena, certain=seen_directly(recordings, settings.clean, told))
         seen, floor = searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor
     else:

@@ -103,10 +103,10 @@ def place_words(place: Place, axis: str | None, single: bool = False) -> str:
     """single: the device has one axis, which then needs no name."""
     if place == "hand":
         return "at the handle" if axis is None or single else f"at the handle, along {axis}"
-    one, all_ = _SEATS[place]
+    seat, all_ = _SEATS[place]
     if axis is None:
-        return one.format("").replace("  ", " ") if single else all_
-    return one.format(axis)
+        return seat.format("").replace("  ", " ") if single else all_
+    return seat.format(axis)
 
 
 _SEATS: Mapping[str, tuple[str, str]] = {

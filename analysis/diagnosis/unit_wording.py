@@ -34,7 +34,7 @@ def scale_of(unit: str, magnitude: float) -> Scale:
     kept = _KEPT[0] <= size < _KEPT[1] and unit not in _ALWAYS_PREFIXED
     if kept or size == 0 or unit in _NEVER_PREFIXED or unit.startswith("1/"):
         return Scale(1.0, written(unit))
-    factor, prefix = max((one for one in _PREFIXES if one[0] <= size * (1 + 1e-9)), default=_PREFIXES[0])
+    factor, prefix = max((prefixed for prefixed in _PREFIXES if prefixed[0] <= size * (1 + 1e-9)), default=_PREFIXES[0])
     return Scale(1 / factor, prefix + written(unit))
 
 

@@ -45,8 +45,8 @@ def answer(recordings: Sequence[Recording]) -> float | None:
 def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:
     """(stretches, lines, inputs) and (stretches, lines, outputs)"""
     inputs, outputs = len(recordings[0].command.channels), len(recordings[0].response.channels)
-    length = sum(len(one) for one in recordings) // (STRETCHES * inputs)
-    found = [pair for one in recordings for pair in _stretches(one, length)] if length >= 16 else []
+    length = sum(len(recording) for recording in recordings) // (STRETCHES * inputs)
+    found = [pair for recording in recordings for pair in _stretches(recording, length)] if length >= 16 else []
     if not found:
         return np.zeros((0, 0, inputs), complex), np.zeros((0, 0, outputs), complex)
     return np.array([u for u, _ in found]), np.array([y for _, y in found])

@@ -42,25 +42,29 @@ def require_alike(
         raise NothingToDiagnose(("there is no recording",))
     first, problems = recordings[0], []
     for other, name in zip(recordings[1:], names[1:], strict=True):
-        for what, one, two in (
+        for what, expected, two in (
             ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
             ("command", _words(first.command), _words(other.command)),
             ("response", _words(first.response), _words(other.response)),
         ):
-            if one != two:
-                problems.append(f"{name} has the {what} {two}, {names[0]} has {one}; {what_now}")
+            if expected != two:
+                problems.append(f"{name} has the {what} {two}, {names[0]} has {expected}; {what_now}")
     if problems:
         raise NothingToDiagnose(tuple(problems))
 
 
 def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> None:
     """A command throughout, and responses that move, for long enough. Raises NothingToDiagnose."""
-    problems = [problem for one, name in zip(recordings, names, strict=True) for problem in _gaps(one.command, name)]
-    problems += [problem for one, name in zip(recordings, names, strict=True) for problem in _absurd(one, name)]
+    problems = [
+        problem for recording, name in zip(recordings, names, strict=True) for problem in _gaps(recording.command, name)
+    ]
+    problems += [
+        problem for recording, name in zip(recordings, names, strict=True) for problem in _absurd(recording, name)
+    ]
     problems += _never(recordings)
     if not problems:
-        known = sum(int(np.isfinite(one.response.samples).all(axis=1).sum()) for one in recordings)
-        cycles = sum(_cycles(one) for one in recordings)
+        known = sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
+        cycles = sum(_cycles(recording) for recording in recordings)
         if known < LEAST_SAMPLES:
             problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
         elif known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S:
@@ -90,10 +94,10 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
 def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
     """A recording that is taken twice would be tested by what it was fitted to. Raises NothingToDiagnose."""
     problems = [
-        f"{names[two]} holds the same samples as {names[one]}, and a recording counts once"
-        for one, two in combinations(range(len(recordings)), 2)
-        if np.array_equal(recordings[one].response.samples, recordings[two].response.samples, equal_nan=True)
-        and np.array_equal(recordings[one].command.samples, recordings[two].command.samples, equal_nan=True)
+        f"{names[two]} holds the same samples as {names[first]}, and a recording counts once"
+        for first, two in combinations(range(len(recordings)), 2)
+        if np.array_equal(recordings[first].response.samples, recordings[two].response.samples, equal_nan=True)
+        and np.array_equal(recordings[first].command.samples, recordings[two].command.samples, equal_nan=True)
     ]
     if problems:
         raise NothingToDiagnose(tuple(problems))
@@ -102,7 +106,7 @@ def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> 
 def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
     """recordings: alike. Raises NothingToDiagnose where the model cannot be of their device."""
     first = recordings[0]
-    names = [one.device or f"recording {number}" for number, one in enumerate(recordings, 1)]
+    names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
     problems = (*_size(model, first), *_kind(model, first), *_absurd_model(model))
     problems = problems or weight_problems(model, recordings, names)
     if not problems:
@@ -135,10 +139,10 @@ def _absurd(recording: Recording, name: str) -> Iterator[str]:
 
 
 def _never(recordings: Sequence[Recording]) -> Iterator[str]:
-    if all(np.ptp(one.command.samples, axis=0).max(initial=0.0) == 0 for one in recordings):
+    if all(np.ptp(recording.command.samples, axis=0).max(initial=0.0) == 0 for recording in recordings):
         yield "the command never changes, so the device was not excited"
     for side in ("response", "position"):
-        signals: list[Signal] = [found for one in recordings if (found := getattr(one, side)) is not None]
+        signals: list[Signal] = [found for recording in recordings if (found := getattr(recording, side)) is not None]
         for channel, name in enumerate(signals[0].channels if signals else ()):
             columns = [signal.samples[:, channel] for signal in signals]
             finite = [column[np.isfinite(column)] for column in columns]
@@ -214,7 +218,7 @@ def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
 
 def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
     fastest = growth_rate(model)
-    longest_s = max(len(one) / one.sample_rate_hz for one in recordings)
+    longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
     if fastest * longest_s > MOST_GROWTH:
         yield (
             f"the model is unstable: undisturbed it grows e-fold in {1 / fastest:.3g} s; damping and stiffness must "
@@ -225,7 +229,7 @@ def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterato
 def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     """Where the rate is a thousand times too low, most likely."""
     swings_hz = np.abs(motions(model).imag) / (2 * np.pi)
-    slowest_hz = min((float(one) for one in swings_hz if one > 0), default=0.0)
+    slowest_hz = min((float(swing_hz) for swing_hz in swings_hz if swing_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
         yield (
             f"the model swings at {slowest_hz:.3g} Hz and faster, which nobody can see at a rate of "

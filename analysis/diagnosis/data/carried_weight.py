@@ -29,20 +29,20 @@ def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], nam
     other = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
     problems = [
         f"{name} says {other}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
-        for one, name in zip(recordings, names, strict=True)
-        if other in one.meta
+        for recording, name in zip(recordings, names, strict=True)
+        if other in recording.meta
     ]
     problems += [
-        f"{name} says {key} = {one.meta[key]!r}, which must be a number from 0 on"
-        for one, name in zip(recordings, names, strict=True)
-        if key in one.meta and not _is_weight(one.meta[key])
+        f"{name} says {key} = {recording.meta[key]!r}, which must be a number from 0 on"
+        for recording, name in zip(recordings, names, strict=True)
+        if key in recording.meta and not _is_weight(recording.meta[key])
     ]
     return tuple(problems)
 
 
 def weighted(recordings: Sequence[Recording]) -> bool:
     """Whether any says that it was made with a weight."""
-    return any(key in one.meta for one in recordings for key in (ADDED_MASS, ADDED_INERTIA))
+    return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
 
 
 def _key(model: MechanicalModel) -> str:

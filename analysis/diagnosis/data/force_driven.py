@@ -26,4 +26,4 @@ def force_driven(recording: Recording) -> Recording:
 
 
 def all_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    return tuple(force_driven(one) for one in recordings)
+    return tuple(force_driven(recording) for recording in recordings)

@@ -26,7 +26,7 @@ def driving_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, .
     hundredth of the strongest where the excitation was recorded."""
     if power.max(initial=0.0) == 0:
         return ()
-    return tuple(name for name, one in zip(channels, power, strict=True) if one > _DRIVEN * power.max())
+    return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN * power.max())
 
 
 _DRIVEN = 0.01

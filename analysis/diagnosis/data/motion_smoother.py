@@ -154,9 +154,9 @@ def _steady_covariance(advance: FloatArray, seeing: FloatArray, stirred: FloatAr
     along, told, found = advance.T, seeing.T @ seeing, stirred
     for _ in range(_DOUBLINGS):
         through = np.linalg.solve(np.eye(len(along)) + told @ found, np.hstack([along, told]))
-        one, other = through[:, : len(along)], through[:, len(along) :]
-        more = along.T @ found @ one
-        along, told, found = along @ one, told + along @ other @ along.T, found + (more + more.T) / 2
+        onward, other = through[:, : len(along)], through[:, len(along) :]
+        more = along.T @ found @ onward
+        along, told, found = along @ onward, told + along @ other @ along.T, found + (more + more.T) / 2
         if not np.isfinite(found).all():
             break
         if np.abs(more).max() <= 1e-10 * np.abs(found).max():

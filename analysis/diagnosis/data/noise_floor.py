@@ -46,7 +46,7 @@ class NoiseFloor:
 def noise_floor(recording: Recording) -> NoiseFloor:
     """From periods that should be alike; else from rest; else from the lines above all that was driven, the noise
     below taken to be as strong; else `how` is "unknown" and every rms NaN."""
-    periods = tuple(one for one in settled_periods(recording) if one.looks > 1)
+    periods = tuple(period for period in settled_periods(recording) if period.looks > 1)
     if periods:
         return _from_repeats(recording, periods)
     rate = recording.sample_rate_hz
@@ -57,12 +57,12 @@ def noise_floor(recording: Recording) -> NoiseFloor:
         remark = "Nothing repeats in this recording: its noise is what it shows at rest."
         return _assembled("rest", lines_hz, [rest for rest in rests if rest is not None], signals, remark)
     quiet = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
-    if all(one is not None for one in quiet):
+    if all(hiss is not None for hiss in quiet):
         remark = (
             "Nothing repeats in this recording and it never rests: its noise is what lies above the driven band, "
             "and was taken to be as strong below."
         )
-        return _assembled("quiet band", lines_hz, [one for one in quiet if one is not None], signals, remark)
+        return _assembled("quiet band", lines_hz, [hiss for hiss in quiet if hiss is not None], signals, remark)
     remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
     unknown = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
     return _assembled("unknown", lines_hz, unknown, signals, remark)
@@ -83,7 +83,7 @@ def _assembled(
 
 
 def _from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
-    lines_hz = max(periods, key=lambda one: one.length).frequency_hz(recording.sample_rate_hz)
+    lines_hz = max(periods, key=lambda period: period.length).frequency_hz(recording.sample_rate_hz)
     response = repeat_noise(recording, recording.response.samples, periods, lines_hz)
     remarks = _what_varies(recording.response, response)
     position = None

@@ -23,25 +23,25 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     Roles are those of the whole: where any recording has something to test, no other gives some of itself; where all
     is marked as test, nothing is.
     """
-    marked = [segment.role for one in recordings for segment in one.segments]
+    marked = [segment.role for recording in recordings for segment in recording.segments]
     if marked and all(role == "test" for role in marked):
-        recordings = [_unmarked(one) for one in recordings]
-    tested = any(segment.role == "test" for one in recordings for segment in one.segments)
+        recordings = [_unmarked(recording) for recording in recordings]
+    tested = any(segment.role == "test" for recording in recordings for segment in recording.segments)
     found: list[Observed] = []
-    for one in recordings:
-        measured, known = measured_of(one, responses)
-        fit, choose, test = roles(one.segments, len(one), tested)
-        masks = (*_without_repeats(fit & known, choose & known, ~_repeated(one)), test & known)
-        for start, stop in parts_of(one):
+    for recording in recordings:
+        measured, known = measured_of(recording, responses)
+        fit, choose, test = roles(recording.segments, len(recording), tested)
+        masks = (*_without_repeats(fit & known, choose & known, ~_repeated(recording)), test & known)
+        for start, stop in parts_of(recording):
             cut: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
-            part = part_of(one, start, stop)
+            part = part_of(recording, start, stop)
             found.append(Observed(part, part.command.samples, measured[start:stop], *cut))
     return tuple(found)
 
 
 def samples_to_fit(recordings: Sequence[Recording]) -> int:
     """With a response, and a position where it has one per response channel."""
-    return sum(int(one.fit.sum()) for one in observed_parts(recordings, len(recordings[0].response.channels)))
+    return sum(int(record.fit.sum()) for record in observed_parts(recordings, len(recordings[0].response.channels)))
 
 
 def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
@@ -69,19 +69,21 @@ def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
     """First sample and the one after the last of each part; the whole where `meta` names no parts."""
     named = recording.meta.get("parts")
     parts = [
-        (int(one["start"]), int(one["stop"]))
-        for one in (named if isinstance(named, Sequence) and not isinstance(named, str) else ())
-        if isinstance(one, dict) and "start" in one and "stop" in one
+        (int(stretch["start"]), int(stretch["stop"]))
+        for stretch in (named if isinstance(named, Sequence) and not isinstance(named, str) else ())
+        if isinstance(stretch, dict) and "start" in stretch and "stop" in stretch
     ]
     inside = [(start, stop) for start, stop in parts if start >= 0 and stop <= len(recording)]
-    return tuple(one for one in inside if one[1] - one[0] >= LEAST_SAMPLES) or ((0, len(recording)),)
+    return tuple(stretch for stretch in inside if stretch[1] - stretch[0] >= LEAST_SAMPLES) or ((0, len(recording)),)
 
 
 def part_of(recording: Recording, start: int, stop: int) -> Recording:
     """Samples start to stop, with the segments that lie in them."""
     if (start, stop) == (0, len(recording)):
         return recording
-    segments = [_moved(one, start, stop) for one in recording.segments if one.stop > start and one.start < stop]
+    segments = [
+        _moved(segment, start, stop) for segment in recording.segments if segment.stop > start and segment.start < stop
+    ]
     return replace(
         recording,
         command=recording.command.part(start, stop),
@@ -103,14 +105,14 @@ def _moved(segment: Segment, start: int, stop: int) -> Segment:
 
 
 def _unmarked(recording: Recording) -> Recording:
-    return replace(recording, segments=tuple(replace(one, role="") for one in recording.segments))
+    return replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
 
 
 def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
     """As `observed_parts` has them: of the recording, and which part where there are several."""
     found: list[str] = []
-    for number, one in enumerate(recordings):
+    for number, recording in enumerate(recordings):
         own = names[number] if number < len(names) else f"recording {number + 1}"
-        count = len(parts_of(one))
+        count = len(parts_of(recording))
         found += [own] if count == 1 else [f"{own}, part {part + 1}" for part in range(count)]
     return tuple(found)

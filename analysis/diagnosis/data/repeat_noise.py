@@ -30,7 +30,7 @@ def repeat_noise(
     recording: Recording, samples: FloatArray, periods: Sequence[Periods], lines_hz: FloatArray
 ) -> ChannelNoise:
     """periods: each with two looks or more. lines_hz: where the density is wanted."""
-    spreads = [_spread(recording, samples, one, lines_hz) for one in periods]
+    spreads = [_spread(recording, samples, period, lines_hz) for period in periods]
     density, freedom = np.stack([spread for spread, _ in spreads]), np.stack([free for _, free in spreads])
     variance = density.mean(axis=1)
     moved = _moved(samples, periods)
@@ -45,14 +45,14 @@ def repeat_noise(
     whole, rounding = with_rounding(smooth, samples)
     segments = tuple(
         SegmentNoise(
-            one.index,
-            one.segment.amplitude,
+            period.index,
+            period.segment.amplitude,
             variance[k],
             freedom[k],
             tuple(counted[k].tolist()),
             tuple(varies[k].tolist()),
         )
-        for k, one in enumerate(periods)
+        for k, period in enumerate(periods)
     )
     return ChannelNoise(np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(loud.tolist()))
 
@@ -95,7 +95,7 @@ def _spread(
 def _moved(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
     """(segments, channels): where a channel moves over its steps of rounding; all where it never does."""
     steps = np.array([rounding_step(channel) for channel in samples.T])
-    moved = np.array([look_samples(samples, one).std(axis=(0, 1)) >= _STEPS_MOVED * steps for one in periods])
+    moved = np.array([look_samples(samples, period).std(axis=(0, 1)) >= _STEPS_MOVED * steps for period in periods])
     return np.asarray(moved | ~moved.any(axis=0), dtype=np.bool_)
 
 

@@ -68,7 +68,7 @@ class BandPower:
     def misfits(self, off: FloatArray) -> Standing:
         """off: a difference of such logarithms. Its rms by channel, for each purpose; NaN where nothing counts."""
         seen = np.where(np.isnan(self.measured), np.nan, off)
-        return Standing(*(_rms(seen[[one.part == part for one in self.stretches]]) for part in PARTS))
+        return Standing(*(_rms(seen[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
 
     @cached_property
     def _edges(self) -> FloatArray:
@@ -86,9 +86,11 @@ class BandPower:
         """(stretches, bands, c): mean density."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
-        for row, one in zip(rows, self.stretches, strict=True):
-            window = min(int(WINDOW_S * rate_hz), one.last - one.first)
-            lines, density = welch(courses[one.record][one.first : one.last], rate_hz, nperseg=window, axis=0)
+        for row, stretch in zip(rows, self.stretches, strict=True):
+            window = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
+            lines, density = welch(
+                courses[stretch.record][stretch.first : stretch.last], rate_hz, nperseg=window, axis=0
+            )
             firsts = np.searchsorted(lines, self._edges)
             for band, (low, high) in enumerate(pairwise(firsts)):
                 row[band] = density[low : max(high, low + 1)].mean(axis=0)
@@ -96,7 +98,7 @@ class BandPower:
 
     def _spans(self, number: int) -> list[tuple[int, int]]:
         record = self.measure.records[number]
-        segments = [(one.start, one.stop) for one in record.recording.segments if one.kind != "rest"]
+        segments = [(segment.start, segment.stop) for segment in record.recording.segments if segment.kind != "rest"]
         length, longest = len(record.measured), int(LONGEST_S * record.recording.sample_rate_hz)
         return segments or [(first, min(first + longest, length)) for first in range(0, length, longest)]
 

@@ -57,7 +57,7 @@ class View:
     @property
     def weights(self) -> FloatArray:
         """(stretches, bands, c): none for what is sealed or drowned."""
-        fit = np.array([one.part != "test" for one in self.power.stretches])
+        fit = np.array([stretch.part != "test" for stretch in self.power.stretches])
         known = np.isfinite(self.power.measured) & fit[:, None, None]
         return np.asarray(np.where(known, 1 / np.hypot(self.spread, FLOOR), 0.0))
 
@@ -116,7 +116,7 @@ def own_columns(view: View, at: Foreseen) -> FloatArray:
 
     there: list[FloatArray] = list(view.map_(moved, jobs))  # type: ignore[arg-type]
     return np.array(
-        [(up - down) / (2 * _move(one)) for one, up, down in zip(numbers, there[::2], there[1::2], strict=True)]
+        [(up - down) / (2 * _move(number)) for number, up, down in zip(numbers, there[::2], there[1::2], strict=True)]
     ).reshape(len(numbers), *at.predicted.shape)
 
 
@@ -153,8 +153,8 @@ def _errors(view: View, at: Foreseen, products: FloatArray) -> FloatArray:
     first = len(products) - len(numbers)
     chance = _weighed(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
     information = products.copy()
-    for k, one in enumerate(numbers, start=first):
-        by_chance = float(chance @ chance) / (2 * _move(one) ** 2)
+    for k, number in enumerate(numbers, start=first):
+        by_chance = float(chance @ chance) / (2 * _move(number) ** 2)
         information[k, k] -= min(by_chance, MOST_BY_CHANCE * products[k, k])
     values, vectors = np.linalg.eigh(information)
     values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_KNOWN))
@@ -164,8 +164,8 @@ def _errors(view: View, at: Foreseen, products: FloatArray) -> FloatArray:
 
 def _reach(at: Foreseen, t: int) -> tuple[FloatArray, FloatArray]:
     numbers = at.hypothesis.numbers
-    most = np.array([LONGEST_STEP if one.parameter.scale == "log" else 2 * _move(one) for one in numbers])
-    bounds = np.array([one.bounds for one in numbers]).reshape(-1, 2) - at.hypothesis.point[:, None]
+    most = np.array([LONGEST_STEP if number.parameter.scale == "log" else 2 * _move(number) for number in numbers])
+    bounds = np.array([number.bounds for number in numbers]).reshape(-1, 2) - at.hypothesis.point[:, None]
     low = np.concatenate([-3.0 - at.deviations[:t], np.clip(bounds[:, 0], -most, 0.0)])
     high = np.concatenate([3.0 - at.deviations[:t], np.clip(bounds[:, 1], 0.0, most)])
     return low, high

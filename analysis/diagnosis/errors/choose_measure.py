@@ -68,10 +68,10 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: 
     """The error measure that the rule chooses, of every part of the recordings. beside: others that must be measured
     alike, and are not part of it."""
     records, others = (
-        tuple(_settled(one, model) for one in observed_parts(these, model.outputs)) if these else ()
+        tuple(_settled(record, model) for record in observed_parts(these, model.outputs)) if these else ()
         for these in (recordings, beside)
     )
-    floors = tuple(noise_floor(one.recording) for one in records)
+    floors = tuple(noise_floor(record.recording) for record in records)
     noise = _noise(floors, records)
     unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
     choice = choose_measure((*records, *others), model)
@@ -84,7 +84,7 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: 
             windows = replace(windows_of(records, model, (unit, noise)), known=known)
             return Chosen(windows, floors, remarks)
         except np.linalg.LinAlgError:
-            if not all(has_motion(one.recording, model) for one in records):
+            if not all(has_motion(record.recording, model) for record in records):
                 return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
     views = force_views(records, model, floors)
     said = f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
@@ -94,21 +94,23 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: 
 def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
     if not known:
         return ()
-    kinds = ", ".join(dict.fromkeys(EFFECT_WORDS[one.effect.name].noun for one in known))
+    kinds = ", ".join(dict.fromkeys(EFFECT_WORDS[placed.effect.name].noun for placed in known))
     return (f"The model names effects of its own, which are part of every simulation: {kinds}.",)
 
 
 def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choice:
     """The rule of this module's first lines."""
-    longest_s = max(len(one.command) / one.recording.sample_rate_hz for one in records)
-    holds, motion = holds_itself(model, longest_s), all(has_motion(one.recording, model) for one in records)
-    if any(one.recording.meta.get("imposed") for one in records):
+    longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
+    holds, motion = holds_itself(model, longest_s), all(has_motion(record.recording, model) for record in records)
+    if any(record.recording.meta.get("imposed") for record in records):
         return Choice("predicted force", IMPOSED)
-    if not holds and any(in_closed_loop(one.recording) for one in records):
+    if not holds and any(in_closed_loop(record.recording) for record in records):
         return Choice("predicted force", CLOSED_LOOP) if motion else Choice("windows", CLOSED_LOOP_WINDOWS)
     if not holds:
         return Choice("windows", DRIFTS)
-    if any(_begins_moving(one) and _settling(one, model) > MOST_LEFT_OUT * len(one.command) for one in records):
+    if any(
+        _begins_moving(record) and _settling(record, model) > MOST_LEFT_OUT * len(record.command) for record in records
+    ):
         return Choice("windows", NOT_AT_REST)
     return Choice("free simulation", "")
 
@@ -187,8 +189,8 @@ def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatAr
     """(c,): the quietest recording's, rms."""
     count = records[0].measured.shape[1]
     rows = [
-        np.concatenate([_unrounded(f, one), f.position_rms if f.position_rms is not None else []])[:count]
-        for f, one in zip(floors, records, strict=True)
+        np.concatenate([_unrounded(f, record), f.position_rms if f.position_rms is not None else []])[:count]
+        for f, record in zip(floors, records, strict=True)
     ]
     signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
     quietest = np.fmin.reduce(rows)

@@ -48,7 +48,7 @@ class ColouredMeasure:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         left = self.plain.residuals(model, effects)
-        return tuple(self.colour.taken_off(one * self.plain.unit) / self.unit for one in left)
+        return tuple(self.colour.taken_off(residual * self.plain.unit) / self.unit for residual in left)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -59,7 +59,7 @@ class ColouredMeasure:
 
 def coloured(plain: ErrorMeasure, colour: Colour, noise: FloatArray) -> ColouredMeasure:
     """noise: (c,), see `ColouredMeasure`."""
-    warm = [_counted(one, colour) for one in plain.records]
+    warm = [_counted(record, colour) for record in plain.records]
     return ColouredMeasure(plain.with_records(tuple(warm)), colour, noise, noise)
 
 

@@ -37,9 +37,10 @@ class ForceViews:
 
 def force_views(records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor]) -> ForceViews:
     """records: with motion, see `has_motion`."""
-    motions = [measured_motion(one.recording, model, floor) for one, floor in zip(records, floors, strict=True)]
+    motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
     entered = [
-        entered_force(model, one.command, one.recording.sample_rate_hz, (), one.recording.hold) for one in records
+        entered_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
+        for record in records
     ]
     band_hz = _band(records, motions, entered, floors, model)
     views, seen = [], []
@@ -47,7 +48,7 @@ def force_views(records: Sequence[Observed], model: MechanicalModel, floors: Seq
         view = _view(record, force, band_hz)
         views.append(view)
         seen.append(_floor(model, motion, floor, band_hz))
-    noise = np.fmin.reduce([one.response_rms for one in seen])
+    noise = np.fmin.reduce([view.response_rms for view in seen])
     known = KNOWN * np.sqrt(np.mean(np.vstack([view.measured for view in views]) ** 2, axis=0))
     noise = np.asarray(np.hypot(noise, known))
     measure = PredictedForce(tuple(views), tuple(motion.position for motion in motions), noise, noise, band_hz)

@@ -36,17 +36,20 @@ class FreeSimulation:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shortened(self) -> "FreeSimulation":
-        kept = [one for one in self.records if (one.fit | one.choose).any()]
-        return replace(self, records=tuple(one.shortened() for one in kept))
+        kept = [record for record in self.records if (record.fit | record.choose).any()]
+        return replace(self, records=tuple(record.shortened() for record in kept))
 
     def tells(self, effect: Effect) -> bool:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
-            (one.measured - channels(self._played(model, effects, one, simulate_response), one.measured.shape[1]))
+            (
+                record.measured
+                - channels(self._played(model, effects, record, simulate_response), record.measured.shape[1])
+            )
             / self.unit
-            for one in self.records
+            for record in self.records
         )
 
     def _played(

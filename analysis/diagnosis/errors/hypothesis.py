@@ -116,13 +116,15 @@ def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
 
 def claimed(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """values: one set per group."""
-    free = [(p, one) for one in values for p in claim.effect.parameters if not p.fixed]
-    point = np.array([Number(p, _unit(p, one)).coordinate(one[p.name]) for p, one in free])
-    return Hypothesis((claim,), tuple(dict(one) for one in values), point)
+    free = [(p, of_group) for of_group in values for p in claim.effect.parameters if not p.fixed]
+    point = np.array([Number(p, _unit(p, of_group)).coordinate(of_group[p.name]) for p, of_group in free])
+    return Hypothesis((claim,), tuple(dict(of_group) for of_group in values), point)
 
 
-def together(one: Hypothesis, other: Hypothesis) -> Hypothesis:
-    return Hypothesis(one.claims + other.claims, one.starts + other.starts, np.concatenate([one.point, other.point]))
+def together(first: Hypothesis, other: Hypothesis) -> Hypothesis:
+    return Hypothesis(
+        first.claims + other.claims, first.starts + other.starts, np.concatenate([first.point, other.point])
+    )
 
 
 NOTHING = Hypothesis((), (), np.zeros(0))

@@ -137,7 +137,7 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
 
 
 def _longest_s(measure: ErrorMeasure) -> float:
-    return max(len(one.command) / one.recording.sample_rate_hz for one in measure.records)
+    return max(len(record.command) / record.recording.sample_rate_hz for record in measure.records)
 
 
 def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:

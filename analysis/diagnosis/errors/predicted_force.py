@@ -46,12 +46,12 @@ class PredictedForce:
 
     def shortened(self) -> "PredictedForce":
         kept = [
-            (self._cut(one), motion)
-            for one, motion in zip(self.records, self.motions, strict=True)
-            if (one.fit | one.choose).any()
+            (self._cut(record), motion)
+            for record, motion in zip(self.records, self.motions, strict=True)
+            if (record.fit | record.choose).any()
         ]
-        records = tuple(one for one, _ in kept)
-        motions = tuple(motion[: len(one.command)] for one, motion in kept)
+        records = tuple(record for record, _ in kept)
+        motions = tuple(motion[: len(record.command)] for record, motion in kept)
         return replace(self, records=records, motions=motions)
 
     def _cut(self, record: Observed) -> Observed:
@@ -83,7 +83,9 @@ class PredictedForce:
     ) -> "_Balance":
         rate_hz = record.recording.sample_rate_hz
         model = carrying(model, record.recording)
-        structure = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, Structure)]).structure
+        structure = bodies_of(
+            model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
+        ).structure
         needed = needed_force(structure, motion, rate_hz, self.band_hz)
         entered = entered_force(model, record.command, rate_hz, effects, record.recording.hold)
         within = band_limited(entered, rate_hz, self.band_hz)

@@ -44,9 +44,9 @@ class Colour:
 
 def colour_of(courses: Sequence[FloatArray], least: FloatArray) -> Colour:
     """courses: (n, c) each, NaN where not known. least: (c,), rms of noise that is white."""
-    count = sum(int(np.isfinite(one).all(axis=1).sum()) for one in courses)
+    count = sum(int(np.isfinite(course).all(axis=1).sum()) for course in courses)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
-    alike: FloatArray = np.sum([_products(one, lags) for one in courses], axis=0) / max(count, 1)
+    alike: FloatArray = np.sum([_products(course, lags) for course in courses], axis=0) / max(count, 1)
     alike[0] = alike[0] * (1 + FLAT) + least**2
     steps = np.zeros((lags + 1, len(least)))
     steps[0] = 1.0

@@ -23,21 +23,23 @@ _ROUNDS = 2
 
 def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
     """Whether a controller made the commands, or a motion was imposed."""
-    return can_be_rigid(recordings) and any(in_closed_loop(one) or one.meta.get("imposed") for one in recordings)
+    return can_be_rigid(recordings) and any(
+        in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
+    )
 
 
 def can_be_rigid(recordings: Sequence[Recording]) -> bool:
     """Whether there is one measured position or velocity for every command."""
-    return all(_is_square(one) for one in recordings)
+    return all(_is_square(recording) for recording in recordings)
 
 
 def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
     """One body per command. Raises MechanicalModelError where the forces give no mass."""
     model = _unit_masses(recordings[0], name)
     records = observed_parts(recordings, model.outputs)
-    if not all(has_motion(one.recording, model) for one in records):
+    if not all(has_motion(record.recording, model) for record in records):
         raise MechanicalModelError(("neither positions nor velocities were measured",))
-    floors = [noise_floor(one.recording) for one in records]
+    floors = [noise_floor(record.recording) for record in records]
     for _ in range(_ROUNDS):
         model = _by_forces(model, force_views(records, model, floors).measure)
     return model
@@ -68,12 +70,12 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
     whole, left = _least_squares(shapes, aim)
     loose, left_loose = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), aim)
     sprung = left < (1 - SPRING_SHARE) * left_loose
-    mass, damping = ((one + one.T) / 2 for one in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
+    mass, damping = ((matrix + matrix.T) / 2 for matrix in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
     stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
     # A body that pushes itself is no linear model; what makes it seem so is for the diagnosis.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
     stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
-    largest = [float(np.abs(np.diagonal(one)).max()) for one in (mass, damping, stiffness)]
+    largest = [float(np.abs(np.diagonal(matrix)).max()) for matrix in (mass, damping, stiffness)]
     open_ = Tolerance(
         RIGID_MASS_SHARE * largest[0], RIGID_SHARE * largest[1] or None, RIGID_SHARE * largest[2] or None, None
     )

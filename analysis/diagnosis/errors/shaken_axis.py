@@ -18,12 +18,12 @@ LONGEST_S = 6.0
 def shaken_along(measure: FreeSimulation, axis: int) -> FreeSimulation:
     """Its segments, each from rest; all where there are no segments, or none that is driven along the axis."""
     parts = tuple(
-        _cut(record, one)
+        _cut(record, segment)
         for record in measure.records
-        for one in record.recording.segments
-        if one.kind != "rest" and one.stop <= len(record.command) and _is_shaken(record, one, axis)
+        for segment in record.recording.segments
+        if segment.kind != "rest" and segment.stop <= len(record.command) and _is_shaken(record, segment, axis)
     )
-    kept = tuple(one for one in parts if (one.fit | one.choose).any())
+    kept = tuple(part for part in parts if (part.fit | part.choose).any())
     return replace(measure, records=kept) if kept else measure
 
 

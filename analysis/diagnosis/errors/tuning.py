@@ -62,7 +62,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
         )
     ]
     deviation = np.concatenate(
-        [np.full(len(pairs), one) for one in grounded]
+        [np.full(len(pairs), deviation) for deviation in grounded]
         + [np.full(len(modes), relative * more) for more in (1.0, 1.0, DAMPING_PER_MODES)]
     )
     units = ("kg m^2", "N m s/rad", "N m/rad") if model.rotational else ("kg", "N s/m", "N/m")

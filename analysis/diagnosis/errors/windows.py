@@ -54,18 +54,18 @@ class Windows:
 
     def shortened(self) -> "Windows":
         kept = [
-            (one.shortened(), states)
-            for one, states in zip(self.records, self.states, strict=True)
-            if (one.fit | one.choose).any()
+            (record.shortened(), states)
+            for record, states in zip(self.records, self.states, strict=True)
+            if (record.fit | record.choose).any()
         ]
-        return replace(self, records=tuple(one for one, _ in kept), states=tuple(states for _, states in kept))
+        return replace(self, records=tuple(record for record, _ in kept), states=tuple(states for _, states in kept))
 
     def tells(self, effect: Effect) -> bool:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         every = (*self.known, *effects)
-        return tuple(self._seen(model, every, *one)[1] for one in zip(self.records, self.states, strict=True))
+        return tuple(self._seen(model, every, *pair)[1] for pair in zip(self.records, self.states, strict=True))
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -92,7 +92,9 @@ class Windows:
             Restarts(length, states),
         )
         left = (record.measured - channels(played, record.measured.shape[1])) / self.unit
-        structure = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, Structure)]).structure
+        structure = bodies_of(
+            model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
+        ).structure
         return played, self._without_states(structure, left, recording.sample_rate_hz, length)
 
     def _without_states(

@@ -70,8 +70,8 @@ def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
     found = settled_periods(recording)
     excitation = instrument_of(recording)
     held = held_samples(excitation)
-    lines = [detection_lines(look_spectra(excitation, one).mean(axis=0), held) for one in found]
-    periods = [(one, its) for one, its in zip(found, lines, strict=True) if its is not None]
+    lines = [detection_lines(look_spectra(excitation, period).mean(axis=0), held) for period in found]
+    periods = [(period, its) for period, its in zip(found, lines, strict=True) if its is not None]
     if not periods:
         return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be told apart.",))
     signals = [(recording.response, floor.response)]
@@ -86,11 +86,11 @@ def distortion(recording: Recording, floor: NoiseFloor) -> Distortions:
 
 def _what_is_missing(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
     remarks = []
-    if all(one.looks < 2 for one, _ in periods):
+    if all(period.looks < 2 for period, _ in periods):
         remarks.append("No period was repeated: what varies from period to period cannot be seen.")
-    if not all(one.settled for one, _ in periods):
+    if not all(period.settled for period, _ in periods):
         remarks.append("Some segments have one period only: its transient counts as distortion.")
-    if len({one.segment.amplitude for one, _ in periods}) < 2:
+    if len({period.segment.amplitude for period, _ in periods}) < 2:
         remarks.append("There is one level only: how distortion changes with level cannot be seen.")
     if not any(lines.any_silent for _, lines in periods):
         remarks.append("No line was left silent between driven ones: distortion cannot be told from the response.")

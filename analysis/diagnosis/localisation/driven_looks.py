@@ -54,21 +54,21 @@ def driven_looks(
 ) -> list[DrivenLook]:
     """noise: of the signal, on the lines floor_hz."""
     found = []
-    for length in dict.fromkeys(one.length for one, _ in periods):
-        alike = [(one, lines) for one, lines in periods if one.length == length]
-        commands = [look_spectra(recording.command.samples, one).mean(axis=0) for one, _ in alike]
-        answers = [look_spectra(signal.samples, one) for one, _ in alike]
+    for length in dict.fromkeys(period.length for period, _ in periods):
+        alike = [(period, lines) for period, lines in periods if period.length == length]
+        commands = [look_spectra(recording.command.samples, period).mean(axis=0) for period, _ in alike]
+        answers = [look_spectra(signal.samples, period) for period, _ in alike]
         driven = [np.where(lines.driven[:, None], u, 0) for (_, lines), u in zip(alike, commands, strict=True)]
         linear = _needed(driven, commands, answers)
         lines_hz = alike[0][0].frequency_hz(recording.sample_rate_hz)
         floor = _on_lines(noise, floor_hz, lines_hz) / length
-        for (one, lines), command, answer in zip(alike, commands, answers, strict=True):
+        for (period, lines), command, answer in zip(alike, commands, answers, strict=True):
             mean, error, spread = _errors(answer, floor, noise.rounding / length)
             if linear is not None:
                 brought, doubt = commanded(linear, np.where(lines.driven[:, None], 0, command))
                 mean, error = mean - brought, error + doubt
-            look = (lines, lines_hz, mean, error, spread, floor, one.looks, noise.freedom)
-            found.append(DrivenLook(inputs_of(recording, one), one.segment.amplitude, *look))
+            look = (lines, lines_hz, mean, error, spread, floor, period.looks, noise.freedom)
+            found.append(DrivenLook(inputs_of(recording, period), period.segment.amplitude, *look))
     return found
 
 

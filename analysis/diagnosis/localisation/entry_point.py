@@ -162,11 +162,11 @@ def _against(rule: SensorRule | None, entry: Entry, dimensions: int) -> float:
     return parsimony if allowed else parsimony + ENTRY_SENSOR_PENALTY
 
 
-def _angle(one: ComplexArray, other: ComplexArray) -> float:
+def _angle(first: ComplexArray, other: ComplexArray) -> float:
     """Mean sine of the largest angle between two subspaces; 1 where they have different dimensions."""
-    if one.shape[2] != other.shape[2]:
+    if first.shape[2] != other.shape[2]:
         return 1.0
-    cosines = np.linalg.svd(np.einsum("lck,lcj->lkj", one.conj(), other), compute_uv=False)[:, -1]
+    cosines = np.linalg.svd(np.einsum("lck,lcj->lkj", first.conj(), other), compute_uv=False)[:, -1]
     return float(np.mean(np.sqrt(np.maximum(1 - cosines**2, 0.0))))
 
 

@@ -89,7 +89,7 @@ def entries_of(
     """frequency_hz: (lines,). position: whether its channels are looked at beside the response's."""
     seen = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
     forces = np.concatenate([seen.response, seen.position], axis=1) if position else seen.response
-    axes = tuple(axis_letter(one, recording.command.channels) for one in recording.command.channels)
+    axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)
     p, channels = model.outputs, forces.shape[1]
     unit = np.eye(channels, dtype=np.complex128)[None]
     found = [Entry(f"a force along {axis}", "mechanism", axis, forces[:, :, [k]]) for k, axis in enumerate(axes)]

@@ -94,12 +94,12 @@ def mismatch_cells(
         raise ValueError(f"the mask of used samples must have shape ({len(recording)},), not {counted.shape}")
     allowed = margin or Margin()
     cells: list[MismatchCell] = []
-    for channels, one in seen:
+    for channels, observation in seen:
         groups: dict[tuple[str, Band, float], list[ResidualLines]] = {}
-        for lines in residual_lines(recording, one, counted):
+        for lines in residual_lines(recording, observation, counted):
             groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
         for group in groups.values():
-            cells += [_cell(group, k, name, one, allowed) for k, name in enumerate(channels)]
+            cells += [_cell(group, k, name, observation, allowed) for k, name in enumerate(channels)]
     return _adjusted(cells)
 
 
@@ -122,14 +122,14 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, 
     first = group[0]
     quantity = seen.quantities[k]
     allowed = margin.of(name, quantity, first.input, first.band_hz)
-    seconds = np.array([one.seconds for one in group])
-    lines = np.array([one.lines for one in group])
+    seconds = np.array([part.seconds for part in group])
+    lines = np.array([part.lines for part in group])
     residual, noise, signal = (
-        float(np.average([getattr(one, what)[k] for one in group], weights=seconds))
+        float(np.average([getattr(part, what)[k] for part in group], weights=seconds))
         for what in ("residual", "noise", "signal")
     )
-    ratio = float(np.average([one.whitened[k] for one in group], weights=lines))
-    shift = 2 * allowed**2 * sum(float(one.signal_to_noise[k]) for one in group)
+    ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
+    shift = 2 * allowed**2 * sum(float(part.signal_to_noise[k]) for part in group)
     p_value = float(noncentral_f_sf(ratio, lines.sum(), max(float(seen.noise.freedom[k]), 1.0), shift))
     return MismatchCell(
         name, quantity, first.input, first.band_hz, first.amplitude,

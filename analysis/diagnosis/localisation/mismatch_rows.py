@@ -27,7 +27,7 @@ def mismatch_rows(
 ) -> tuple[Mismatch, ...]:
     """Significant ones, largest share first; of the cells, the share of their signal (rms, at most 1), of the states,
     the share of the mismatch's power that sits there. What states there are is kept before what cells there are."""
-    tied = [(one.region.share, _state_row(one)) for one in states if one.region.p_value <= FALSE_DISCOVERY_RATE]
+    tied = [(state.region.share, _state_row(state)) for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
     found = [(cell.share, _cell_row(cell)) for cell in cells if cell.significant]
     best = sorted(tied, key=_by_share)[:most]
     best += sorted(found, key=_by_share)[: most - len(best)]
@@ -44,6 +44,8 @@ def _cell_row(cell: MismatchCell) -> Mismatch:
     )
 
 
-def _state_row(one: StateMismatch) -> Mismatch:
-    region = one.region
-    return Mismatch(one.output, one.input, one.band_hz, None, region.words, min(region.share, 1.0), region.p_value)
+def _state_row(state: StateMismatch) -> Mismatch:
+    region = state.region
+    return Mismatch(
+        state.output, state.input, state.band_hz, None, region.words, min(region.share, 1.0), region.p_value
+    )

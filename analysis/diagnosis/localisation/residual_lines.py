@@ -69,7 +69,7 @@ nothing is a matter of a degree of misalignment, and judged by the loudest."""
 def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[ResidualLines]:
     """used: (n,), the samples that count. Segments without a whole period or window of them are left out."""
     whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
-    periods = {one.index: one for one in settled_periods(recording)}
+    periods = {period.index: period for period in settled_periods(recording)}
     found: list[ResidualLines] = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         if segment.kind == "rest":

@@ -51,23 +51,23 @@ def residual_spectra(
         noises.append(floor.position)
     residual = np.hstack(left)
     whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
-    looks = [one for one in (_within(periods, whole) for periods in settled_periods(recording)) if one.starts]
+    looks = [period for period in (_within(periods, whole) for periods in settled_periods(recording)) if period.starts]
     if not looks:
         looks = _windows(recording, whole)
-    looks = [one for one in looks if one.length == looks[0].length]
+    looks = [look for look in looks if look.length == looks[0].length]
     if not looks or not floor.known:
         return None
     lines_hz = looks[0].frequency_hz(recording.sample_rate_hz)
-    excitation = np.stack([look_spectra(instrument_of(recording), one).mean(axis=0) for one in looks])
+    excitation = np.stack([look_spectra(instrument_of(recording), look).mean(axis=0) for look in looks])
     together = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
     driven = detection_lines(together, held_samples(instrument_of(recording)))
     if driven is None:
         return None
     first, last = np.flatnonzero(driven.driven)[[0, -1]]
     inside = slice(int(first), int(last) + 1)
-    spectra = np.stack([look_spectra(residual, one).mean(axis=0)[inside] for one in looks])
-    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], one) for one in looks])
-    noise += model_error**2 * np.stack([_answered(recording, one, len(noises) > 1)[inside] for one in looks])
+    spectra = np.stack([look_spectra(residual, look).mean(axis=0)[inside] for look in looks])
+    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[inside], look) for look in looks])
+    noise += model_error**2 * np.stack([_answered(recording, look, len(noises) > 1)[inside] for look in looks])
     return ResidualSpectra(lines_hz[inside], spectra, noise, left[0].shape[1])
 
 

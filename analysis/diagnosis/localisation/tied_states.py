@@ -44,7 +44,7 @@ def tied_forces(
         strata = _strata(recording, evidence.used > 0, command)
         worst = max(mine, key=lambda cell: cell.in_noise)
         seen = state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
-        found.append([StateMismatch(worst.output, channel, _band(mine), one) for one in seen])
+        found.append([StateMismatch(worst.output, channel, _band(mine), region) for region in seen])
     return _corrected(found, looked_at=6)
 
 
@@ -55,7 +55,7 @@ def tied_errors(
     found = []
     for k, channel in enumerate(recording.response.channels):
         own = recording.response.quantities[k]
-        mine = [one for one in cells if one.significant and (one.output, one.quantity) == (channel, own)]
+        mine = [cell for cell in cells if cell.significant and (cell.output, cell.quantity) == (channel, own)]
         if not mine or channel not in channels:
             continue
         reading = evidence.response[:, k]
@@ -64,9 +64,11 @@ def tied_errors(
             State("time", "t", "s", np.arange(len(reading)) / evidence.sample_rate_hz),
         ]
         strata = _strata(recording, evidence.used > 0, reading)
-        inputs = "+".join(one for one in recording.command.channels if any(one in m.input.split("+") for m in mine))
+        inputs = "+".join(
+            channel for channel in recording.command.channels if any(channel in m.input.split("+") for m in mine)
+        )
         seen = state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
-        found.append([StateMismatch(channel, inputs, _band(mine), one) for one in seen])
+        found.append([StateMismatch(channel, inputs, _band(mine), region) for region in seen])
     return _corrected(found, looked_at=2)
 
 
@@ -76,12 +78,13 @@ def _corrected(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tupl
     kept = []
     for group in found:
         raised = [
-            replace(one, region=replace(one.region, p_value=min(1.0, tests * one.region.p_value))) for one in group
+            replace(state, region=replace(state.region, p_value=min(1.0, tests * state.region.p_value)))
+            for state in group
         ]
         significant = [
-            one for one in raised if one.region.p_value <= FALSE_DISCOVERY_RATE and _says_something(one.region)
+            state for state in raised if state.region.p_value <= FALSE_DISCOVERY_RATE and _says_something(state.region)
         ]
-        kept += sorted(significant, key=lambda one: -one.region.share)[:STATES_NAMED]
+        kept += sorted(significant, key=lambda state: -state.region.share)[:STATES_NAMED]
     return tuple(kept)
 
 

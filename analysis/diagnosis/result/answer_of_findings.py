@@ -68,12 +68,12 @@ def named_sentences(found: Findings) -> tuple[str, ...]:
             filter(
                 None,
                 (
-                    f"{capital(effect_title(one, single))}, {numbers_text(one.effect, one.parameters)}.",
-                    inseparable_sentence(one),
+                    f"{capital(effect_title(effect, single))}, {numbers_text(effect.effect, effect.parameters)}.",
+                    inseparable_sentence(effect),
                 ),
             )
         )
-        for one in found.diagnosis.effects
+        for effect in found.diagnosis.effects
     )
 
 
@@ -113,13 +113,14 @@ def drawn_excerpt(courses: Sequence[Course]) -> DrawnExcerpt | None:
     stretches = [(course, *ends) for course in courses for ends in course.tested]
     if not stretches:
         return None
-    course, first, last = max(stretches, key=lambda one: float(_change(*one).max(initial=0.0)))
+    course, first, last = max(stretches, key=lambda stretch: float(_change(*stretch).max(initial=0.0)))
     changed = _change(course, first, last)
     at, c = divmod(int(np.argmax(changed)), changed.shape[1])
     begin = max(min(first + at - DRAWN // 2, last - DRAWN), first)
     part = slice(begin, min(begin + DRAWN, last))
     measured, retuned, after = (
-        tuple(np.nan_to_num(one[part, c]).tolist()) for one in (course.measured, course.retuned, course.after)
+        tuple(np.nan_to_num(course_of[part, c]).tolist())
+        for course_of in (course.measured, course.retuned, course.after)
     )
     step_s = 1 / course.sample_rate_hz
     return DrawnExcerpt(

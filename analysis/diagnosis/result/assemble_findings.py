@@ -70,7 +70,7 @@ def assembled(
         local=local,
         floor=floors[0],
         tuning=tuning,
-        axes=tuple(axis_letter(one, said.inputs) for one in said.inputs),
+        axes=tuple(axis_letter(name, said.inputs) for name in said.inputs),
         proposal=proposal,
         split_s=_split_s(measure),
     )
@@ -139,8 +139,8 @@ def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) ->
     for number, record in enumerate(measure.records):
         count = record.measured.shape[1]
         before, retuned, after = (
-            record.measured - one.fitted.residuals[number] * measure.unit
-            for one in (found.before, found.retuned, found.after)
+            record.measured - contender.fitted.residuals[number] * measure.unit
+            for contender in (found.before, found.retuned, found.after)
         )
         courses.append(
             Course(
@@ -159,9 +159,11 @@ def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) ->
 
 
 def _units(recording: Recording) -> tuple[str, ...]:
-    signals = [one for one in (recording.response, recording.position) if one is not None]
+    signals = [signal for signal in (recording.response, recording.position) if signal is not None]
     return tuple(
-        one.unit if isinstance(one.unit, str) else one.unit[k] for one in signals for k in range(len(one.channels))
+        signal.unit if isinstance(signal.unit, str) else signal.unit[k]
+        for signal in signals
+        for k in range(len(signal.channels))
     )
 
 
@@ -174,7 +176,7 @@ def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature
     """Each named effect's, against the final model without it alone."""
     measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
     names = Names(
-        tuple(axis_letter(one, said.inputs) for one in said.inputs), said.outputs, said.response_unit, said.rotational
+        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.rotational
     )
     hold, drawn = measure.records[0].recording.hold, []
     for number in range(len(fitted.hypothesis.claims)):
@@ -182,7 +184,7 @@ def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature
         bare = gather_evidence(measure, tuning, evaluated(measure, tuning, fitted.deviations, others))
         own = fitted.hypothesis.of_claim(number)
         drawn.append(
-            signature_of(bare[0], max(own, key=lambda one: _strength(one.values)), others.placed(), names, hold)
+            signature_of(bare[0], max(own, key=lambda placed: _strength(placed.values)), others.placed(), names, hold)
         )
     return tuple(drawn)
 

@@ -31,12 +31,14 @@ def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: 
         _courses(record.command, np.nan_to_num(record.measured - left * measure.unit))
         for record, left in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
-    terms = [_terms(one) for one in _within_what_was_fitted(courses, fitted)]
-    rows = np.vstack([one[mask] for one, mask in zip(terms, fitted, strict=True)])
-    left = np.vstack([one[mask] for one, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
+    terms = [_terms(course) for course in _within_what_was_fitted(courses, fitted)]
+    rows = np.vstack([term[mask] for term, mask in zip(terms, fitted, strict=True)])
+    left = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
     scale = _scale(rows)
     weights = np.stack([_chosen(rows / scale, left[:, c], numbers) for c in range(left.shape[1])], axis=1)
-    corrected = tuple(one - each / scale @ weights for one, each in zip(retuned.fitted.residuals, terms, strict=True))
+    corrected = tuple(
+        residual - each / scale @ weights for residual, each in zip(retuned.fitted.residuals, terms, strict=True)
+    )
     error = _normalised(measure, corrected, [record.test for record in measure.records])
     return BlackBox("polynomial of the model's signals", numbers * left.shape[1], error, physics)
 
@@ -50,8 +52,8 @@ def _scale(rows: FloatArray) -> FloatArray:
 
 def _within_what_was_fitted(courses: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
     """Held at the ends of the range that was fitted to: beyond it, powers would be anything, and easy to beat."""
-    seen = np.vstack([one[mask] for one, mask in zip(courses, fitted, strict=True)])
-    return [np.clip(one, seen.min(axis=0), seen.max(axis=0)) for one in courses]
+    seen = np.vstack([course[mask] for course, mask in zip(courses, fitted, strict=True)])
+    return [np.clip(course, seen.min(axis=0), seen.max(axis=0)) for course in courses]
 
 
 def _courses(command: FloatArray, predicted: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
     errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
     rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
     off = [errors.retuned, errors.after, errors.noise]
-    factors = [f"{math.exp(one):.3g}" for one in off if one is not None]
+    factors = [f"{math.exp(ratio):.3g}" for ratio in off if ratio is not None]
     said = "how far its amplitudes are off is not known"
     if len(factors) == len(off):
         without, with_it, chance = factors

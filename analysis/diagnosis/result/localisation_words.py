@@ -16,7 +16,7 @@ _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shif
 def localisation_sentences(local: Localisation) -> tuple[str, ...]:
     """Of what re-tuning leaves: where it enters, and the states that it is tied to."""
     said = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
-    return tuple(one for one in said if one)
+    return tuple(sentence for sentence in said if sentence)
 
 
 def entry_sentence(entry: EntryPoint | None) -> str:
@@ -35,18 +35,18 @@ def states_sentence(states: Sequence[StateMismatch]) -> str:
     if not states:
         return ""
     parts = [
-        f"{one.output}, driven by {one.input}, {one.region.words} ({share_text(one.region.share)} of what is missing, "
-        f"{p_text(one.region.p_value)})"
-        for one in states
+        f"{state.output}, driven by {state.input}, {state.region.words} ({share_text(state.region.share)} of what is "
+        f"missing, {p_text(state.region.p_value)})"
+        for state in states
     ]
     return f"It is tied to a state: {'; '.join(parts)}."
 
 
 def _next(entry: EntryPoint) -> str:
-    best, others = entry.ranking[0], [one for one in entry.ranking[1:] if one.name not in entry.ranking[0].alike]
+    best, others = entry.ranking[0], [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].alike]
     alike = f"; so does {listed(best.alike)}, which looks the same" if best.alike else ""
     # Forces along several axes hold each single one, and errors of several channels each channel's.
-    rivals = [one for one in others if not (one.axis is None and one.place == best.place)]
+    rivals = [other for other in others if not (other.axis is None and other.place == best.place)]
     if not rivals:
         return alike
     second = rivals[0]

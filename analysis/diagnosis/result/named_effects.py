@@ -93,7 +93,7 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
     unit = BY_NOISE if found.statistic is None else BY_CHANCE
     for other in contenders[1:]:
         claim = other.fitted.hypothesis.claims[-1]
-        if claim.effect.name == best.fitted.hypothesis.claims[-1].effect.name or claim.effect.name in rivals:
+        if claim.effect.name == best.newest or claim.effect.name in rivals:
             continue
         same = both_stand(best, other)
         rivals[claim.effect.name] = Rival(
@@ -101,14 +101,14 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
         )
         if len(rivals) == MOST_RIVALS:
             break
-    return tuple(rivals.values()), by_name[best.fitted.hypothesis.claims[-1].effect.name]
+    return tuple(rivals.values()), by_name[best.newest]
 
 
 def _chances_of_names(contenders: Sequence[Contender], chances: Sequence[float]) -> dict[str, float]:
     """An effect may contend several times, at other axes or from another start: the name is one."""
     found: dict[str, float] = {}
-    for one, chance in zip(contenders, chances, strict=True):
-        name = one.fitted.hypothesis.claims[-1].effect.name
+    for contender, chance in zip(contenders, chances, strict=True):
+        name = contender.newest
         found[name] = min(1.0, found.get(name, 0.0) + chance)
     return found
 
@@ -166,7 +166,7 @@ def _reported(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, fl
     reported = [dict(claim.effect.report(values)) for values in groups]
     main = EFFECTS_BY_NAME[claim.effect.name].main.name
     if claim.effect.name in LARGEST and len(reported) > 1:
-        return max(reported, key=lambda one: abs(one[main]))
+        return max(reported, key=lambda values: abs(values[main]))
     return reported[0]
 
 
@@ -177,7 +177,7 @@ LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
 def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
     placed = whole.placed(point)
     first = sum(claim.groups for claim in whole.claims[:number])
-    return [dict(one.values) for one in placed[first : first + whole.claims[number].groups]]
+    return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 
 
 # How likely each contender is the right one, from how far apart they stand.
@@ -187,10 +187,10 @@ def probabilities(contenders: Sequence[Contender], left: float) -> tuple[float, 
     if not contenders:
         return ()
     best = contenders[0]
-    behind = np.array([max(one.standing.chosen_by - best.standing.chosen_by, 0.0) for one in contenders])
-    refines = np.array([one is not best and only_refines(one, best) for one in contenders])
+    behind = np.array([max(contender.standing.chosen_by - best.standing.chosen_by, 0.0) for contender in contenders])
+    refines = np.array([contender is not best and only_refines(contender, best) for contender in contenders])
     weights = np.where(refines, 0.0, np.exp(-behind / PROBABILITY_SCALE))
-    return tuple((1 - elsewhere(left)) * float(one) for one in weights / weights.sum())
+    return tuple((1 - elsewhere(left)) * float(weight) for weight in weights / weights.sum())
 
 
 def elsewhere(left: float) -> float:

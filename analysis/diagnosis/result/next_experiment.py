@@ -48,8 +48,10 @@ def foresee(
 ) -> tuple[Foreseen, ...]:
     """The most telling for its cost first, those that tell too little last. known: (t + numbers, twice), the
     information on the rival's numbers that has been recorded so far, calibration included."""
-    found = [Foreseen(one, _gain(bench, named, rival, known, one)) for one in menu]
-    return tuple(sorted(found, key=lambda one: (one.gain < TELLING_GAIN, -one.gain / one.experiment.minutes)))
+    found = [Foreseen(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu]
+    return tuple(
+        sorted(found, key=lambda foreseen: (foreseen.gain < TELLING_GAIN, -foreseen.gain / foreseen.experiment.minutes))
+    )
 
 
 def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None:
@@ -65,27 +67,27 @@ def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None
     )
 
 
-def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, one: Experiment) -> float:
-    base = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, one)
-    differs = _predicted(bench, named.deviations, named.hypothesis, named.hypothesis.point, one) - base
+def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experiment: Experiment) -> float:
+    base = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
+    differs = _predicted(bench, named.deviations, named.hypothesis, named.hypothesis.point, experiment) - base
     columns = []
     for number in range(len(rival.deviations)):
         there = rival.deviations.copy()
         there[number] += MOVED
-        columns.append((_predicted(bench, there, rival.hypothesis, rival.hypothesis.point, one) - base) / MOVED)
+        columns.append((_predicted(bench, there, rival.hypothesis, rival.hypothesis.point, experiment) - base) / MOVED)
     for number, of in enumerate(rival.hypothesis.numbers):
         point = rival.hypothesis.point.copy()
         point[number] += of.move
-        columns.append((_predicted(bench, rival.deviations, rival.hypothesis, point, one) - base) / of.move)
-    return _left(bench, rival, known, (one, differs, np.array(columns))) / 2
+        columns.append((_predicted(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
+    return _left(bench, rival, known, (experiment, differs, np.array(columns))) / 2
 
 
 def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]) -> float:
     """Squares that stay when the rival re-tunes, by steps that are tried out: what numbers do is no straight line.
     seen: the experiment, the difference to be tuned away, and what each of the rival's numbers does to it."""
-    one, differs, moves = seen
+    experiment, differs, moves = seen
     tuned, t = np.zeros(len(known)), len(rival.deviations)
-    wanted = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, one) + differs
+    wanted = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
     whole, least, rest = float(differs @ differs), np.inf, differs
     pull = moves @ differs
     straight = whole - float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
@@ -94,7 +96,7 @@ def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment
         tuned = tuned + step
         try:
             there = _predicted(
-                bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], one
+                bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], experiment
             )
         except (MechanicalModelError, np.linalg.LinAlgError):
             break
@@ -109,11 +111,13 @@ def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment
 
 
 def _predicted(
-    bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, one: Experiment
+    bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
 ) -> FloatArray:
     model: MechanicalModel = bench.tuning.tuned(deviations)
-    model = heavier(model, one.added) if one.added else model
+    model = heavier(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
-        played = simulate_mechanism(model, one.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold)
+        played = simulate_mechanism(
+            model, experiment.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold
+        )
         signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

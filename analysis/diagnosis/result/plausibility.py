@@ -46,7 +46,7 @@ def _at_an_edge(value: float, parameter: Parameter) -> bool:
 
 
 def _of_interval(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator[str]:
-    placed = next((one for one in named if one.effect.name == effect.effect), None)
+    placed = next((placed for placed in named if placed.effect.name == effect.effect), None)
     for parameter in placed.effect.parameters[:1] if placed is not None else ():
         estimate = effect.parameters.get(parameter.name)
         if estimate is None or estimate.ci95 is None or parameter.none is None:
@@ -72,8 +72,8 @@ def _ends(matrix: FloatArray) -> tuple[float, float]:
 
 def _unit(effect: str, parameter: str, found: Findings) -> str:
     known = EFFECTS_BY_NAME.get(effect)
-    for one in known.parameters if known else ():
-        if one.name == parameter:
+    for known_parameter in known.parameters if known else ():
+        if known_parameter.name == parameter:
             response = found.courses[0].units[0] if found.courses else RESPONSE
-            return one.unit_in(found.given.rotational, response)
+            return known_parameter.unit_in(found.given.rotational, response)
     return "1"

@@ -59,9 +59,9 @@ def proposed_experiment(arena: Arena, found: Explanation) -> Proposal | None:
 def _rival(contenders: tuple[Contender, ...]) -> Contender | None:
     """The best of those that the answer holds beside the named effect."""
     best = contenders[0]
-    name = best.fitted.hypothesis.claims[-1].effect.name
+    name = best.newest
     for other in contenders[1:]:
-        if other.fitted.hypothesis.claims[-1].effect.name != name and both_stand(best, other):
+        if other.newest != name and both_stand(best, other):
             return other
     return None
 

@@ -151,7 +151,7 @@ def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        wrong = tuple(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        wrong = tuple(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
         raise RealAnswerError(wrong) from error
 
 

@@ -31,12 +31,12 @@ class RemainderSpectrum:
 
 def remainder_spectra(courses: Sequence[Course], floor: NoiseFloor | None) -> tuple[RemainderSpectrum, ...]:
     """One per channel, over all held-out stretches; in sixths of an octave. Empty where nothing was held out."""
-    parts = [(one, start, stop) for one in courses for start, stop in one.tested if stop - start >= 64]
+    parts = [(course, start, stop) for course in courses for start, stop in course.tested if stop - start >= 64]
     if not parts:
         return ()
     first = parts[0][0]
     parts = [part for part in parts if part[0].channels == first.channels]
-    rate_hz = min(one.sample_rate_hz for one, _, _ in parts)
+    rate_hz = min(course.sample_rate_hz for course, _, _ in parts)
     length = min(_LENGTH, min(stop - start for _, start, stop in parts))
     lines_hz: FloatArray = np.fft.rfftfreq(length, 1 / rate_hz)[1:].astype(np.float64)
     weights = np.array([stop - start for _, start, stop in parts], dtype=float)

@@ -47,15 +47,15 @@ def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ..
 
 def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
     """Those that moved by a standard deviation or more, the furthest first. deviations: (parameters,)"""
-    moved = [one for one in all_numbers(tuning, deviations) if abs(one.deviations) >= RETUNING_NAMED]
-    return tuple(sorted(moved, key=lambda one: -abs(one.deviations)))
+    moved = [number for number in all_numbers(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
+    return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
 
 
 def retuned_sentence(moved: Sequence[MovedNumber]) -> str:
     """Beside named physics: what else was turned."""
     if not moved:
         return ""
-    texts = [one.text for one in moved[:_NAMED]]
+    texts = [number.text for number in moved[:_NAMED]]
     more = len(moved) - _NAMED
     said = listed([*texts, f"{more} more"] if more > 0 else texts)
     return f"Re-tuned beyond the calibration's standard deviation: {said}."
@@ -64,19 +64,19 @@ def retuned_sentence(moved: Sequence[MovedNumber]) -> str:
 def doubtful_sentences(moved: Sequence[MovedNumber]) -> tuple[str, ...]:
     """Numbers that left what their calibration makes likely: they may stand for physics that was not named. Many are
     counted, for all of them stand in the table of numbers."""
-    far = [one for one in moved if abs(one.deviations) >= RETUNING_DOUBTED]
+    far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
     if len(far) > _NAMED:
-        edge = sum(abs(one.deviations) >= RETUNING_BOUND - 1e-6 for one in far)
+        edge = sum(abs(number.deviations) >= RETUNING_BOUND - 1e-6 for number in far)
         return (
             f"{len(far)} numbers were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
             f"{f', {edge} of them as far as they may' if edge else ''}: "
             "either the calibration is wrong, or they stand for physics that was not named.",
         )
     return tuple(
-        f"The {one.name} was moved by {abs(one.deviations):.2g} standard deviations of its calibration"
-        f"{_AS_FAR if abs(one.deviations) >= RETUNING_BOUND - 1e-6 else ''}: "
+        f"The {number.name} was moved by {abs(number.deviations):.2g} standard deviations of its calibration"
+        f"{_AS_FAR if abs(number.deviations) >= RETUNING_BOUND - 1e-6 else ''}: "
         "either the calibration is wrong, or it stands for physics that was not named."
-        for one in far
+        for number in far
     )
 
 

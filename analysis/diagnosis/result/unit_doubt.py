@@ -30,9 +30,9 @@ def _factor(course: Course, channel: int) -> float | None:
     known = np.isfinite(measured) & np.isfinite(predicted)
     if not known.any():
         return None
-    one, other = (each[known] - np.mean(each[known]) for each in (measured, predicted))
-    sizes = float(np.sqrt(one @ one)), float(np.sqrt(other @ other))
-    together = float(one @ other)
+    actual, other = (each[known] - np.mean(each[known]) for each in (measured, predicted))
+    sizes = float(np.sqrt(actual @ actual)), float(np.sqrt(other @ other))
+    together = float(actual @ other)
     if min(sizes) == 0 or not np.isfinite(sizes).all() or abs(together) < UNIT_CORRELATION * sizes[0] * sizes[1]:
         return None
     return float(np.copysign(sizes[0] / sizes[1], together))

@@ -36,7 +36,7 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), si
         return f"The model answers as the device does: {_one_error('as it was given', errors.before, errors)}."
     if diagnosis.verdict == "parameters":
         off = (
-            f": {listed([one.text for one in moved])}"
+            f": {listed([number.text for number in moved])}"
             if moved
             else ", each within its calibration's standard deviation"
         )
@@ -98,11 +98,11 @@ def inseparable_sentence(effect: NamedEffect) -> str:
     odds = ", ".join(
         f"{noun_of(name)} {probability_text(probability)}"
         for name, probability in (
-            (effect.effect, effect.probability), *((one.effect, one.probability) for one in others)
+            (effect.effect, effect.probability), *((other.effect, other.probability) for other in others)
         )
     )  # fmt: skip
     return (
-        f"These data cannot tell {noun_of(effect.effect)} from {listed([noun_of(one.effect) for one in others])}: "
+        f"These data cannot tell {noun_of(effect.effect)} from {listed([noun_of(other.effect) for other in others])}: "
         f"{both} named (probabilities: {odds})."
     )
 
@@ -112,10 +112,10 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     left = diagnosis.remainder
     if not left:
         return "Nothing significant is left unexplained."
-    worst = sorted(left, key=lambda one: one.share, reverse=True)
+    worst = sorted(left, key=lambda row: row.share, reverse=True)
     more = len(left) - _PLACES_NAMED
     rest = f"; and {more} smaller {'place' if more == 1 else 'places'}" if more > 0 else ""
-    return f"Still unexplained: {'; '.join(place_of(one) for one in worst[:_PLACES_NAMED])}{rest}."
+    return f"Still unexplained: {'; '.join(place_of(row) for row in worst[:_PLACES_NAMED])}{rest}."
 
 
 def place_of(mismatch: Mismatch) -> str:

@@ -53,7 +53,7 @@ def _faint(effect: Effect, values: Values) -> Values:
 # Starting values for a clock that runs wrong, where a recording is too short to see lateness grow: by trial.
 def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
     """None where the effect's own estimator finds some, where it may not be named, or where no trial is better."""
-    effect = next((one for one in catalogue if one.name == CLOCK_DRIFT), None)
+    effect = next((known for known in catalogue if known.name == CLOCK_DRIFT), None)
     if effect is None or effect.starts(evidence, ALL_SITES):
         return ()
     ppm = _best_drift(evidence)

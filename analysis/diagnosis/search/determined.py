@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.hypothesis import Number
 from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
-from analysis.diagnosis.search.rivalry import Arena, Contender, sensitivity_at
+from analysis.diagnosis.search.rivalry import Arena, sensitivity_at
 from analysis.diagnosis.search.without_step import without_step
 from analysis.diagnosis.settings import INTERVAL_FACTOR, REPLACEMENTS_TRIED, UNDETERMINED_REACH
 from analysis.diagnosis.types import Patience
@@ -30,7 +30,7 @@ def number_errors(arena: Arena, found: Explanation) -> FloatArray:
 def determined(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
     """As it is, where its numbers are fixed; else without the effects whose numbers are open, or with what is as good
     and has them."""
-    left_open = [number for number, one in enumerate(_open(arena, found)) if one] if found.steps else []
+    left_open = [number for number, is_open in enumerate(_open(arena, found)) if is_open] if found.steps else []
     if not left_open:
         return found
     worst = left_open[-1]
@@ -40,17 +40,19 @@ def determined(arena: Arena, found: Explanation, patient: Patience) -> Explanati
         found = (_instead(arena, found) if len(found.steps) == 1 else None) or _nothing(found)
         return replace(found, undetermined=known)
     fewer = without_step(arena, found, worst)
-    rounds = tuple(tuple(one for one in contenders if _name(one) != name) for contenders in fewer.rounds)
+    rounds = tuple(
+        tuple(contender for contender in contenders if contender.newest != name) for contenders in fewer.rounds
+    )
     return determined(arena, replace(fewer, rounds=rounds, undetermined=known), patient)
 
 
 def _instead(arena: Arena, found: Explanation) -> Explanation | None:
     """The next that is as good, where its numbers are fixed."""
     best = found.rounds[0][0]
-    others = tuple(one for one in found.rounds[0] if _name(one) != _name(best))
-    as_good = {_name(one): one for one in reversed(others) if both_stand(best, one)}
-    for other in sorted(as_good.values(), key=lambda one: one.standing.chosen_by)[:REPLACEMENTS_TRIED]:
-        rest = tuple(one for one in others if one is not other)
+    others = tuple(contender for contender in found.rounds[0] if contender.newest != best.newest)
+    as_good = {contender.newest: contender for contender in reversed(others) if both_stand(best, contender)}
+    for other in sorted(as_good.values(), key=lambda contender: contender.standing.chosen_by)[:REPLACEMENTS_TRIED]:
+        rest = tuple(contender for contender in others if contender is not other)
         instead = replace(found, after=arena.confirmed(other), rounds=((other, *rest),), steps=(other,))
         if not any(_open(arena, instead)):
             return instead
@@ -61,10 +63,6 @@ def _nothing(found: Explanation) -> Explanation:
     return replace(found, after=found.retuned, steps=())
 
 
-def _name(one: Contender) -> str:
-    return one.fitted.hypothesis.claims[-1].effect.name
-
-
 def _open(arena: Arena, found: Explanation) -> Iterator[bool]:
     """By effect: whether every number that could be none might as well be any other."""
     hypothesis, first = found.after.fitted.hypothesis, 0
@@ -72,10 +70,10 @@ def _open(arena: Arena, found: Explanation) -> Iterator[bool]:
     each = list(zip(hypothesis.numbers, hypothesis.point.tolist(), errors.tolist(), strict=True))
     for claim in hypothesis.claims:
         free = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
-        own = [one for one in each[first : first + free] if np.isfinite(one[0].parameter.none or 0.0)]
+        own = [number for number in each[first : first + free] if np.isfinite(number[0].parameter.none or 0.0)]
         first += free
         could_be_none = [(number, at, error) for number, at, error in own if number.parameter.none is not None]
-        yield bool(could_be_none) and all(_is_open(*one) for one in could_be_none)
+        yield bool(could_be_none) and all(_is_open(*number) for number in could_be_none)
 
 
 def _is_open(number: Number, at: float, error: float) -> bool:

@@ -72,8 +72,8 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
     steps: list[Contender] = []
     barred = ""
     hasty, ended_early = replace(arena, map_=impatient(arena.map_, patient)), False
-    for one in arena.certain:
-        base = _with(arena, base, one)
+    for certain in arena.certain:
+        base = _with(arena, base, certain)
         rounds.append((base,))
         steps.append(base)
     surprised |= arena.sound is not None
@@ -89,12 +89,12 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
         except OutOfPatienceError:
             ended_early = True
             break
-        named = tuple(one for one in contenders if one.fitted.hypothesis.claims[-1].effect.name not in arena.barred)
+        named = tuple(contender for contender in contenders if contender.newest not in arena.barred)
         rounds.append(named)
         if not named or not worthwhile(base, named[0]):
             break
         if named[0] is not contenders[0]:
-            barred = contenders[0].fitted.hypothesis.claims[-1].effect.name
+            barred = contenders[0].newest
             break
         base = named[0]
         steps.append(base)
@@ -102,9 +102,9 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
 
 
-def _with(arena: Arena, base: Contender, one: Hypothesis) -> Contender:
+def _with(arena: Arena, base: Contender, hypothesis: Hypothesis) -> Contender:
     """Whatever it gains."""
-    start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, one))
+    start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, hypothesis))
     return arena.contender(refine(arena, start))
 
 
@@ -135,18 +135,20 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
     held = base.hypothesis.claims
     evidence = gather_evidence(arena.measure, arena.tuning, base)
     suggested = [
-        one
-        for one in candidates([one for one in catalogue if arena.measure.tells(one)], evidence[0])
-        if not any(excludes(claim, one.claims[0]) for claim in held)
+        hypothesis
+        for hypothesis in candidates([effect for effect in catalogue if arena.measure.tells(effect)], evidence[0])
+        if not any(excludes(claim, hypothesis.claims[0]) for claim in held)
     ]
     if arena.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held):
-        suggested += clock_drift_by_trial([one for one in catalogue if arena.measure.tells(one)], evidence[0])
+        suggested += clock_drift_by_trial([effect for effect in catalogue if arena.measure.tells(effect)], evidence[0])
     known = sensitivity_at(arena, base.deviations, base.hypothesis)
     step.at(0.2)
     screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
     step.at(0.6)
     contenders = contest(arena, base, known, screened)
-    return plainest_first([one for one in contenders if not silences(arena.measure, base, one.fitted)])
+    return plainest_first(
+        [contender for contender in contenders if not silences(arena.measure, base, contender.fitted)]
+    )
 
 
 def worthwhile(base: Contender, better: Contender) -> bool:

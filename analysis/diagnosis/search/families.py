@@ -1,4 +1,4 @@
-"""Effects that are one thing in several shapes: of those, one at a time can be at an axis."""
+"""Families of effects that describe the same physics in several forms: one of a family at an axis at a time."""
 
 from analysis.diagnosis.errors.hypothesis import Claim
 
@@ -27,5 +27,5 @@ def excludes(held: Claim, other: Claim) -> bool:
     """Whether `other` cannot be beside what is held already."""
     if not set(held.sites) & set(other.sites):
         return False
-    one, two = held.effect.name, other.effect.name
-    return one == two or any(one in family and two in family for family in FAMILIES)
+    names = {held.effect.name, other.effect.name}
+    return len(names) == 1 or any(names <= family for family in FAMILIES)

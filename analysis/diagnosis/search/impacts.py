@@ -56,7 +56,7 @@ def rattling(
     evidence = gather_evidence(arena.measure, arena.tuning, given)[0]
     view = View(BandPower(arena.measure), arena.tuning, arena.map_)
     claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(arena.tuning.model.inputs)]
-    places = sorted((_at(view, evidence, one) for one in claims), key=lambda one: one.cost)
+    places = sorted((_at(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
     if places[0].cost >= foreseen(view, given.deviations, NOTHING).cost:
         return None
     view = _with_chance(view, places[0])
@@ -64,7 +64,7 @@ def rattling(
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_at(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    return _judged(arena, found, best, [one.hypothesis for one in others if _is_model(one)])
+    return _judged(arena, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
 
 
 def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
@@ -80,12 +80,12 @@ def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
         return foreseen(near, given, claimed(claim, [values]))
 
     tried: list[Foreseen] = list(near.map_(at, net))  # type: ignore[arg-type]
-    best = fitted(near, min(tried, key=lambda one: one.cost), FIRST_ROUNDS) if tried else None
+    best = fitted(near, min(tried, key=lambda trial: trial.cost), FIRST_ROUNDS) if tried else None
     return foreseen(view, given, NOTHING if best is None else best.hypothesis)
 
 
-def _is_model(one: Foreseen) -> bool:
-    return bool(one.hypothesis.claims) and bool(np.isfinite(one.cost))
+def _is_model(trial: Foreseen) -> bool:
+    return bool(trial.hypothesis.claims) and bool(np.isfinite(trial.cost))
 
 
 def _with_chance(view: View, at: Foreseen) -> View:
@@ -123,7 +123,7 @@ class _Court:
     def stands(self, deviations: FloatArray, hypothesis: Hypothesis) -> Contender:
         whole = evaluated(self.arena.whole, self.arena.tuning, deviations, hypothesis)
         off = self.power.misfits(self.power.measured - self.power.predicted(whole.residuals))
-        return Contender(whole, Standing(*(self._times(one) for one in (off.fit, off.choose, off.test))))
+        return Contender(whole, Standing(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
 
     def _times(self, off: FloatArray) -> FloatArray:
         """Of a channel in which noise drowns all bands, that it is as good as chance."""
@@ -136,16 +136,16 @@ def _judged(arena: Arena, found: Explanation, best: Foreseen, others: Sequence[H
     given = np.zeros_like(best.deviations)
     before = court.stands(given, NOTHING)
     linear = [before, *(court.stands(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
-    retuned = min(linear, key=lambda one: one.standing.chosen_by)
-    rivals = [court.stands(given, one) for one in others]
+    retuned = min(linear, key=lambda contender: contender.standing.chosen_by)
+    rivals = [court.stands(given, rival) for rival in others]
     earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
     rivals += [
-        court.stands(one.fitted.deviations, one.fitted.hypothesis)
-        for one in earlier
-        if one.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
+        court.stands(contender.fitted.deviations, contender.fitted.hypothesis)
+        for contender in earlier
+        if contender.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
     ]
-    rivals.sort(key=lambda one: one.standing.chosen_by)
-    if not _convincing(named, retuned) or any(_as_good(one, named) for one in rivals):
+    rivals.sort(key=lambda rival: rival.standing.chosen_by)
+    if not _convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, court.chance, best.errors)
     return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
@@ -157,8 +157,8 @@ def _court(arena: Arena, best: Foreseen) -> _Court:
     def course(number: int) -> FloatArray:
         return power.predicted(arena.whole.residuals(model, _apart(best.hypothesis, number).placed()))
 
-    one, other = (np.asarray(each) for each in arena.map_(course, range(2)))
-    apart = power.misfits(one - other)
+    first, other = (np.asarray(each) for each in arena.map_(course, range(2)))
+    apart = power.misfits(first - other)
     chance = np.fmax(np.fmax(apart.fit, apart.choose), apart.test)
     return _Court(arena, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
@@ -173,7 +173,7 @@ def _convincing(named: Contender, retuned: Contender) -> bool:
 
 
 def _as_good(rival: Contender, named: Contender) -> bool:
-    ways = [(getattr(one.standing, part) for one in (rival, named)) for part in ("choose", "test")]
+    ways = [(getattr(contender.standing, part) for contender in (rival, named)) for part in ("choose", "test")]
     return all(_whole(other) <= IMPACTS_AS_GOOD * _whole(own) for other, own in ways if np.isfinite(other).any())
 
 
@@ -184,8 +184,8 @@ def _whole(times: FloatArray) -> float:
 
 # Whether a response is irregular: what should repeat does not, by far more than its noise; or it is full of peaks.
 def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
-    if any(one.how == "repeats" for one in floors):
-        return any(_varies(channel) for one in floors for channel in (one.response, one.position) if channel)
+    if any(floor.how == "repeats" for floor in floors):
+        return any(_varies(channel) for floor in floors for channel in (floor.response, floor.position) if channel)
     masks = [record.fit | record.choose for record in arena.whole.records]
     left = np.vstack([row[mask] for row, mask in zip(found.retuned.fitted.residuals, masks, strict=True)])
     if not len(left):
@@ -196,4 +196,4 @@ def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) ->
 
 
 def _varies(noise: ChannelNoise) -> bool:
-    return any(bool(np.any(one.variance > (VARIES_ERROR * noise.rms) ** 2)) for one in noise.segments)
+    return any(bool(np.any(segment.variance > (VARIES_ERROR * noise.rms) ** 2)) for segment in noise.segments)

@@ -45,8 +45,8 @@ class _Lesson:
     def courses(self) -> tuple[FloatArray, ...]:
         """What is left, (n, c) each, in the channels' own units; NaN where it is not compared."""
         return tuple(
-            np.where((record.fit | record.choose | record.test)[:, None], one * self.measure.unit, np.nan)
-            for record, one in zip(self.measure.records, self.retuned.fitted.residuals, strict=True)
+            np.where((record.fit | record.choose | record.test)[:, None], residual * self.measure.unit, np.nan)
+            for record, residual in zip(self.measure.records, self.retuned.fitted.residuals, strict=True)
         )
 
     @property
@@ -74,13 +74,13 @@ def learned_from(
     diagnosed: what is to be diagnosed, measured alike. Raises NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
     lessons: list[_Lesson] = []
-    for number, one in enumerate(clean):
+    for number, recording in enumerate(clean):
         progress(LEARNING, BEGUN * number / len(clean))
-        chosen = measure_of((one,), model, (*diagnosed, *clean))
+        chosen = measure_of((recording,), model, (*diagnosed, *clean))
         require_alike(chosen.measure.name, error)
-        lessons.append(_lesson(chosen, model, one, map_))
-    floor = learn_floor([one.cells for one in lessons])
-    largest = np.max([one.channels for one in lessons], axis=0)
+        lessons.append(_lesson(chosen, model, recording, map_))
+    floor = learn_floor([lesson.cells for lesson in lessons])
+    largest = np.max([lesson.channels for lesson in lessons], axis=0)
     floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
     return _with_colour(floor, lessons, map_)
 
@@ -95,21 +95,22 @@ def require_alike(learned_by: str, error: str) -> None:
 
 
 def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> Learned:
-    courses = [course for one in lessons for course in one.courses]
-    colour = colour_of(courses, np.min([one.measure.noise for one in lessons], axis=0))
+    courses = [course for lesson in lessons for course in lesson.courses]
+    colour = colour_of(courses, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [
-        _rms([colour.taken_off(course) for course in one.courses]) / _signal(one.measure, one.retuned.fitted.residuals)
-        for one in lessons
+        _rms([colour.taken_off(course) for course in lesson.courses])
+        / _signal(lesson.measure, lesson.retuned.fitted.residuals)
+        for lesson in lessons
     ]
     share = np.max(shares, axis=0)
     sound = [
         sound_recording(
-            coloured(floored(one.measure, floor), colour, share * one.signal),
-            one.tuning,
-            one.retuned.fitted.deviations,
+            coloured(floored(lesson.measure, floor), colour, share * lesson.signal),
+            lesson.tuning,
+            lesson.retuned.fitted.deviations,
             map_,
         )
-        for one in lessons
+        for lesson in lessons
     ]
     return Learned(floor, colour, share, SoundRecordings(tuple(sound), floor.beyond))
 
@@ -117,8 +118,8 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
 def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
     """(c,): rms about the mean of what was measured or of what the model foresees of it, the smaller of both: neither a
     hum or a drift makes it larger, nor a model that is far off."""
-    measured = [one.measured for one in measure.records]
-    foreseen = [one - left * measure.unit for one, left in zip(measured, residuals, strict=True)]
+    measured = [record.measured for record in measure.records]
+    foreseen = [course - left * measure.unit for course, left in zip(measured, residuals, strict=True)]
     sizes = [np.nanstd(np.vstack(courses), axis=0) for courses in (measured, foreseen)]
     return np.asarray(np.maximum(np.fmin(*sizes), np.finfo(float).tiny))
 
@@ -149,7 +150,7 @@ def floored(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
 
 def _size(measure: ErrorMeasure) -> FloatArray:
     """(c,): rms of the signal."""
-    return np.asarray(np.nanstd(np.vstack([one.measured for one in measure.records]), axis=0))
+    return np.asarray(np.nanstd(np.vstack([record.measured for record in measure.records]), axis=0))
 
 
 def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:

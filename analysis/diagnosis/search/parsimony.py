@@ -16,11 +16,11 @@ def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
     for other in contenders[1:]:
         if _is_plainer(other, chosen) and _good_enough(other, chosen):
             chosen = other
-    return (chosen, *(one for one in contenders if one is not chosen))
+    return (chosen, *(contender for contender in contenders if contender is not chosen))
 
 
-def _is_plainer(one: Contender, other: Contender) -> bool:
-    return only_refines(other, one) or (_price(one) < _price(other) and not only_refines(one, other))
+def _is_plainer(plain: Contender, other: Contender) -> bool:
+    return only_refines(other, plain) or (_price(plain) < _price(other) and not only_refines(plain, other))
 
 
 def _price(contender: Contender) -> float:
@@ -29,9 +29,9 @@ def _price(contender: Contender) -> float:
     return 2.0 * len(contender.fitted.hypothesis.point) + float(deviations @ deviations)
 
 
-def only_refines(other: Contender, one: Contender) -> bool:
-    """Whether the other's last effect holds the one's as a special case, at the same place."""
-    return _contained(one, other)
+def only_refines(other: Contender, plain: Contender) -> bool:
+    """Whether the other's last effect contains the plain one's as a special case, at the same place."""
+    return _contained(plain, other)
 
 
 def both_stand(named: Contender, other: Contender) -> bool:
@@ -39,8 +39,8 @@ def both_stand(named: Contender, other: Contender) -> bool:
     return inseparable(named, other) and not only_refines(other, named)
 
 
-def _contained(one: Contender, other: Contender) -> bool:
-    plain, refined = one.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
+def _contained(contender: Contender, other: Contender) -> bool:
+    plain, refined = contender.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
     return plain.effect.name in refined.effect.simpler and set(plain.sites) <= set(refined.sites)
 
 
@@ -48,6 +48,6 @@ def _good_enough(plain: Contender, refined: Contender) -> bool:
     if not _contained(plain, refined):
         return inseparable(refined, plain)
     gained = plain.standing.chosen_by - refined.standing.chosen_by
-    rubs = plain.fitted.hypothesis.claims[-1].effect.name in DRY_FRICTION
+    rubs = plain.newest in DRY_FRICTION
     share = REFINED_FRICTION_SHARE if rubs else REFINED_SHARE
     return gained <= max(REFINED_GAIN, min(share * excess(plain), REFINED_MOST_GAIN))

@@ -41,6 +41,11 @@ class Contender:
     usual: float = 0.0
     """Mean log error power that it would gain on a device in order, and that is counted against it here."""
 
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last."""
+        return self.fitted.hypothesis.claims[-1].effect.name
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arena:
@@ -62,7 +67,7 @@ class Arena:
 
     def half_opened(self) -> "Arena":
         """With the first half of every sealed stretch to fit and to choose by."""
-        whole = self.whole.with_records(tuple(one.unsealed() for one in self.whole.records))
+        whole = self.whole.with_records(tuple(record.unsealed() for record in self.whole.records))
         return replace(self, measure=whole.shortened(), whole=whole)
 
     def contender(self, fitted: Fitted) -> Contender:
@@ -86,19 +91,21 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
     """The best first. known: of the model's own numbers, near the base."""
     measure, tuning = arena.measure, arena.tuning
 
-    def first(one: Screened) -> Fitted:
-        return fit(measure, tuning, evaluated(measure, tuning, base.deviations, one.hypothesis), known, FIRST_ROUNDS)
+    def first(candidate: Screened) -> Fitted:
+        return fit(
+            measure, tuning, evaluated(measure, tuning, base.deviations, candidate.hypothesis), known, FIRST_ROUNDS
+        )
 
     fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
-    fits.sort(key=lambda one: one.cost)
-    gained = [base.cost - one.cost for one in fits]
-    worth = [one for one, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
-    refined = [refine(arena, one) for one in worth[:MOST_REFINED]]
+    fits.sort(key=lambda found: found.cost)
+    gained = [base.cost - found.cost for found in fits]
+    worth = [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
+    refined = [refine(arena, candidate) for candidate in worth[:MOST_REFINED]]
     rest = fits[len(refined) :]
-    plain = [one for one in rest if any(_holds(richer, one) for richer in refined[:1])][:1]
-    refined += [refine(arena, one) for one in plain]
-    contenders = [arena.contender(one) for one in [*refined, *(one for one in rest if one not in plain)]]
-    return tuple(sorted(contenders, key=lambda one: one.standing.chosen_by))
+    plain = [plain_law for plain_law in rest if any(_holds(richer, plain_law) for richer in refined[:1])][:1]
+    refined += [refine(arena, law) for law in plain]
+    contenders = [arena.contender(law) for law in [*refined, *(law for law in rest if law not in plain)]]
+    return tuple(sorted(contenders, key=lambda contender: contender.standing.chosen_by))
 
 
 def refine(arena: Arena, fitted: Fitted) -> Fitted:
@@ -167,8 +174,8 @@ def _holds(richer: Fitted, plain: Fitted) -> bool:
 
 def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:
     varied = _varied(screened)
-    best = max((base.cost - one.cost for one in varied), default=0.0)
-    worth = [one for one in varied if base.cost - one.cost >= WORTH_FITTING * best]
+    best = max((base.cost - candidate.cost for candidate in varied), default=0.0)
+    worth = [candidate for candidate in varied if base.cost - candidate.cost >= WORTH_FITTING * best]
     return (worth if len(worth) >= LEAST_FITTED else varied[:LEAST_FITTED])[:MOST_FITTED]
 
 
@@ -176,23 +183,23 @@ def _varied(screened: Sequence[Screened]) -> list[Screened]:
     """The best start of each hypothesis before the second start of any."""
     seen: dict[object, int] = {}
     ranked = []
-    for one in screened:
-        key = one.hypothesis.key
+    for candidate in screened:
+        key = candidate.hypothesis.key
         seen[key] = seen.get(key, -1) + 1
-        ranked.append((seen[key], one))
-    return [one for _, one in sorted(ranked, key=lambda pair: pair[0])]
+        ranked.append((seen[key], candidate))
+    return [candidate for _, candidate in sorted(ranked, key=lambda pair: pair[0])]
 
 
 # Which of a model's numbers a force at an axis can feel: those that change how that axis moves.
 def felt_numbers(measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis) -> list[int]:
     """plain: what the numbers do where no force depends on the motion. What hardly moves the axes at which such forces
     act does the same beside them."""
-    forces = [one for one in hypothesis.placed() if isinstance(one.effect.acts, (AxisForce, JointForce))]
+    forces = [effect for effect in hypothesis.placed() if isinstance(effect.effect.acts, (AxisForce, JointForce))]
     model = tuning.tuned(np.zeros(len(tuning.names)))
-    if not forces or any(isinstance(one.effect.acts, JointForce) for one in forces):
+    if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):
         return list(range(len(tuning.names)))
     reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
-    sites = {site for one in forces for site in one.sites}
+    sites = {site for force in forces for site in force.sites}
     strength = _strengths(measure, plain.columns, model.outputs)
     felt = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:

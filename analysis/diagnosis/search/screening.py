@@ -33,14 +33,14 @@ def screen(
     model = tuning.tuned(base.deviations)
     errors = fitting(measure, base.residuals)
 
-    def foreseen(one: Hypothesis) -> Screened:
-        whole = together(base.hypothesis, one)
+    def foreseen(hypothesis: Hypothesis) -> Screened:
+        whole = together(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
             there = fitting(measure, measure.residuals(model, whole.placed()))
         return Screened(whole, _reached(base, known, errors, errors - there))
 
     found: list[Screened] = list(map_(foreseen, suggested))  # type: ignore[arg-type]
-    return tuple(sorted(found, key=lambda one: one.cost))
+    return tuple(sorted(found, key=lambda screened: screened.cost))
 
 
 def _reached(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:

@@ -59,8 +59,8 @@ def _remarks(found: Explanation) -> tuple[str, ...]:
 
 def _left_open(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(
-        f"An explanation by {noun_of(one)} is not named: these recordings leave its numbers as good as open."
-        for one in dict.fromkeys(names)
+        f"An explanation by {noun_of(name)} is not named: these recordings leave its numbers as good as open."
+        for name in dict.fromkeys(names)
     )
 
 

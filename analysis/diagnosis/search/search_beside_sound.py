@@ -43,7 +43,7 @@ def _left(arena: Arena, seen: Searched) -> float:
 def _by_size(
     arena: Arena, learned: Learned, catalogue: Sequence[Effect], progress: Progress, patient: Patience
 ) -> Searched:
-    wide = replace(learned.floor, channels=tuple(learned.floor.beyond * one for one in learned.floor.channels))
+    wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
     plain = floored(arena.whole, wide)
     seen = searched(replace(arena, measure=plain.shortened(), whole=plain), catalogue, progress, patient)
     back = floored(arena.whole, learned.floor).with_records(seen.arena.whole.records)
@@ -85,15 +85,17 @@ def _by(arena: Arena, found: Explanation) -> Explanation:
     if after.hypothesis.claims and not arena.certain:
         start = evaluated(arena.measure, arena.tuning, after.deviations, after.hypothesis)
         after = refine(arena, start)
-    steps = [*found.steps[:-1], *(replace(one, fitted=after) for one in found.steps[-1:])]
+    steps = [*found.steps[:-1], *(replace(step, fitted=after) for step in found.steps[-1:])]
     return replace(
         found,
         before=_seen_by(arena.whole, arena, found.before),
         retuned=_seen_by(arena.whole, arena, found.retuned),
         after=_seen_by(arena.whole, arena, replace(found.after, fitted=after)),
-        steps=tuple(_seen_by(arena.measure, arena, one) for one in steps),
+        steps=tuple(_seen_by(arena.measure, arena, step) for step in steps),
     )
 
 
-def _seen_by(measure: ErrorMeasure, arena: Arena, one: Contender) -> Contender:
-    return replace(one, fitted=evaluated(measure, arena.tuning, one.fitted.deviations, one.fitted.hypothesis))
+def _seen_by(measure: ErrorMeasure, arena: Arena, contender: Contender) -> Contender:
+    return replace(
+        contender, fitted=evaluated(measure, arena.tuning, contender.fitted.deviations, contender.fitted.hypothesis)
+    )

@@ -24,8 +24,8 @@ def seen_directly(
     recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
 ) -> tuple[Hypothesis, ...]:
     """At most one, for steps are also there twice and have a largest reading. effects: those that may be named."""
-    known = {one.name: one for one in effects}
-    new, sound = _readings(recordings), [_readings([one]) for one in clean]
+    known = {effect.name: effect for effect in effects}
+    new, sound = _readings(recordings), [_readings([recording]) for recording in clean]
     for name, look in (("quantization", _steps), ("sensor_clipping", _limit), ("lost_samples", _twice)):
         found = look(new, sound)
         if found is not None:
@@ -44,7 +44,7 @@ def _claimed(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypot
 
 def _readings(recordings: Sequence[Recording]) -> FloatArray:
     """(n, p): those that are known, one after the other."""
-    samples = np.vstack([one.response.samples for one in recordings])
+    samples = np.vstack([recording.response.samples for recording in recordings])
     return np.asarray(samples[np.isfinite(samples).all(axis=1)])
 
 
@@ -52,7 +52,7 @@ def _steps(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     found = {}
     for c in range(new.shape[1]):
         step = lattice_step(new[:, c])
-        usual = max((lattice_step(one[:, c]) or 0.0 for one in sound), default=0.0)
+        usual = max((lattice_step(readings[:, c]) or 0.0 for readings in sound), default=0.0)
         if step is not None and step > STEP_FACTOR * usual:
             found[c] = step
     alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
@@ -64,8 +64,8 @@ def _limit(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     found = {}
     for c in range(new.shape[1]):
         limit, count = _at_the_top(new[:, c])
-        usual = max(_at_the_top(one[:, c])[1] / len(one) for one in sound) * len(new)
-        beyond = max(float(np.abs(one[:, c]).max()) for one in sound)
+        usual = max(_at_the_top(readings[:, c])[1] / len(readings) for readings in sound) * len(new)
+        beyond = max(float(np.abs(readings[:, c]).max()) for readings in sound)
         if limit < beyond and _unusual(count, usual):
             found[c] = limit
     within = bool(found) and bool(np.all(np.abs(new) <= max(found.values()) * (1 + SAME)))
@@ -85,7 +85,7 @@ def _at_the_top(values: FloatArray) -> tuple[float, int]:
 def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     """Here and there: a sensor that stands still for a while has not lost samples."""
     repeated = _repeats(new)
-    usual = max(float(_begun(_repeats(one)).mean()) for one in sound) * len(repeated)
+    usual = max(float(_begun(_repeats(readings)).mean()) for readings in sound) * len(repeated)
     if not _unusual(int(_begun(repeated).sum()), usual):
         return None
     fraction = (float(repeated.sum()) - usual) / len(repeated)

@@ -32,22 +32,22 @@ class SoundRecording:
     def gained(self, wanted: Hypothesis) -> FloatArray:
         """(c,): logarithm of the errors' rms without less that with it, each at its best."""
         measure, tuning = self.measure, self.tuning
-        starts = [evaluated(measure, tuning, self.base.deviations, one) for one in self._starts(wanted)]
-        starts.sort(key=lambda one: one.cost)
-        ends = [fit(measure, tuning, one, self.known, ROUNDS) for one in starts[:TRIED]]
-        best = min([*ends, self.base], key=lambda one: one.cost)
+        starts = [evaluated(measure, tuning, self.base.deviations, hypothesis) for hypothesis in self._starts(wanted)]
+        starts.sort(key=lambda fitted: fitted.cost)
+        ends = [fit(measure, tuning, start, self.known, ROUNDS) for start in starts[:TRIED]]
+        best = min([*ends, self.base], key=lambda fitted: fitted.cost)
         without, with_it = self._left(self.base), self._left(best)
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
     def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
         """Where the recordings to diagnose have it, and where this one's own course suggests it for the last claim."""
         last = wanted.claims[-1]
-        own = [one for one in candidates([last.effect], self.evidence) if one.claims == (last,)]
+        own = [hypothesis for hypothesis in candidates([last.effect], self.evidence) if hypothesis.claims == (last,)]
         held = without_claim(wanted, len(wanted.claims) - 1)
-        return [wanted, *(together(held, one) for one in own)]
+        return [wanted, *(together(held, hypothesis) for hypothesis in own)]
 
     def _left(self, fitted: Fitted) -> FloatArray:
-        masks = [one.fit | one.choose for one in self.measure.records]
+        masks = [record.fit | record.choose for record in self.measure.records]
         return rms_over(self.measure.records, fitted.residuals, masks)
 
 
@@ -63,7 +63,7 @@ class SoundRecordings:
         if not hypothesis.claims:
             return np.zeros(1)
         if hypothesis.key not in self.seen:
-            gains = np.max([one.gained(hypothesis) for one in self.each], axis=0)
+            gains = np.max([sound.gained(hypothesis) for sound in self.each], axis=0)
             self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
         return self.seen[hypothesis.key]
 

@@ -62,7 +62,7 @@ def worth_naming(found: Explanation) -> bool:
 
 def _confirmed(found: Explanation) -> bool:
     """Whether the sealed samples agree that something was explained; yes where nothing was sealed."""
-    without, with_it = (np.log(one.standing.test) for one in (found.retuned, found.after))
+    without, with_it = (np.log(contender.standing.test) for contender in (found.retuned, found.after))
     whole, left = float(np.mean(without)), float(np.mean(with_it))
     if not np.isfinite(whole):
         return True
@@ -77,5 +77,5 @@ def share_of_mismatch(without: Contender, with_it: Contender) -> float:
 
 def shares_taken(without: Contender, steps: Sequence[Contender]) -> tuple[float, ...]:
     """Of the mismatch that was there without any of them, what each step took away: together no more than all."""
-    left = [0.0, *(share_of_mismatch(without, one) for one in steps)]
+    left = [0.0, *(share_of_mismatch(without, step) for step in steps)]
     return tuple(max(after - before, 0.0) for before, after in pairwise(left))

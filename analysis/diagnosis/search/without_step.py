@@ -14,17 +14,13 @@ def without_step(arena: Arena, found: Explanation, number: int) -> Explanation:
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
     if not later:
         return replace(found, after=arena.confirmed(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
-    alone = [_without(arena, one, number) for one in later]
+    alone = [_without(arena, contender, number) for contender in later]
     alone[-1] = arena.contender(refine(arena, alone[-1].fitted))
-    others = [one for one in found.rounds[number] if _last(one) != _last(alone[0])]
+    others = [contender for contender in found.rounds[number] if contender.newest != alone[0].newest]
     rounds = (*found.rounds[:number], (alone[0], *others), *found.rounds[number + 2 :])
     return replace(found, after=arena.confirmed(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
 
 
-def _without(arena: Arena, one: Contender, number: int) -> Contender:
-    fewer: Hypothesis = without_claim(one.fitted.hypothesis, number)
-    return arena.contender(evaluated(arena.measure, arena.tuning, one.fitted.deviations, fewer))
-
-
-def _last(one: Contender) -> str:
-    return one.fitted.hypothesis.claims[-1].effect.name
+def _without(arena: Arena, contender: Contender, number: int) -> Contender:
+    fewer: Hypothesis = without_claim(contender.fitted.hypothesis, number)
+    return arena.contender(evaluated(arena.measure, arena.tuning, contender.fitted.deviations, fewer))
