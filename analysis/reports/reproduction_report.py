@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.reproduction.document import FigureFindings, Finding, PlayedRow, Reproduction
-from analysis.wording import number
+from analysis.wording import NONE, number
 
 BANNER = (
     "Everything here was simulated: the device, and those who answered. The simulation was set up to show the features "
@@ -17,6 +17,11 @@ _SAYS: dict[bool | None, str] = {True: "yes", False: "no", None: "–"}
 
 _MEASURES = ("Flatness", "Worst coupling", "Median coupling", "Axis error", "Error")
 
+_MODEL_NOTE = (
+    "Root mean squares relative to the response, as measured. Held out: the prediction of a record that the fit did "
+    "not see. Expected: with the misfit to the fitted lines and the scatter that their noise leaves; never below the "
+    "held-out error."
+)
 _ROW_NOTES = (
     "Over every line of the band, worst axis: flatness is the largest deviation from the wanted level; coupling the "
     "largest off-axis response over that along the axis; axis error the largest angle between the wanted axis and what "
@@ -39,7 +44,7 @@ def render_reproduction_report(
     generated: str,
 ) -> str:
     """HTML. pictures: by the number of the published figure."""
-    sections = [_overview(reproduction)]
+    sections = [*_models(reproduction), _overview(reproduction)]
     for figure in sorted(reproduction.figures, key=lambda one: one.figure):
         played = _played_tables(reproduction) if figure.figure == 5 else ()
         tables = (_findings_table(figure), *played)
@@ -66,6 +71,23 @@ def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
         f"Figure {figure.figure}: {_count(figure)}  {figure.title}"
         for figure in sorted(reproduction.figures, key=lambda one: one.figure)
     )
+
+
+def _models(reproduction: Reproduction) -> list[Section]:
+    """Before everything that was played through them."""
+    if not reproduction.models:
+        return []
+    rows = tuple(
+        (one.name, _percent(one.held_out_error), _percent(one.held_out_noise), _percent(one.expected_error))
+        for one in reproduction.models
+    )
+    header = ("Model", "Held-out error", "Noise of that record", "Expected error")
+    table = Table("Quality of the identified models", header, rows, notes=(_MODEL_NOTE,))
+    return [Section("How good the models are", tables=(table,))]
+
+
+def _percent(share: float | None) -> str:
+    return NONE if share is None else f"{100 * share:.2f} %"
 
 
 def _overview(reproduction: Reproduction) -> Section:

@@ -40,10 +40,15 @@ def render_study_report(
     provenance: Mapping[str, str],
     generated: str,
     ellipsoids: Sequence[EllipsoidResult] = (),
+    qualities: Sequence[tuple[str, str]] = (),
 ) -> str:
-    """HTML. pictures: of `analysis.figures.study_pictures`, for the same analysis and ellipsoids."""
+    """HTML. pictures: of `analysis.figures.study_pictures`, for the same analysis and ellipsoids.
+
+    qualities: of the models that stimuli went through, as (sessions, sentence).
+    """
     by_name = {picture.name: picture for picture in pictures}
     sections = [
+        *_models(qualities),
         _warnings(analysis),
         *_results(analysis, by_name),
         *_beside(analysis),
@@ -81,6 +86,14 @@ def _without_directions(analysis: StudyAnalysis) -> str:
         return "There is no run to analyse."
     runs = len(analysis.detection)
     return f"No test run; {runs} detection run{'s' if runs != 1 else ''}."
+
+
+def _models(qualities: Sequence[tuple[str, str]]) -> list[Section]:
+    """First: accelerations are as good as the model that turned them into forces."""
+    if not qualities:
+        return []
+    points = tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities)
+    return [Section("How good the model of the device is", points=points)]
 
 
 def _warnings(analysis: StudyAnalysis) -> Section:

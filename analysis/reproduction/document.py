@@ -67,6 +67,16 @@ class PlayedRow:
 
 
 @dataclass(frozen=True, config=STRICT)
+class UsedModel:
+    """An identified model that drives the device, with the quality that its file stores."""
+
+    name: str
+    expected_error: Annotated[float, Field(description="Relative, with misfit and scatter; not below the others.")]
+    held_out_error: Annotated[float | None, Field(description="On what was kept for a test; null without a test.")]
+    held_out_noise: Annotated[float | None, Field(description="Of what was kept; null where it is not known.")]
+
+
+@dataclass(frozen=True, config=STRICT)
 class Reproduction:
     device: str
     subjects: int
@@ -77,6 +87,9 @@ class Reproduction:
     played: Annotated[tuple[PlayedRow, ...], Field(description="Rows of figure 5, and what stands beside them.")]
     baselines: Annotated[
         tuple[PlayedRow, ...], Field(description="Other ways of driving the device: centre, edge, in a simulated hand.")
+    ] = ()
+    models: Annotated[
+        tuple[UsedModel, ...], Field(description="That drive the device; none in files of earlier versions.")
     ] = ()
 
 

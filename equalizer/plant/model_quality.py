@@ -64,7 +64,8 @@ def quality_sentence(quality: ModelQuality | None) -> str:
     noise = "" if quality.held_out_noise is None else f", noise of the record {100 * quality.held_out_noise:.2f} %"
     return (
         f"Measured on {quality.held_out_s or 0:g} s kept for a test, the model errs by "
-        f"{100 * quality.held_out_error:.2f} %{noise}."
+        f"{100 * quality.held_out_error:.2f} %{noise}; expected with misfit and scatter: "
+        f"{100 * quality.expected_error:.2f} %."
     )
 
 

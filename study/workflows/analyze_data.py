@@ -147,7 +147,8 @@ def _write(
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figures, pictures)
-    page = render_study_report(analysis, pictures, _shown(provenance, collected), local_now(), shapes)
+    shown = _shown(provenance, collected)
+    page = render_study_report(analysis, pictures, shown, local_now(), shapes, collected.qualities)
     write_text(out / PAGE_NAME, page, overwrite=True)
 
 

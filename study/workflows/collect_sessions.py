@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.population import Population, split_by_population
+from analysis.wording import listed
+from equalizer.plant.model_quality import NOT_STORED
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial
 from study.errors import StudyError, WrongUseError
@@ -29,6 +31,8 @@ class Collected:
     """Names of the simulated participants; empty for people."""
     left_out: tuple[str, ...]
     """What did not enter, and why, in sentences."""
+    qualities: tuple[tuple[str, str], ...]
+    """Of the models that stimuli went through: (sessions, sentence), by what was measured; none for plain forces."""
     finished: tuple[str, ...]
     """What was written now, because the program was killed before it was done, in sentences."""
 
@@ -68,8 +72,19 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         devices=tuple(dict.fromkeys(state.opened.device.name for _, state in entering)),
         observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
         left_out=tuple(left_out),
+        qualities=_qualities(entering),
         finished=_finish(whole),
     )
+
+
+def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[tuple[str, str], ...]:
+    """Sessions that share a model stand together."""
+    sessions: dict[tuple[str, str], list[str]] = {}
+    for folder, state in entering:
+        if (equalized := state.opened.equalized) is not None:
+            key = (equalized.sha256, equalized.quality or NOT_STORED)
+            sessions.setdefault(key, []).append(folder.name)
+    return tuple((listed(names), sentence) for (_, sentence), names in sessions.items())
 
 
 def _folders(data: Path) -> tuple[SessionFolder, ...]:

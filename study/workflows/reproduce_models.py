@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from analysis.reproduction.document import UsedModel
 from equalizer.identification.held_out import HeldOut, held_out
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
@@ -21,9 +22,15 @@ class ReproducedModel:
     """It holds the spring: what is played under the same spring needs no other account of it."""
     tested: HeldOut | None
 
+    def used(self, name: str) -> UsedModel:
+        """name: of its recording."""
+        quality = self.model.quality
+        assert quality is not None, "every model that is kept or made here has one"
+        return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
+
 
 def modelled(plan: ReproductionPlan, recorded: Recorded, on_share: Callable[[float], None]) -> ReproducedModel:
-    """A file in the way that is not of this recording, order and band is made again."""
+    """A file in the way that is not of this recording, order and band, or without its quality, is made again."""
     path = plan.models / recorded.path.name
     model = _kept(path, plan, recorded.path)
     if model is None:
@@ -39,7 +46,7 @@ def _kept(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel |
         model = read_identified_model(path) if path.exists() else None
     except UnusableFileError:
         return None
-    if model is None or (model.order, model.band_hz) != (plan.order, plan.band_hz):
+    if model is None or model.quality is None or (model.order, model.band_hz) != (plan.order, plan.band_hz):
         return None
     parents = [parent.get("sha256") for parent in model.provenance.get("parents", ())]
     return model if parents == [sha256_of(source)] else None

@@ -131,6 +131,7 @@ def _results(
         device_name=centre.device,
         played=play_equalized(plan, models, steps.of("playing")),
         baselines=play_baselines(plan, models, estimate, steps.of("baselines")),
+        models=tuple(one.used(name) for name, one in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[SLICK_NAME].tested,
         remarks=tuple(f"{name}: {said}" for name, one in recordings.items() for said in one.warnings),

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.ellipsoid import EllipsoidResult
+from analysis.reproduction.document import UsedModel
 from analysis.reproduction.measured_device import MeasuredDevice
 from analysis.reproduction.played_response import PlayedResponse
 from analysis.study_analysis import StudyAnalysis
@@ -19,6 +20,7 @@ class Results:
     device_name: str
     played: Played
     baselines: tuple[PlayedResponse, ...]
+    models: tuple[UsedModel, ...]
     tested: HeldOut | None
     """The centre's model on what was kept from it."""
     tested_frictionless: HeldOut | None

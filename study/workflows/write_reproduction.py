@@ -81,6 +81,7 @@ def _document(
         ),
         played=tuple(played_row(row) for row in (*played.rows.all, *played.others)),
         baselines=tuple(played_row(row) for row in results.baselines),
+        models=results.models,
     )
 
 

@@ -396,7 +396,10 @@ def test_what_was_measured_of_the_model_comes_before_what_it_predicts(plants, pl
     write_identified_model(tmp_path / "poor.h5", model_of(plants.omega_like(), quality=quality))
     done = equalize_trajectory(replace(plan, models=(tmp_path / "poor.h5",)))
     first, cause, predicted, *_ = summary_lines(done)
-    assert first == "Measured on 10 s kept for a test, the model errs by 13.00 %, noise of the record 0.40 %."
+    assert first == (
+        "Measured on 10 s kept for a test, the model errs by 13.00 %, noise of the record 0.40 %; expected with misfit "
+        "and scatter: 13.00 %."
+    )
     assert cause == "A pole sits on the bound of the decay."
     assert predicted.startswith("As the model itself predicts: error 0.")
     assert list(summary(done))[1] == "quality"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_quality import NOT_STORED, ModelQuality, quality_sentence
 from equalizer.tracking.model_equalizer import ModelEqualizer
 from protocols.loading import load_protocol
 from study.devices.clock import VirtualClock
@@ -13,6 +14,7 @@ from study.errors import StudyError
 from study.store.identified_model_file import write_identified_model
 from study.store.trial_recordings import find_trial_recording, recording_name
 from study.store.trials_file import TRIALS_NAME, read_trials
+from study.workflows.analyze_data import analyze_data
 from study.workflows.conduct_session import conduct_new, conduct_resumed
 from study.workflows.equalize_stimuli import level_scales
 from study.workflows.fold_session import fold_session
@@ -170,3 +172,18 @@ def test_a_protocol_of_commanded_forces_does_not_pretend_to_use_a_model(plan, sm
 def test_a_protocol_of_accelerations_needs_a_model(plan):
     with pytest.raises(StudyError, match="no model was given"):
         take(replace(plan, model=None))
+
+
+def test_the_report_says_first_how_good_the_model_is(conducted, plan, tmp_path):
+    data = conducted.folder.path.parent
+    page = analyze_data(data, tmp_path / "out").report.read_text()
+    assert page.index("How good the model of the device is") < page.index("Before you read the numbers")
+    assert f"S1_001: {NOT_STORED}" in page
+
+
+def test_the_report_gives_the_error_that_was_measured(plan, tmp_path):
+    quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0)
+    write_identified_model(tmp_path / "tested.h5", rigid(quality=quality))
+    take(replace(plan, model=tmp_path / "tested.h5"))
+    page = analyze_data(plan.data, tmp_path / "out").report.read_text()
+    assert f"S1_001: {quality_sentence(quality)}" in page

@@ -8,6 +8,7 @@ import pytest
 from analysis.reproduction.document import ReproductionError, reproduction_from_json
 from study.errors import LeftError, StudyError
 from study.store.file_errors import UnusableFileError
+from study.store.identified_model_file import read_identified_model
 from study.store.recording_file import read_recording, write_recording
 from study.store.reproduction_file import read_reproduction
 from study.workflows.reproduce_models import modelled
@@ -70,6 +71,16 @@ def test_all_five_figures_come_out_beside_what_is_published(written, plan):
     assert "Everything here was simulated" in page
     drawn = {path.name for path in plan.figures.iterdir()}
     assert {"equalized-response.png", "transfer-functions.svg", "ellipsoids.png", "frequency-bands.svg"} <= drawn
+
+
+def test_the_quality_of_the_models_comes_before_what_they_play(written, plan):
+    models = {model.name: model for model in written.reproduction.models}
+    assert set(models) == {"centre", "between 1", "between 2", "frictionless", "hand"}
+    stored = read_identified_model(plan.models / "centre.h5").quality
+    assert models["centre"].expected_error == stored.expected_error >= (stored.held_out_error or 0.0)
+    page = written.report.read_text()
+    assert page.index("Quality of the identified models") < page.index("What came out")
+    assert f"<td>{100 * stored.expected_error:.2f} %</td>" in page
 
 
 def test_the_document_is_read_again_and_recognised(written):
