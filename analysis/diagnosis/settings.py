@@ -63,7 +63,7 @@ SENSOR_LOUD = 10.0  # times its own noise, in power, that the response's residua
 SENSOR_LEAST_LINES = 5
 SENSOR_ABSENT, SENSOR_PRESENT = 0.1, 0.5  # share of it below which position lacks it, above which position shows it
 STATE_CROWDED = 1.5  # share of a mismatch in a region of state, over the region's share of the samples
-STATES_NAMED = 2  # per axis or channel; principle: what hangs on one state is seen in others, too
+STATES_NAMED = 2  # per axis or channel; principle: what depends on one state is seen in others, too
 
 # Which hypotheses are tried and fitted (`candidates`, `screening`, `rivalry`). By hand.
 STARTS_PER_CLAIM = 4

@@ -1,4 +1,4 @@
-"""Whether the responses have anything to do with the commands: where all is noise, there is nothing to explain.
+"""Whether the responses depend on the commands at all, by coherence.
 
 By the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed., 7.3), which
 for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of freedom.

@@ -1,4 +1,4 @@
-"""Whether the commands of a recording hang on its responses: a controller, a virtual spring."""
+"""Whether the commands depend on the responses: a controller, a virtual spring."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def in_closed_loop(recording: Recording) -> bool:
         by_feedback = command - recording.excitation.samples
         return bool(_rms(by_feedback) > FED_BACK_SHARE * _rms(command))
     if recording.hold is not Hold.ZERO_ORDER:
-        # The command before a sample already hangs on the one after it.
+        # The command before a sample already depends on the one after it.
         return False
     return any(_told_by(command[:, axis], recording) for axis in range(command.shape[1]))
 

@@ -1,4 +1,4 @@
-"""An error measure whose noise has the colour of what a sound device differs by from its model."""
+"""Error measure with prewhitened residuals: its noise has the spectrum of a sound device's model error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,13 +17,13 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColouredMeasure:
-    """Residuals are those of `plain` without the colour, and count from where all that they hang on is known."""
+    """Residuals are those of `plain`, whitened; they count where all samples that the filter uses are known."""
 
     plain: ErrorMeasure
     colour: Colour
     unit: FloatArray
     noise: FloatArray
-    """(c,): rms of what is left of a sound device's differences without their colour, in each channel's own unit."""
+    """(c,): rms of a sound device's whitened residual, in each channel's own unit."""
     least: float = 0.0
 
     @property
@@ -48,12 +48,12 @@ class ColouredMeasure:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         left = self.plain.residuals(model, effects)
-        return tuple(self.colour.taken_off(residual * self.plain.unit) / self.unit for residual in left)
+        return tuple(self.colour.whitened(residual * self.plain.unit) / self.unit for residual in left)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """With the colour, as estimators of starting values look at courses."""
+        """Of the residuals that are not whitened: estimators of starting values look at time series."""
         return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
 
 

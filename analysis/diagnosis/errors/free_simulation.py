@@ -1,4 +1,4 @@
-"""The measured course against a simulated one that knows the commands alone."""
+"""Free simulation: the measured signals against a simulation from the commands alone."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

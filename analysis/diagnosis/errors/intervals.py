@@ -1,4 +1,4 @@
-"""How sure a fit is of its numbers: covariances that hold where errors are neither white nor of the assumed strength.
+"""Standard errors of a fit that hold where residuals are neither white nor of the assumed variance.
 
 The sandwich of Huber (1967) and White (1980), its middle summed over stretches longer than the errors remember.
 """

@@ -1,4 +1,4 @@
-"""How well a finished model predicts a recording to which nothing is fitted, and what one factor would mend."""
+"""Prediction error of a finished model on a recording that nothing is fitted to, and the best gain factor."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""The colour of what a model leaves of a sound device: where in frequency it misses much, and where next to nothing.
+"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves of a sound device.
 
-A course without its colour is what could not be foreseen of it from its own past (the error of an autoregression,
-Yule 1927, Walker 1931), so that each frequency counts by how much a sound device differs there.
+The whitened residual is the one-step prediction error (Yule 1927, Walker 1931): each frequency is weighted by the
+inverse of the residual's spectrum on a device in order.
 """
 
 from collections.abc import Sequence
@@ -15,28 +15,28 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
-"""That a course is foreseen from, and samples that each asks for."""
+"""Largest order of the autoregression, and samples per lag."""
 FLAT = 1e-4
-"""Share of the power that counts as white: no model is trusted better at any frequency."""
+"""White part added to the power, as a share of it: bounds the weight of any frequency."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Colour:
     steps: FloatArray
-    """(lags + 1, c): the filter that takes it off, the first row 1."""
+    """(lags + 1, c): the whitening filter, the first row 1."""
 
     @property
     def lags(self) -> int:
         return len(self.steps) - 1
 
-    def taken_off(self, left: FloatArray) -> FloatArray:
-        """(n, c), NaN where it was. A sample hangs on those before it alone; what is not known counts as 0."""
+    def whitened(self, left: FloatArray) -> FloatArray:
+        """(n, c), NaN where it was. The filter is causal; unknown samples count as 0."""
         known = np.isfinite(left)
         filled = np.where(known, left, 0.0)
         return np.where(known, fftconvolve(filled, self.steps, axes=0)[: len(left)], np.nan)
 
     def warm(self, left: FloatArray) -> Mask:
-        """(n,): where all that a sample is foreseen from is known."""
+        """(n,): where all samples that the filter uses are known."""
         unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(left).all(axis=1)])
         until = np.concatenate([[0.0], np.cumsum(unknown)])
         return np.asarray(until[self.lags + 1 :] == until[: len(left)], dtype=np.bool_)
@@ -56,6 +56,6 @@ def colour_of(courses: Sequence[FloatArray], least: FloatArray) -> Colour:
 
 
 def _products(course: FloatArray, lags: int) -> FloatArray:
-    """(lags + 1, c): sums of what lies so many samples apart, multiplied."""
+    """(lags + 1, c): sums of lagged products."""
     filled: FloatArray = np.where(np.isfinite(course).all(axis=1, keepdims=True), course, 0.0)
     return np.array([np.sum(filled[k:] * filled[: len(filled) - k], axis=0) for k in range(lags + 1)])

@@ -1,4 +1,4 @@
-"""A linear model of a device in closed loop, for whoever has none: masses, dampers and springs by least squares on
+"""A linear model of a device in closed loop, where none is given: masses, dampers and springs by least squares on
 forces, as rigid robots are identified (Gautier, Vandanjon and Pressé 1994). Spectra would be bent by the controller."""
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The part of what was observed that shakes one axis: enough to learn of its drive, and quick to simulate."""
+"""The segments that excite one axis: enough to identify its drive, and quick to simulate."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""How a fit stands: its errors against the noise, on what was fitted, on what is chosen by and on what was sealed."""
+"""Errors of a fit over the noise, on the samples to fit, to choose and to test by."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class Standing:
 
     @property
     def seen(self) -> float:
-        """The worst channel, on what decisions may see."""
+        """The worst channel, on the samples to fit and to choose by."""
         return float(max(self.fit.max(), self.choose.max()))
 
     @property

@@ -1,4 +1,4 @@
-"""A correction without physics, fitted beside the named effects: whoever beats them knows something that they do not.
+"""A correction without physics, fitted beside the named effects: where it is better, something is still missing.
 
 A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term as each takes
 most of what is left (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per channel as the physics

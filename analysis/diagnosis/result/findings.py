@@ -34,7 +34,7 @@ class Course:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signature:
-    """What shows a named effect: the missing force or error against what it hangs on, with the fitted law on it."""
+    """What shows a named effect: the missing force or error against what it depends on, with the fitted law on it."""
 
     effect: str
     axis: str | None

@@ -1,4 +1,4 @@
-"""What shows a named effect: what is missing where the effect alone is left out of the fit, against what it hangs on,
+"""What shows a named effect: what is missing where the effect alone is left out of the fit, against what it depends on,
 and the fitted law, played by the simulator and averaged alike."""
 
 from collections.abc import Mapping, Sequence

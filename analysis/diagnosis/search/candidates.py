@@ -1,4 +1,4 @@
-"""Which hypotheses the data suggest: every effect of the catalogue wherever it could be, with values to start from."""
+"""Candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from the data."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ CLOCK_DRIFT = "clock_drift"
 
 
 def candidates(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """In the catalogue's order. Where an effect's own estimator sees nothing, it is not among them."""
+    """In the catalogue's order; an effect whose estimator finds no starting value is left out."""
     found: list[Hypothesis] = []
     for effect in catalogue:
         sensed = EFFECTS_BY_NAME[effect.name].place == "sensor"
@@ -45,14 +45,14 @@ def _each(effect: Effect, sites: tuple[int, ...], starts: Sequence[tuple[Values,
 
 
 def _faint(effect: Effect, values: Values) -> Values:
-    """Where the data show nothing of it: a tenth of what another axis shows."""
+    """Starting values for an axis at which the estimator finds none: a tenth of another axis's."""
     main = effect.parameters[0]
     return {**values, main.name: values[main.name] / 10 if main.none == 0 else values[main.name]}
 
 
-# Starting values for a clock that runs wrong, where a recording is too short to see lateness grow: by trial.
+# Starting values for clock drift by grid search, for recordings too short to show the growing delay.
 def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """None where the effect's own estimator finds some, where it may not be named, or where no trial is better."""
+    """Empty where the effect's own estimator finds some, where it may not be named, or where no trial is better."""
     effect = next((known for known in catalogue if known.name == CLOCK_DRIFT), None)
     if effect is None or effect.starts(evidence, ALL_SITES):
         return ()

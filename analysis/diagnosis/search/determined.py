@@ -1,4 +1,4 @@
-"""Whether recordings fix the numbers of what was found, without which it is no more than a way to bend the model."""
+"""Identifiability: an effect whose numbers the recordings leave undetermined is not named."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -28,8 +28,8 @@ def number_errors(arena: Arena, found: Explanation) -> FloatArray:
 
 
 def determined(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
-    """As it is, where its numbers are fixed; else without the effects whose numbers are open, or with what is as good
-    and has them."""
+    """The same where all numbers are determined; else without the effects whose numbers are not, or with an explanation
+    that is as good and whose numbers are determined."""
     left_open = [number for number, is_open in enumerate(_open(arena, found)) if is_open] if found.steps else []
     if not left_open:
         return found
@@ -47,7 +47,7 @@ def determined(arena: Arena, found: Explanation, patient: Patience) -> Explanati
 
 
 def _instead(arena: Arena, found: Explanation) -> Explanation | None:
-    """The next that is as good, where its numbers are fixed."""
+    """The next explanation that is as good and whose numbers are determined."""
     best = found.rounds[0][0]
     others = tuple(contender for contender in found.rounds[0] if contender.newest != best.newest)
     as_good = {contender.newest: contender for contender in reversed(others) if both_stand(best, contender)}
@@ -64,7 +64,7 @@ def _nothing(found: Explanation) -> Explanation:
 
 
 def _open(arena: Arena, found: Explanation) -> Iterator[bool]:
-    """By effect: whether every number that could be none might as well be any other."""
+    """By effect: whether all its numbers that have a value meaning no effect are undetermined."""
     hypothesis, first = found.after.fitted.hypothesis, 0
     errors = number_errors(arena, found)
     each = list(zip(hypothesis.numbers, hypothesis.point.tolist(), errors.tolist(), strict=True))

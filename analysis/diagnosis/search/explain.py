@@ -1,4 +1,4 @@
-"""From a model and what was observed to the physics that the model lacks: re-tune, screen, fit, choose, add, prune."""
+"""Forward selection of missing effects: re-tune the model, screen candidates, fit the best, add one, repeat."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,11 +25,11 @@ RETUNING_ROUNDS = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Statistic:
-    """What contenders were compared by where waveforms cannot be predicted."""
+    """What contenders were compared by where waveforms cannot be predicted: a statistic of the response."""
 
     words: str
     chance: FloatArray
-    """(c,): its usual difference between two courses of one model, which stands where noise does otherwise."""
+    """(c,): its usual difference between two simulations of one model; takes the place of the noise."""
     errors: FloatArray
     """(numbers,): standard errors of the final hypothesis's point."""
 
@@ -103,13 +103,13 @@ def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patie
 
 
 def _with(arena: Arena, base: Contender, hypothesis: Hypothesis) -> Contender:
-    """Whatever it gains."""
+    """With a hypothesis that is certain, whether or not it lowers the error."""
     start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, hypothesis))
     return arena.contender(refine(arena, start))
 
 
 def retuned_alone(arena: Arena) -> Fitted:
-    """Without physics that the model does not name."""
+    """The model re-tuned, without any added effect."""
     return _retuned_from(arena, evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
 
 
@@ -120,7 +120,7 @@ def _retuned_from(arena: Arena, before: Fitted) -> Fitted:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A stretch of the work, as it is shown."""
+    """Part of the work, for the progress display."""
 
     what: str
     begun: float
@@ -152,7 +152,8 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
 
 
 def worthwhile(base: Contender, better: Contender) -> bool:
-    """Where only the worst channel is above the noise, and not their mean, it must come down by half of that."""
+    """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
+    the mean over channels, its logarithm must fall by half."""
     gained, over = base.standing.chosen_by - better.standing.chosen_by, np.log(base.standing.seen)
     if excess(base) == 0 and over > np.log(NOISE_ALONE) and np.log(better.standing.seen) > over / 2:
         return False

@@ -24,7 +24,7 @@ FAMILIES: tuple[frozenset[str], ...] = (
 
 
 def excludes(held: Claim, other: Claim) -> bool:
-    """Whether `other` cannot be beside what is held already."""
+    """Whether `other` cannot be added beside a claim that is part of the explanation."""
     if not set(held.sites) & set(other.sites):
         return False
     names = {held.effect.name, other.effect.name}

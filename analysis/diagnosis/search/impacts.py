@@ -1,8 +1,7 @@
-"""Play that rattles: no waveform of it can be predicted, so hypotheses are judged by the response's band powers.
+"""Rattling play: its waveform is chaotic and cannot be predicted, so hypotheses are compared by band powers.
 
-Two simulations of a drive with play part within a few blows, however little they differ; one that has the right play is
-as far from the record as from another of its own (Ott, Chaos in Dynamical Systems, chapter 4). So what two courses of
-the same hypothesis differ by takes the place of the noise.
+Two simulations of a drive with play diverge within a few impacts, however small their initial difference (Ott, Chaos in
+Dynamical Systems, chapter 4). So the difference between two simulations of one hypothesis takes the place of the noise.
 """
 
 from collections.abc import Sequence
@@ -36,9 +35,9 @@ from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
 APART, COURSES = 1e-9, 4
-"""What courses of one hypothesis differ by at first, in the logarithm of a number; and how many there are."""
+"""Initial difference between simulations of one hypothesis, in the logarithm of a number; and how many are run."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
-"""Of a gap, over that which is guessed."""
+"""Gaps that are tried, over the estimated one."""
 FIRST_ROUNDS, ROUNDS = 5, 3
 RIVAL = "loose_joint"
 
@@ -46,7 +45,7 @@ RIVAL = "loose_joint"
 def rattling(
     arena: Arena, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
 ) -> Explanation | None:
-    """None where nothing rattles, or where no play explains how."""
+    """None where the response is regular, or where play does not explain it."""
     effects = {effect.name: effect for effect in catalogue}
     if "backlash" not in effects or not isinstance(arena.whole, FreeSimulation):
         return None
@@ -68,7 +67,7 @@ def rattling(
 
 
 def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
-    """The best that a claim can do by the stretches that shake its axis."""
+    """The best fit of a claim, on the segments that excite its axis."""
     measure = view.power.measure
     assert isinstance(measure, FreeSimulation)
     near = View(BandPower(shaken_along(measure, claim.sites[0])), view.tuning, view.map_)
@@ -89,7 +88,7 @@ def _is_model(trial: Foreseen) -> bool:
 
 
 def _with_chance(view: View, at: Foreseen) -> View:
-    """Knowing what chance does to each band, and what the model's own numbers do to those that it leaves alone."""
+    """With each band's spread between simulations, and the sensitivity of the calm bands to the model's numbers."""
 
     def course(number: int) -> FloatArray:
         return view.predicted(at.deviations, _apart(at.hypothesis, number))
@@ -112,8 +111,8 @@ def _apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Court:
-    """What contenders are brought before: all samples, the sealed ones, too."""
+class _Comparison:
+    """Compares contenders by band power on all samples, the sealed ones included."""
 
     arena: Arena
     power: BandPower
@@ -126,32 +125,32 @@ class _Court:
         return Contender(whole, Standing(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
 
     def _times(self, off: FloatArray) -> FloatArray:
-        """Of a channel in which noise drowns all bands, that it is as good as chance."""
+        """Misfit over chance; 1 for a channel whose bands are all below the noise."""
         return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
 
 
 def _judged(arena: Arena, found: Explanation, best: Foreseen, others: Sequence[Hypothesis]) -> Explanation | None:
-    court = _court(arena, best)
-    named = court.stands(best.deviations, best.hypothesis)
+    comparison = _comparison(arena, best)
+    named = comparison.stands(best.deviations, best.hypothesis)
     given = np.zeros_like(best.deviations)
-    before = court.stands(given, NOTHING)
-    linear = [before, *(court.stands(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
+    before = comparison.stands(given, NOTHING)
+    linear = [before, *(comparison.stands(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
     retuned = min(linear, key=lambda contender: contender.standing.chosen_by)
-    rivals = [court.stands(given, rival) for rival in others]
+    rivals = [comparison.stands(given, rival) for rival in others]
     earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
     rivals += [
-        court.stands(contender.fitted.deviations, contender.fitted.hypothesis)
+        comparison.stands(contender.fitted.deviations, contender.fitted.hypothesis)
         for contender in earlier
         if contender.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
     ]
     rivals.sort(key=lambda rival: rival.standing.chosen_by)
     if not _convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
-    statistic = Statistic(WORDS, court.chance, best.errors)
+    statistic = Statistic(WORDS, comparison.chance, best.errors)
     return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
 
 
-def _court(arena: Arena, best: Foreseen) -> _Court:
+def _comparison(arena: Arena, best: Foreseen) -> _Comparison:
     power, model = BandPower(arena.whole), arena.tuning.tuned(best.deviations)
 
     def course(number: int) -> FloatArray:
@@ -160,7 +159,7 @@ def _court(arena: Arena, best: Foreseen) -> _Court:
     first, other = (np.asarray(each) for each in arena.map_(course, range(2)))
     apart = power.misfits(first - other)
     chance = np.fmax(np.fmax(apart.fit, apart.choose), apart.test)
-    return _Court(arena, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
+    return _Comparison(arena, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
 
 def _convincing(named: Contender, retuned: Contender) -> bool:
@@ -178,11 +177,11 @@ def _as_good(rival: Contender, named: Contender) -> bool:
 
 
 def _whole(times: FloatArray) -> float:
-    """Over the channels."""
+    """Root mean square over the channels."""
     return float(np.sqrt(np.nanmean(times**2)))
 
 
-# Whether a response is irregular: what should repeat does not, by far more than its noise; or it is full of peaks.
+# A response is irregular where repeats differ by far more than the noise or, without repeats, its residual is peaked.
 def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
     if any(floor.how == "repeats" for floor in floors):
         return any(_varies(channel) for floor in floors for channel in (floor.response, floor.position) if channel)

@@ -1,4 +1,4 @@
-"""What a sound device differs by from its re-tuned model, learned from recordings in which nothing is missing."""
+"""The residual of a sound device from its re-tuned model, learned from clean recordings: it counts as noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,11 +25,11 @@ from equalizer.signals.signal import FloatArray
 
 LEARNING = "learning from the clean recordings"
 BEGUN = 0.02
-"""Of a diagnosis, that is done then."""
+"""Share of the whole diagnosis that is done when learning ends."""
 
 
 class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
-    """Clean recordings that say nothing of those to diagnose; a sentence without a full stop."""
+    """The clean recordings cannot be compared with those to diagnose; a sentence without a full stop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class _Lesson:
 
     @property
     def courses(self) -> tuple[FloatArray, ...]:
-        """What is left, (n, c) each, in the channels' own units; NaN where it is not compared."""
+        """Residuals, (n, c) each, in the channels' own units; NaN where samples do not count."""
         return tuple(
             np.where((record.fit | record.choose | record.test)[:, None], residual * self.measure.unit, np.nan)
             for record, residual in zip(self.measure.records, self.retuned.fitted.residuals, strict=True)
@@ -59,11 +59,11 @@ class Learned:
     floor: CleanFloor
     colour: Colour
     share: FloatArray
-    """(c,): what is left without its colour, of the signal; see `_signal`."""
+    """(c,): rms of the whitened residual over the signal's; see `_signal`."""
     sound: SoundRecordings
 
     def beside(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
-        """Of recordings to diagnose."""
+        """The error measure of the recordings to diagnose, with this residual as coloured noise."""
         return coloured(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
 
 
@@ -98,7 +98,7 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
     courses = [course for lesson in lessons for course in lesson.courses]
     colour = colour_of(courses, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [
-        _rms([colour.taken_off(course) for course in lesson.courses])
+        _rms([colour.whitened(course) for course in lesson.courses])
         / _signal(lesson.measure, lesson.retuned.fitted.residuals)
         for lesson in lessons
     ]
@@ -144,7 +144,7 @@ def _channel_shares(measure: ErrorMeasure, retuned: Contender) -> FloatArray:
 
 
 def floored(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
-    """What a sound device differs by counts as noise."""
+    """With the learned residual counted as noise."""
     return measure.with_floor(np.array(floor.channels) * _size(measure)) if floor.channels else measure
 
 

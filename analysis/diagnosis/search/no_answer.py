@@ -1,4 +1,4 @@
-"""An explanation that foresees nothing: effects that hold the device still are the last refuge of a fit."""
+"""Explanations without predictive power: an effect that stops the simulated device can fit better than a wrong one."""
 
 import numpy as np
 
@@ -15,13 +15,13 @@ _TINY = 1e-300
 
 
 def foresees_nothing(measure: ErrorMeasure, contender: Contender) -> bool:
-    """On the samples that decisions may see: in no channel is it better than no prediction."""
+    """Whether in no channel, on the samples to fit and choose by, the prediction is better than none."""
     return bool((_left(measure, contender.fitted) >= NO_PREDICTION_SHARE * _signal(measure)).all())
 
 
 def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
-    """Whether what is new foresees nothing, far above the noise, in the channel where it gains most or whose sensor it
-    is said to be: a low pass that lets nothing through explains nothing, though it leaves the model free for others."""
+    """Whether the new effect leaves no predictive power, far above the noise, in the channel where it gains most or
+    whose sensor it acts on: a low pass that passes nothing explains nothing, though it frees the model for others."""
     before, left = _left(measure, base), _left(measure, fitted)
     most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
     claim = fitted.hypothesis.claims[-1]

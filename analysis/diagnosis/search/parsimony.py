@@ -1,4 +1,4 @@
-"""Of explanations about as good, the plainest: few numbers, a calibration that was right, a law not refined."""
+"""Parsimony: of explanations about as good, few numbers, a small re-tuning and an unrefined law are preferred."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from analysis.diagnosis.settings import REFINED_FRICTION_SHARE, REFINED_GAIN, RE
 
 
 def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
-    """contenders: sorted by their errors, the best first; the same with the one to prefer at the front."""
+    """contenders: by their errors, the best first. The same, with the preferred contender moved to the front."""
     if not contenders:
         return ()
     chosen = contenders[0]
@@ -24,7 +24,7 @@ def _is_plainer(plain: Contender, other: Contender) -> bool:
 
 
 def _price(contender: Contender) -> float:
-    """Akaike's (1974): two for each number, and what it costs the calibration to be so far off."""
+    """Akaike's information criterion (1974): two per number, and the squared deviations from the calibration."""
     deviations = contender.fitted.deviations
     return 2.0 * len(contender.fitted.hypothesis.point) + float(deviations @ deviations)
 
@@ -35,7 +35,7 @@ def only_refines(other: Contender, plain: Contender) -> bool:
 
 
 def both_stand(named: Contender, other: Contender) -> bool:
-    """Whether the other belongs to the answer, too: as good, and no mere refinement."""
+    """Whether the other is inseparable from the named contender, and no refinement of it."""
     return inseparable(named, other) and not only_refines(other, named)
 
 

@@ -1,4 +1,4 @@
-"""A search that ends in time: what was found until then stands."""
+"""Time limit of a search: what was found until then is the result."""
 
 from collections.abc import Callable, Iterable
 
@@ -19,7 +19,7 @@ def always() -> bool:
 
 
 def impatient(map_: Mapper, patient: Patience) -> Mapper:
-    """The same map, that begins no further piece of work once patience has ended."""
+    """The same map; raises OutOfPatienceError before a piece of work that would begin after the time limit."""
 
     def asked(function: Callable[..., object]) -> Callable[..., object]:
         def work(*arguments: object) -> object:

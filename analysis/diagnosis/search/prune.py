@@ -1,4 +1,4 @@
-"""Of what a search found, only what is needed: a search that adds one effect at a time keeps what it began with."""
+"""Backward elimination: effects that forward selection added and that are not needed are removed."""
 
 import numpy as np
 
@@ -22,8 +22,7 @@ def pruned(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
 
 
 def _without_former(arena: Arena, found: Explanation) -> Explanation:
-    """Of two, the later alone where it does as well: the earlier was the best stopgap until the true one had found its
-    numbers."""
+    """Of two effects, the later alone where it does as well: the earlier may have stood in for it."""
     alone = without_step(arena, found, 0)
     kept = worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
     return found if kept else alone

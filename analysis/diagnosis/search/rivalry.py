@@ -1,4 +1,4 @@
-"""Fits of the hypotheses that a screen left over, the best first."""
+"""Fits the hypotheses that passed the screening, and orders them by their errors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ class Contender:
     fitted: Fitted
     standing: Standing
     usual: float = 0.0
-    """Mean log error power that it would gain on a device in order, and that is counted against it here."""
+    """Mean log error power that it gains on clean recordings, which is counted against it here."""
 
     @property
     def newest(self) -> str:
@@ -52,18 +52,18 @@ class Arena:
     """What all fits share."""
 
     measure: ErrorMeasure
-    """Of what decisions may see,"""
+    """Of the samples to fit and to choose by,"""
     whole: ErrorMeasure
-    """and with what they may not."""
+    """and with the sealed samples."""
     tuning: Tuning
     map_: Mapper
     barred: frozenset[str] = frozenset()
     """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
     only where its refinement shows, and without it that law is the barred one."""
     sound: SoundRecordings | None = None
-    """Contenders stand as they would without what they gain on these."""
+    """Clean recordings: what a contender gains on them is counted against it."""
     certain: tuple[Hypothesis, ...] = ()
-    """Seen without any model: no search, and no comparison, is needed for these."""
+    """Faults that a recording shows by itself (`seen_directly`): added without a search."""
 
     def half_opened(self) -> "Arena":
         """With the first half of every sealed stretch to fit and to choose by."""
@@ -71,7 +71,7 @@ class Arena:
         return replace(self, measure=whole.shortened(), whole=whole)
 
     def contender(self, fitted: Fitted) -> Contender:
-        """As decisions see it; its `test` is NaN."""
+        """On the samples to fit and to choose by; its `test` is NaN."""
         return self._contender(fitted, self.measure)
 
     def confirmed(self, contender: Contender) -> Contender:
@@ -109,8 +109,8 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
 
 
 def refine(arena: Arena, fitted: Fitted) -> Fitted:
-    """To the end, with what the model's numbers do recomputed there; where that leaves more than noise, also from the
-    calibration as it was, for what re-tuning had to hide may have taken it far away."""
+    """Fitted until it settles, with sensitivities recomputed; where more than noise is left, also from the calibration,
+    because re-tuning may have absorbed the missing effect and ended in another minimum."""
     here, known = _refined_from(arena, fitted, None)
     here, known = _of_alike(arena, here, known)
     if arena.contender(here).standing.seen <= NO_SECOND_START:
@@ -121,7 +121,7 @@ def refine(arena: Arena, fitted: Fitted) -> Fitted:
 
 
 def _of_alike(arena: Arena, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
-    """The best of what does almost the same, each fitted to the end; the plain one where it is as good as any."""
+    """The best of the hypotheses that behave almost alike, each fitted; the plain one where it is as good as any."""
     best = fitted, known
     for other in alike(fitted.hypothesis):
         beside = _refined_from(arena, evaluated(arena.measure, arena.tuning, fitted.deviations, other), known)
@@ -136,8 +136,8 @@ def _of_alike(arena: Arena, fitted: Fitted, known: Sensitivity) -> tuple[Fitted,
 def sensitivity_at(
     arena: Arena, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
 ) -> Sensitivity:
-    """Of the model's own numbers. Without forces that depend on the motion simulations are quick, and where those are
-    small beside what moves, they hardly matter to it."""
+    """Of the prediction to the model's own numbers. Motion-dependent forces are left out first: simulations are quick
+    without them, and small forces hardly change the sensitivity."""
     kept = hypothesis
     for number in reversed(range(len(hypothesis.claims))):
         if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
@@ -150,7 +150,7 @@ def sensitivity_at(
 
 
 def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
-    """known: what the model's numbers do, taken elsewhere with the same hypothesis; None = not taken yet."""
+    """known: sensitivity at another point of the same hypothesis; None = not computed yet."""
     best = fitted
     complete = known is not None
     there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
@@ -167,7 +167,7 @@ def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tu
 
 
 def _holds(richer: Fitted, plain: Fitted) -> bool:
-    """Whether the last claim of one holds the other's as a special case: then both must be fitted as well."""
+    """Whether the last claim contains the other's as a special case: then both must be fitted equally well."""
     last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
     return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)
 
@@ -192,8 +192,8 @@ def _varied(screened: Sequence[Screened]) -> list[Screened]:
 
 # Which of a model's numbers a force at an axis can feel: those that change how that axis moves.
 def felt_numbers(measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis) -> list[int]:
-    """plain: what the numbers do where no force depends on the motion. What hardly moves the axes at which such forces
-    act does the same beside them."""
+    """Numbers whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
+    plain: sensitivity without motion-dependent forces."""
     forces = [effect for effect in hypothesis.placed() if isinstance(effect.effect.acts, (AxisForce, JointForce))]
     model = tuning.tuned(np.zeros(len(tuning.names)))
     if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):

@@ -1,4 +1,4 @@
-"""Whether the data can tell two explanations apart."""
+"""Whether the data separate two explanations."""
 
 from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.settings import AS_GOOD_GAIN, AS_GOOD_SHARE, NOISE_KNOWN_TO
@@ -10,7 +10,6 @@ def excess(contender: Contender) -> float:
 
 
 def inseparable(best: Contender, other: Contender) -> bool:
-    """As much as both gain on a device in order, where neither is true, they mend the model itself: less than that
-    tells nothing."""
+    """Also where the difference is smaller than what both gain on clean recordings, where neither effect is present."""
     worse = other.standing.chosen_by - best.standing.chosen_by
     return worse <= max(AS_GOOD_GAIN, AS_GOOD_SHARE * excess(best), min(other.usual, best.usual))

@@ -1,4 +1,4 @@
-"""Which hypotheses are worth a fit: how much of what is left each could take, at one simulation apiece."""
+"""Ranks hypotheses by the gain that a linear model about their starting values predicts, one simulation each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Screened:
     hypothesis: Hypothesis
     """Together with what is already held to be true."""
     cost: float
-    """As `Fitted.cost`, foreseen by a straight line through the start."""
+    """As `Fitted.cost`, predicted by linearisation at the starting values."""
 
 
 def screen(

@@ -1,4 +1,4 @@
-"""The search for what is missing, and once more with half of the sealed samples where they alone show something."""
+"""The search without clean recordings; repeated with half of the sealed samples where only they show a mismatch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The search for what a recording holds that recordings of the sound device do not."""
+"""The search beside clean recordings: for effects that these do not show."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -34,7 +34,7 @@ def searched_beside_sound(
 
 
 def _left(arena: Arena, seen: Searched) -> float:
-    """Mean log error power of what is named, on what decisions may see."""
+    """Mean log error power of what is named, on the samples to fit and to choose by."""
     stands = seen.found.after if seen.judged.named else seen.found.retuned
     fitted = evaluated(arena.measure, arena.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
     return Contender(fitted, standing(arena.measure, fitted.residuals)).standing.chosen_by
@@ -68,7 +68,7 @@ def _by_contrast(
 
 
 def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
-    """How far the device is from sound is judged by more than it differed by then: days differ, too."""
+    """The bars are raised by the factor `beyond`, because a sound device differs from day to day, too."""
     if named:
         return Judgement(
             "explained" if found.after.standing.seen <= beyond * EXPLAINED_ERROR else "partly_explained", True
@@ -79,8 +79,8 @@ def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
 
 
 def _by(arena: Arena, found: Explanation) -> Explanation:
-    """The colour tells effects apart. Their numbers are those that bring the course itself closest: where a law is not
-    exact, what the colour makes little of would pull at them."""
+    """Effects are chosen on the whitened residual, their numbers fitted on the residual itself: where a law is not
+    exact, frequencies with little weight would bias them."""
     after = found.after.fitted
     if after.hypothesis.claims and not arena.certain:
         start = evaluated(arena.measure, arena.tuning, after.deviations, after.hypothesis)

@@ -23,7 +23,7 @@ SAME = 1e-9
 def seen_directly(
     recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
 ) -> tuple[Hypothesis, ...]:
-    """At most one, for steps are also there twice and have a largest reading. effects: those that may be named."""
+    """At most one: rounded readings also repeat and have a largest value. effects: those that may be named."""
     known = {effect.name: effect for effect in effects}
     new, sound = _readings(recordings), [_readings([recording]) for recording in clean]
     for name, look in (("quantization", _steps), ("sensor_clipping", _limit), ("lost_samples", _twice)):
@@ -83,7 +83,7 @@ def _at_the_top(values: FloatArray) -> tuple[float, int]:
 
 
 def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
-    """Here and there: a sensor that stands still for a while has not lost samples."""
+    """Repeated samples that are scattered: a sensor at rest for a while has not lost samples."""
     repeated = _repeats(new)
     usual = max(float(_begun(_repeats(readings)).mean()) for readings in sound) * len(repeated)
     if not _unusual(int(_begun(repeated).sum()), usual):

@@ -1,4 +1,4 @@
-"""What an explanation gains on recordings of a sound device: so much it gains without being true."""
+"""What an explanation gains on clean recordings, where its effect is absent: a baseline for its gain elsewhere."""
 
 from dataclasses import dataclass, field
 
@@ -30,7 +30,7 @@ class SoundRecording:
     evidence: Evidence
 
     def gained(self, wanted: Hypothesis) -> FloatArray:
-        """(c,): logarithm of the errors' rms without less that with it, each at its best."""
+        """(c,): fall of the logarithm of the rms error by the hypothesis, both fitted."""
         measure, tuning = self.measure, self.tuning
         starts = [evaluated(measure, tuning, self.base.deviations, hypothesis) for hypothesis in self._starts(wanted)]
         starts.sort(key=lambda fitted: fitted.cost)
@@ -59,7 +59,7 @@ class SoundRecordings:
     seen: dict[object, FloatArray] = field(default_factory=dict)
 
     def gained(self, hypothesis: Hypothesis) -> FloatArray:
-        """(c,): logarithm of the errors' rms, that counts against it; none of a model without effects."""
+        """(c,): the gain that is counted against the hypothesis; 0 for a model without effects."""
         if not hypothesis.claims:
             return np.zeros(1)
         if hypothesis.key not in self.seen:

@@ -1,4 +1,4 @@
-"""What a finished search allows to be said: nothing is missing, parameters were off, physics is named, or is not."""
+"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Judgement:
 
 
 def judge(found: Explanation) -> Judgement:
-    """By what decisions may see; the sealed samples can only take a name, or `explained`, away."""
+    """By the samples to fit and to choose by; the sealed ones can only withdraw a name, or `explained`."""
     if not found.after.fitted.hypothesis.claims or not _confirmed(found):
         if found.before.standing.seen <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
@@ -46,7 +46,7 @@ def judge(found: Explanation) -> Judgement:
 
 
 def as_good_as_noise(found: Explanation) -> bool:
-    """On what decisions may see."""
+    """On the samples to fit and to choose by."""
     worst = found.after.standing.seen
     if worst <= EXPLAINED_ERROR:
         return True
@@ -54,14 +54,14 @@ def as_good_as_noise(found: Explanation) -> bool:
 
 
 def worth_naming(found: Explanation) -> bool:
-    """Beside a remainder; on what decisions may see."""
+    """Beside a remainder; on the samples to fit and to choose by."""
     taken = found.retuned.standing.chosen_by - found.after.standing.chosen_by
     share = share_of_mismatch(found.retuned, found.after)
     return found.after.standing.seen <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
 def _confirmed(found: Explanation) -> bool:
-    """Whether the sealed samples agree that something was explained; yes where nothing was sealed."""
+    """Whether the sealed samples confirm the explanation; yes where nothing was sealed."""
     without, with_it = (np.log(contender.standing.test) for contender in (found.retuned, found.after))
     whole, left = float(np.mean(without)), float(np.mean(with_it))
     if not np.isfinite(whole):
@@ -76,6 +76,6 @@ def share_of_mismatch(without: Contender, with_it: Contender) -> float:
 
 
 def shares_taken(without: Contender, steps: Sequence[Contender]) -> tuple[float, ...]:
-    """Of the mismatch that was there without any of them, what each step took away: together no more than all."""
+    """Share of the mismatch of the re-tuned model that each step removed; their sum is at most 1."""
     left = [0.0, *(share_of_mismatch(without, step) for step in steps)]
     return tuple(max(after - before, 0.0) for before, after in pairwise(left))

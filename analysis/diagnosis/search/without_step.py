@@ -1,4 +1,4 @@
-"""An explanation without one of its effects, whose place the next one takes."""
+"""An explanation with one of its effects removed."""
 
 from dataclasses import replace
 
