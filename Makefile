@@ -6,6 +6,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 # Small matrices: threads of a linear algebra library would wait for each other longer than they work.
 export OPENBLAS_NUM_THREADS ?= 1
+# Some machines forbid Python to keep compiled code: then each of the hundreds of programs that the tests start compiles
+# numba, pandas and SciPy anew, for seconds.
+unexport PYTHONDONTWRITEBYTECODE
 
 DIAGNOSIS := tests/stories/test_missing_physics_is_named.py \
 	tests/stories/test_friction_is_named_and_then_compensated.py tests/analysis
@@ -30,7 +33,7 @@ SEED ?= 95000
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove-study prove-equalizer prove-diagnosis prove-bank docs clean \
+.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank docs clean \
 	types imports compiled $(TESTED)
 
 help: ## Show what can be made
@@ -70,6 +73,8 @@ fix: $(VENV)/.installed-test ## Let ruff format and mend what it can
 bench: $(VENV)/.installed-test ## Ours against the same work done plainly and against live peers; prints ratios
 	@# Peers are installed once, in .venv-peers. A bar that is missed does not hide the other benchmarks.
 	@missed=0; for file in tests/benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || missed=1; done; exit $$missed
+
+prove: prove-study prove-equalizer prove-diagnosis ## All tests marked slow, which `make test` leaves out
 
 prove-study: $(VENV)/.installed-test ## The slow proof of the study: 100 sessions killed at random
 	$(BIN)/python -m pytest -m slow tests/study tests/stories $(DIAGNOSIS:%=--ignore=%)

@@ -133,7 +133,12 @@ def test_what_is_wrong_is_said_and_nothing_is_written(
 
 
 @pytest.mark.parametrize(
-    "typed", ["real recordings --out empty", "real recordings --out empty/out", f"kit score labels.csv {SCORE}"]
+    "typed",
+    [
+        "real recordings --out empty",
+        pytest.param("real recordings --out empty/out", marks=pytest.mark.slow),
+        f"kit score labels.csv {SCORE}",
+    ],
 )
 def test_a_place_that_may_not_be_written_to_is_said(place: Path, typed: str) -> None:
     """The superuser, whom no mode of a folder stops, works without that right."""

@@ -9,18 +9,21 @@ import pytest
 
 from analysis.diagnosis.result.experiment_menu import experiment_menu
 from analysis.proof.follow_up import FollowUp, follow_up_figures
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.challenge.draw_bank import draw
 from study.errors import StudyError
 from study.store.mechanical_model_file import read_mechanical_model
 from study.store.provenance import sha256_of
 from study.workflows.follow_up import DRAWN, FURTHER, NEXT, PROPOSED, follow_up
-from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, ProofFolder, opened
+from study.workflows.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder, opened
 from study.workflows.reveal_cases import outcome_of
-from study.workflows.seal_cases import BankPlan, seal_one
+from study.workflows.seal_cases import BankPlan, seal_one, settings_text
 
 SEED, NUMBER, LEVEL_N = 51_404, 0, 3.0
 """A gain of the accelerometer."""
 PLAN = BankPlan(SEED, 1, brief=True)
+CONSIDERED = ("sensor_gain", "force_gain", "sensor_lag", "coulomb_friction", "added_mass")
+"""Of the catalogue, for the time that it takes."""
 ERRORS = {"before": 9.0, "retuned": 9.0, "after": 1.0, "noise": 1.0}
 
 
@@ -50,6 +53,8 @@ def started(path, best):
     seal_one(folder, draw(SEED, NUMBER, True))
     label = json.loads(folder.label(NUMBER).read_text())
     place = folder.open / label["name"]
+    without = [effect.name for effect in EFFECT_NAMES if effect.name not in CONSIDERED]
+    (place / SETTINGS).write_text(settings_text(without))
     menu = experiment_menu(read_mechanical_model(place / MODEL), 1000.0, 0, LEVEL_N)
     answer(place, best=menu[0].words if best else "")
     outcome = outcome_of(label, json.loads((place / ANSWER).read_text()))

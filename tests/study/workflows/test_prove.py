@@ -22,7 +22,7 @@ from study.workflows.write_proof import commit, write_proof, write_table
 
 ROOT = Path(__file__).parents[3]
 SEED = 51_404
-PLAN = BankPlan(SEED, 3, brief=True)
+PLAN = BankPlan(SEED, 2, brief=True)
 
 
 @pytest.fixture(scope="module")
