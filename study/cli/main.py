@@ -24,6 +24,7 @@ from study.cli import (
     identify,
     import_recording,
     kit,
+    look,
     noise,
     note,
     protocol,
@@ -61,6 +62,7 @@ app.command("reproduce")(reproduce.reproduce)
 app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
 app.command("import")(import_recording.import_recording)
+app.command("look")(look.look)
 app.command("identify")(identify.identify)
 app.command("equalize")(equalize.equalize)
 app.command("twin")(twin.twin)

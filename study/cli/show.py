@@ -1,4 +1,4 @@
-"""`hapteq show`: one session, or one diagnosis, as the screen shows it."""
+"""`hapteq show`: one session, or one diagnosis, as the screen shows it; or one recording."""
 
 import json
 from collections.abc import Iterable
@@ -19,16 +19,28 @@ PLOT_COLUMNS, PLOT_ROWS = 78, 12
 
 
 def show(
-    what: Annotated[str, typer.Argument(help="A session (its folder or name), or a diagnosis.json.", metavar="WHAT")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            help="A session (its folder or name), a diagnosis (its file or folder), or a recording.", metavar="WHAT"
+        ),
+    ],
     data: DataOption = Path("data"),
     log: Annotated[bool, typer.Option("--log", help="Also the log in words.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Facts, thresholds, warnings and staircases of a session; or verdict, effects and fit of a diagnosis."""
-    if Path(what).is_file():
+    """Facts, thresholds, warnings and staircases of a session; verdict, effects and fit of a diagnosis; or channels,
+    segments and facts of a recording."""
+    from study.store.hdf5_file import is_hdf5
+
+    if Path(what).is_file() and is_hdf5(Path(what)):
+        _show_recording(Path(what), as_json)
+        return
+    document = Path(what) / "diagnosis.json" if (Path(what) / "diagnosis.json").is_file() else Path(what)
+    if document.is_file():
         from study.workflows.view_diagnosis import diagnosis_view
 
-        diagnosis = diagnosis_view(Path(what))
+        diagnosis = diagnosis_view(document)
         _say([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
         return
     from study.local_clock import machine_zone
@@ -37,6 +49,17 @@ def show(
 
     session = session_view(_folder(what, data), in_utc if as_json else machine_zone)
     _say([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
+
+
+def _show_recording(path: Path, as_json: bool) -> None:
+    from study.cli.look import recording_lines, say
+    from study.workflows.look_at_recordings import look_at, look_document, recording_facts
+
+    found = look_at([path])
+    if as_json:
+        _say([json.dumps(look_document(found)[0], indent=2)])
+        return
+    say([*recording_facts(found[0]), *recording_lines(found[0]), "", f"Its checks: hapteq look {path}"])
 
 
 def _folder(what: str, data: Path) -> Path:

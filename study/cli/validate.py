@@ -11,11 +11,13 @@ def validate(
     files: Annotated[list[Path], typer.Argument(help="Files or session folders.")],
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
 ) -> None:
-    """Check files: recordings, models, protocols, tables, logs. Exit code 1 if anything is wrong."""
+    """Check files: recordings, models, protocols, tables, logs; and models against the recordings that are given with
+    them. Exit code 1 if anything is wrong."""
     from study.errors import ExitCode
     from study.workflows.validate_apart import validate_files
+    from study.workflows.validate_together import validated_together
 
-    found = list(validate_files(files))
+    found = validated_together(list(validate_files(files)))
     if as_json:
         rows = [
             {"file": str(v.path), "kind": v.kind, "problems": list(v.problems), "notes": list(v.notes)} for v in found

@@ -4,12 +4,16 @@ from collections.abc import Callable
 
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
 from analysis.diagnosis.result.real_answer import FORMAT as REAL_ANSWER_FORMAT
+from analysis.look.driven_band import silent_segments
 from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from equalizer.plant.model_quality import quality_brief
+from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.trajectory import TRAJECTORY
 from protocols.loading import ProtocolError, load_protocol
 from protocols.recording_protocol import RecordingProtocol
 from protocols.schema import ADAPTERS, protocol_schema
+from study.importing.import_map import ChannelMap, ComputedMap
+from study.importing.map_toml import KIND as MAP_KIND
 from study.importing.map_toml import is_map, parse_map
 from study.store import identified_model_file, recording_layout
 from study.store.csv_rows import header_problem
@@ -35,6 +39,8 @@ def recognise_recording(content: FileContent) -> str | None:
     if content.hdf5_format != recording_layout.FORMAT:
         return None
     found = read_recording(content.path)
+    if silent := silent_segments(found):
+        raise UnusableFileError(content.path, recording_layout.KIND, silent)
     parts = [
         f"recording, {found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
         _count(len(found.command.channels), "command"),
@@ -76,8 +82,19 @@ def recognise_import_map(content: FileContent) -> str | None:
     if content.toml is None or not is_map(content.toml):
         return None
     found = parse_map(content.text or "", content.path)
-    channels = [*found.channel, *found.computed]
+    channels: list[ChannelMap | ComputedMap] = [*found.channel, *found.computed]
+    if problems := tuple(problem for channel in channels if (problem := _unit_problem(channel))):
+        raise UnusableFileError(content.path, MAP_KIND, problems)
     return f"import map for {found.device}: {_count(len(channels), 'channel')}, {_count(len(found.clock), 'clock')}"
+
+
+def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
+    """Empty where its unit is known, or none is stated."""
+    try:
+        check_quantity(channel.quantity, parse_unit(channel.unit.strip() or UNSTATED))
+    except UnknownUnitError as error:
+        return f"{channel.role} '{channel.name}': {error}"
+    return ""
 
 
 _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}

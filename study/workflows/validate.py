@@ -4,10 +4,13 @@ import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from study.errors import StudyError
 from study.store.archive import FOLDER
 from study.store.file_errors import UnusableFileError
 from study.store.privacy import warning
+from study.store.recording_file import read_recording
 from study.store.regular_file import DOCUMENT_BYTES
 from study.store.strict_json import load_json
 from study.store.toml_text import TOML_BYTES, too_long_key
@@ -38,7 +41,16 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
     found = _validated(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
     said = (warning(folder) for folder in folders if _is_folder(folder))
-    return replace(found, notes=tuple(filter(None, said)))
+    return replace(found, notes=(*filter(None, said), *_notes(found)))
+
+
+def _notes(found: Validation) -> tuple[str, ...]:
+    """Of a sound recording: axes that are not driven."""
+    if found.problems or not found.kind.startswith("recording, "):
+        return ()
+    command = read_recording(found.path).command
+    idle = [name for name, one in zip(command.channels, command.samples.T, strict=True) if not np.nan_to_num(one).any()]
+    return (f"No command drives {', '.join(idle)}.",) if idle else ()
 
 
 def _is_folder(path: Path) -> bool:

@@ -1,0 +1,230 @@
+"""Pictures of a recording before any model: courses, spectra, coherence, levels, derivatives."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, new_figure, plain_axes
+from analysis.look.channels import Channel
+from analysis.look.kinematics import KinematicPair, derivative
+from analysis.look.overview import Overview
+from equalizer.signals.signal import FloatArray
+
+COLUMNS = 1200
+"""Of a course, each drawn from its lowest to its highest sample."""
+SHOWN_SAMPLES = 600
+"""Of two courses that are laid over each other."""
+_FIT, _TEST, _BAND = "#EEF3E6", "#FBEFD9", "#EEF3E6"
+_DECADES = 8
+_COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
+
+
+def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
+    """place: of the recording among those of the page, from 1; part of the pictures' names."""
+    pictures = [_signals(found, f"signals-{place}")]
+    if found.spectra is not None:
+        pictures.append(_spectra(found, f"spectra-{place}"))
+    if found.coherences:
+        pictures.append(_coherence(found, f"coherence-{place}"))
+    if len(found.levels) > 2:
+        pictures.append(_levels(found, f"levels-{place}"))
+    if found.pairs:
+        pictures.append(_derivatives(found, f"derivatives-{place}"))
+    return tuple(pictures)
+
+
+def _rows(found: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
+    figure = new_figure(8.6, 0.8 + height_in * len(found.channels))
+    axes = figure.subplots(len(found.channels), 1, sharex=True, squeeze=False)[:, 0]
+    for channel, panel in zip(found.channels, axes, strict=True):
+        plain_axes(panel)
+        panel.set_title(f"{channel.role} {channel.name} ({_pretty(channel.unit)})", fontsize=9, loc="left", pad=3)
+    return figure, list(axes)
+
+
+def _signals(found: Overview, name: str) -> Picture:
+    figure, axes = _rows(found, 1.15)
+    rate_hz = found.recording.sample_rate_hz
+    for channel, panel in zip(found.channels, axes, strict=True):
+        times_s, low, high = envelope(channel.samples, rate_hz)
+        panel.fill_between(times_s, low, high, color=_COLOUR_OF[channel.role], linewidth=0.6)
+        for segment in found.recording.segments:
+            if segment.role:
+                shade = _FIT if segment.role == "fit" else _TEST
+                panel.axvspan(segment.start / rate_hz, segment.stop / rate_hz, color=shade, zorder=0, linewidth=0)
+        for start, _ in found.stretches[1:]:
+            panel.axvline(start / rate_hz, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
+    figure.supxlabel("Time (s)" if found.recording.meta.get("time") != "unknown" else "Sample", fontsize=10)
+    handles = [Patch(color=_FIT, label="to fit"), Patch(color=_TEST, label="to test")]
+    if any(segment.role for segment in found.recording.segments):
+        figure.legend(handles=handles, loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
+    return Picture(
+        name=name,
+        title="Signals",
+        caption="Every channel from its lowest to its highest sample in each column of the picture. Shades: samples "
+        "marked to fit and to test. Dotted: where one part ends and the next begins.",
+        figure=figure,
+    )
+
+
+def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times, lowest and highest of equal stretches; (≤ columns,) each, NaN where all are missing."""
+    starts = np.unique(np.linspace(0, len(samples), min(columns, len(samples)), endpoint=False).astype(int))
+    low = np.fmin.reduceat(samples, starts)
+    high = np.fmax.reduceat(samples, starts)
+    # Neighbouring columns touch, or a steep course would fall into pieces.
+    low[1:], high[1:] = np.fmin(low[1:], high[:-1]), np.fmax(high[1:], low[:-1])
+    return starts / rate_hz, low, high
+
+
+def _spectra(found: Overview, name: str) -> Picture:
+    assert found.spectra is not None
+    figure, axes = _rows(found, 1.25)
+    frequency_hz = found.spectra.frequency_hz
+    for k, (channel, panel) in enumerate(zip(found.channels, axes, strict=True)):
+        amplitude = np.sqrt(found.spectra.power(k))
+        if np.nanmin(channel.samples) == np.nanmax(channel.samples):
+            panel.text(0.5, 0.5, "constant", transform=panel.transAxes, ha="center", fontsize=9, color=GREY)
+            continue
+        panel.plot(frequency_hz, np.where(amplitude > 0, amplitude, np.nan), color=_COLOUR_OF[channel.role], lw=1.0)
+        panel.set_yscale("log")
+        if amplitude.max() > 0:
+            top = float(amplitude.max())
+            panel.set_ylim(max(0.5 * float(amplitude[amplitude > 0].min()), top * 10.0**-_DECADES), 2 * top)
+        _shade_bands(panel, found)
+    axes[0].set_xscale("log")
+    axes[0].set_xlim(float(frequency_hz[0]), float(frequency_hz[-1]))
+    figure.supxlabel("Frequency (Hz)", fontsize=10)
+    figure.supylabel("Amplitude density (unit per √Hz)", fontsize=10)
+    step_hz = float(frequency_hz[0])
+    return Picture(
+        name=name,
+        title="Spectra",
+        caption=f"Mean of {found.spectra.windows} windows of {1 / step_hz:.3g} s (Hann, half overlap, less a straight "
+        "line). Shade: from the lowest to the highest frequency that a command was driven at.",
+        figure=figure,
+    )
+
+
+def _shade_bands(panel: Axes, found: Overview) -> None:
+    if found.bands:
+        low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
+        panel.axvspan(low, high, color=_BAND, zorder=0)
+
+
+def _coherence(found: Overview, name: str) -> Picture:
+    assert found.spectra is not None
+    figure = new_figure(8.6, 3.0)
+    panel = figure.subplots()
+    plain_axes(panel)
+    _shade_bands(panel, found)
+    for k, one in enumerate(found.coherences):
+        panel.plot(
+            found.spectra.frequency_hz, one.multiple, color=COLOURS[k % len(COLOURS)], lw=1.1, label=one.response
+        )
+    panel.set_xscale("log")
+    panel.set_xlim(float(found.spectra.frequency_hz[0]), float(found.spectra.frequency_hz[-1]))
+    panel.set_ylim(0, 1.02)
+    panel.set_xlabel("Frequency (Hz)", fontsize=10)
+    panel.set_ylabel("Multiple coherence", fontsize=10)
+    figure.legend(loc="outside upper center", ncols=min(4, len(found.coherences)), fontsize=8.5, frameon=False)
+    return Picture(
+        name=name,
+        title="Coherence",
+        caption="Share of each response's power that all commands together explain linearly, without what as many "
+        "windows explain by chance. Shade: driven band.",
+        figure=figure,
+    )
+
+
+def _levels(found: Overview, name: str) -> Picture:
+    figure = new_figure(8.6, 3.2)
+    panel = figure.subplots()
+    plain_axes(panel)
+    numbers = [level.number for level in found.levels]
+    strongest = [max(level.rms[k] for level in found.levels) for k in range(len(found.channels))]
+    shown = [k for k, c in enumerate(found.channels) if c.role in ("command", "response") and strongest[k] > 0]
+    for count, k in enumerate(shown):
+        sizes = np.array([level.rms[k] for level in found.levels]) / strongest[k]
+        panel.plot(
+            numbers,
+            np.where(sizes > 0, sizes, np.nan),
+            color=COLOURS[count % len(COLOURS)],
+            marker=MARKERS[count % len(MARKERS)],
+            markersize=5,
+            linewidth=0.8,
+            linestyle=":" if found.channels[k].role == "command" else "-",
+            label=f"{found.channels[k].label} ({found.channels[k].of(strongest[k])})",
+        )
+    panel.set_ylim(0, 1.05)
+    panel.set_xlabel("Segment", fontsize=10)
+    panel.set_ylabel("Rms over that of the strongest", fontsize=10)
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.legend(loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
+    return Picture(
+        name=name,
+        title="Levels",
+        caption="Rms of each command and response in every segment, over its largest one (in brackets). Where a "
+        "response does not follow its command, the device is not linear.",
+        figure=figure,
+    )
+
+
+def _derivatives(found: Overview, name: str) -> Picture:
+    pairs = found.pairs
+    figure = new_figure(8.6, 0.8 + 1.9 * len(pairs))
+    axes = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
+    for pair, panel in zip(pairs, axes, strict=True):
+        _pair_panel(panel, pair, found)
+    handles = [
+        Line2D([], [], color=BLACK, linewidth=2.2, alpha=0.35, label="recorded"),
+        Line2D([], [], color=BLUE, linewidth=1.0, label="differentiated position or speed"),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
+    figure.supxlabel("Time (s)", fontsize=10)
+    return Picture(
+        name=name,
+        title="Derivatives",
+        caption="A stretch in which the most happens: what was recorded, and central differences of the place or speed "
+        "that shows the same motion.",
+        figure=figure,
+    )
+
+
+def _pair_panel(panel: Axes, pair: KinematicPair, found: Overview) -> None:
+    rate_hz = found.recording.sample_rate_hz
+    by_label = {channel.label: channel for channel in found.channels}
+    later = by_label[pair.derivative]
+    start, stop = _liveliest(later, found.stretches)
+    times_s = np.arange(start, stop) / rate_hz
+    differences = derivative(by_label[pair.place].samples, pair.order, rate_hz)
+    plain_axes(panel)
+    panel.plot(times_s, later.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
+    panel.plot(times_s, differences[start:stop], color=BLUE, linewidth=1.0)
+    panel.set_title(f"{pair.derivative} ({_pretty(later.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
+    panel.set_xlim(float(times_s[0]), float(times_s[-1]))
+
+
+def _liveliest(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    """Where the channel varies the most, within one stretch."""
+    best, place = -1.0, stretches[0]
+    for start, stop in stretches:
+        piece = np.nan_to_num(channel.samples[start:stop] - np.nanmean(channel.samples))
+        length = min(SHOWN_SAMPLES, len(piece))
+        sums, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (piece, piece**2))
+        mean = (sums[length:] - sums[:-length]) / length
+        varied = (squares[length:] - squares[:-length]) / length - mean**2
+        if varied.max() > best:
+            at = start + int(np.argmax(varied))
+            best, place = float(varied.max()), (at, at + length)
+    return place
+
+
+def _pretty(unit: str) -> str:
+    return "no unit" if unit == "1" else unit.replace("^2", "²")

@@ -1,0 +1,62 @@
+"""The channels of a recording, one by one, and the stretches in which time runs on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.wording import typeset
+from equalizer.signals.recording import Recording
+from equalizer.signals.recording_checks import signals_of
+from equalizer.signals.signal import FloatArray
+
+Stretch = tuple[int, int]
+"""First sample, and the one after the last."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    role: str
+    """command, response, position, excitation or condition."""
+    name: str
+    quantity: str
+    unit: str
+    samples: FloatArray
+    """(n,)"""
+
+    @property
+    def label(self) -> str:
+        return f"{self.role} '{self.name}'"
+
+    @property
+    def known(self) -> FloatArray:
+        """Without missing samples."""
+        return self.samples[np.isfinite(self.samples)]
+
+    def of(self, value: float) -> str:
+        """A value of this channel, as text with its unit."""
+        return in_unit(value, self.unit)
+
+
+def channels_of(recording: Recording) -> tuple[Channel, ...]:
+    return tuple(
+        Channel(role, name, quantity, unit, samples)
+        for role, signal in signals_of(recording).items()
+        for name, quantity, unit, samples in zip(
+            signal.channels, signal.quantities, signal.units, signal.samples.T, strict=True
+        )
+    )
+
+
+def stretches_of(recording: Recording) -> tuple[Stretch, ...]:
+    """Parts of the recording: between them the state of the device jumps."""
+    return parts_of(recording)
+
+
+def in_unit(value: float, unit: str, digits: int = 3) -> str:
+    return f"{typeset(f'{value:.{digits}g}')}{'' if unit == '1' else f' {unit}'}"
+
+
+def rms(samples: FloatArray) -> float:
+    """About the mean; 0 of nothing."""
+    return float(np.std(samples)) if samples.size else 0.0

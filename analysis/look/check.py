@@ -1,0 +1,23 @@
+"""One thing that was checked in a recording, and what came of it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Level = Literal["fine", "notice", "wrong"]
+"""`wrong` would mislead an analysis; `notice` should be known; `fine` was checked and is in order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    name: str
+    """What was checked: "clipping"."""
+    level: Level
+    seen: str
+    """One sentence, with numbers and units."""
+    do: str = ""
+    """What to do about it; empty where there is nothing to do."""
+
+
+def fine_if_none(name: str, found: tuple[Check, ...], seen: str) -> tuple[Check, ...]:
+    """The findings, or one check that says that there are none."""
+    return found or (Check(name, "fine", seen),)

@@ -1,0 +1,88 @@
+"""Flat extremes: where a sensor, a converter or an amplifier came to its end.
+
+A signal that turns by itself is slow where it turns, so it stays near its extreme no longer than its slope before and
+after allows. A clipped one comes in fast, stays at the last value, and leaves fast: by its slopes and the time that it
+stays, it would have gone on by slope x time / 4 (a parabola through both).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.diagnosis.data.rounding import rounding_step
+from analysis.look.channels import Channel
+from analysis.look.check import Check, fine_if_none
+from equalizer.signals.signal import FloatArray
+
+CLIPPING = "clipping"
+LEAST_SAMPLES = 5
+"""At an extreme: fewer are chance."""
+LEAST_RUNS = 2
+_STEPS = 3.0
+"""By how many steps of rounding a channel would have gone on, at least."""
+SETTLES = 0.4
+"""Of its speed before, that a signal must keep until it is flat: with less it comes to rest there by itself."""
+_FEW_VALUES = 24
+"""A channel of so few values was made so: a binary command, a series of steps, a coarse encoder."""
+_CROWDED = 4.0
+"""Samples at the extreme over those in the next equally wide bin below it."""
+
+
+def clipping(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    found = tuple(check for channel in channels if channel.role != "excitation" for check in _of_channel(channel))
+    return fine_if_none(CLIPPING, found, "No channel is flat at its extremes.")
+
+
+def _of_channel(channel: Channel) -> tuple[Check, ...]:
+    if len(np.unique(channel.known)) <= _FEW_VALUES:
+        return ()
+    sides = [(sign, clipped_samples(sign * channel.samples)) for sign in (1.0, -1.0)]
+    hit = [(sign, count) for sign, count in sides if count]
+    if not hit:
+        return ()
+    ends = " and ".join(channel.of(sign * float(np.max(sign * channel.known))) for sign, _ in hit)
+    count = sum(count for _, count in hit)
+    seen = f"{channel.label} is cut off at {ends}: {count} samples ({count / len(channel.samples):.2%}) lie there."
+    if channel.role == "command":
+        return (Check(CLIPPING, "notice", seen, "The command was limited: leave those stretches out, or drive less."),)
+    return (
+        Check(CLIPPING, "wrong", seen, "Record again with less drive or a wider range; leave those stretches out."),
+    )
+
+
+def clipped_samples(samples: FloatArray) -> int:
+    """At the upper end; 0 where the signal turns there by itself. samples: (n,), NaN = missing."""
+    filled = np.where(np.isfinite(samples), samples, -np.inf)
+    top = float(filled.max())
+    known = samples[np.isfinite(samples)]
+    step = rounding_step(samples)
+    width = max(step, 1e-3 * float(np.ptp(known)))
+    tolerance = max(0.5 * step, 1e-9 * float(np.ptp(known)))
+    at_top = filled >= top - tolerance
+    # As wide as the top's own bin, so that a rounded signal is compared step by step.
+    next_below = int(np.sum((filled < top - tolerance) & (filled >= top - tolerance - width)))
+    if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below / max(1.0, width / max(step, width)):
+        return 0
+    runs = _runs(at_top)
+    beyond = [_would_go_on(filled, start, stop) for start, stop in runs]
+    needed = max(_STEPS * step, 1e-6 * float(np.ptp(known)))
+    counted = [stop - start for (start, stop), over in zip(runs, beyond, strict=True) if over > needed]
+    return int(at_top.sum()) if len(counted) >= LEAST_RUNS or max(counted, default=0) >= LEAST_SAMPLES else 0
+
+
+def _would_go_on(samples: FloatArray, start: int, stop: int) -> float:
+    """How far above a flat run the signal would have risen; 0 at the ends of a recording."""
+    back = max(1, (stop - start) // 8)  # a rounded signal stands still between its steps, so not by two samples alone
+    if start - 1 < 2 * back or stop + back >= len(samples):
+        return 0.0
+    before, earlier = samples[start - 1 - back], samples[start - 1 - 2 * back]
+    came, went = samples[start - 1] - before, samples[stop] - samples[stop + back]
+    if not np.isfinite(came + went + earlier) or came < SETTLES * (before - earlier):
+        return 0.0
+    slope = min(came, went) / back
+    return float(max(0.0, slope) * (stop - start + 1) / 4)
+
+
+def _runs(marked: np.ndarray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(np.int8), [0]])))
+    return [(int(start), int(stop)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,107 @@
+"""Time stamps against the stated rate: jitter, gaps and drift."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.look.channels import Stretch
+from analysis.look.check import Check
+from equalizer.signals.recording import Recording
+
+CLOCK = "clock"
+GAP = 1.5
+"""Steps between two stamps that are a gap."""
+JITTER, WILD = 0.02, 0.2
+"""Rms of a stamp off its place, in steps, that is noticed, and that spoils phases."""
+DRIFT_PPM, RATE_PPM = 100.0, 5000.0
+"""Off the stated rate: a cheap oscillator, and a rate that is another."""
+
+
+def clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ...]:
+    if recording.meta.get("time") == "unknown":
+        return (
+            Check(
+                CLOCK,
+                "notice",
+                "No time is known: samples are numbered, and the rate of 1 Hz is nominal.",
+                "Nothing that hangs on speed, frequency or delay can be said of it.",
+            ),
+        )
+    if recording.time_s is None:
+        said = _resampled(recording)
+        return said or (
+            Check(CLOCK, "fine", f"There are no time stamps; {recording.sample_rate_hz:g} Hz is taken as stated."),
+        )
+    found = tuple(check for start, stop in stretches for check in _of_stamps(recording, start, stop))
+    return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
+
+
+def _resampled(recording: Recording) -> tuple[Check, ...]:
+    """What an import has said about uneven stamps."""
+    said = recording.meta.get("import")
+    notes = said.get("notes", ()) if isinstance(said, dict) else ()
+    uneven = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
+    return tuple(
+        Check(CLOCK, "notice", f"The import has evened it out: {note}", "Trust phases far below half the rate only.")
+        for note in uneven
+    )
+
+
+def _of_stamps(recording: Recording, start: int, stop: int) -> tuple[Check, ...]:
+    assert recording.time_s is not None
+    stamps, rate_hz = recording.time_s[start:stop], recording.sample_rate_hz
+    if len(stamps) < 3:
+        return ()
+    steps = np.diff(stamps) * rate_hz
+    gaps = steps > GAP
+    places = np.concatenate([[0.0], np.cumsum(np.where(gaps, np.round(steps), 1.0))])
+    slope, begin = np.polyfit(places, stamps - stamps[0], 1)
+    off = (stamps - stamps[0] - begin - slope * places) / slope
+    jitter, drift_ppm = float(np.std(off)), (slope * rate_hz - 1) * 1e6
+    return tuple(
+        check
+        for check in (
+            _gap_check(steps, gaps, stamps, rate_hz),
+            _jitter_check(jitter, float(np.abs(off).max()), slope),
+            _drift_check(drift_ppm, rate_hz),
+        )
+        if check is not None
+    )
+
+
+def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz: float) -> Check | None:
+    if not gaps.any():
+        return None
+    first, longest = int(np.argmax(gaps)), float(steps.max())
+    return Check(
+        CLOCK,
+        "wrong",
+        f"{int(gaps.sum())} gaps between time stamps, the first after {stamps[first] - stamps[0]:.4g} s; the longest "
+        f"is {longest / rate_hz * 1e3:.4g} ms in place of {1e3 / rate_hz:.4g} ms.",
+        "Import with the stamps as the clock: lost samples become missing ones, and what follows keeps its time.",
+    )
+
+
+def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
+    seen = (
+        f"Time stamps lie {jitter * step_s * 1e6:.3g} us rms off their places ({jitter:.1%} of a step), "
+        f"{most * step_s * 1e6:.3g} us at most."
+    )
+    if jitter > WILD:
+        return Check(CLOCK, "wrong", seen, "Import with the stamps as the clock, and resample.")
+    if jitter > JITTER:
+        return Check(
+            CLOCK, "notice", seen, "Expect noise beside strong lines; resample by the stamps where it matters."
+        )
+    return Check(CLOCK, "fine", seen)
+
+
+def _drift_check(drift_ppm: float, rate_hz: float) -> Check | None:
+    slower = "slower" if drift_ppm > 0 else "faster"
+    seen = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {slower} than {rate_hz:g} Hz."
+    if abs(drift_ppm) > RATE_PPM:
+        true_hz = rate_hz / (1 + drift_ppm * 1e-6)
+        return Check(CLOCK, "wrong", seen, f"State the rate as {true_hz:.6g} Hz, or import with the stamps.")
+    if abs(drift_ppm) > DRIFT_PPM:
+        return Check(CLOCK, "notice", seen, "State the rate of the stamps where frequencies matter.")
+    return Check(CLOCK, "fine", seen)

@@ -1,0 +1,74 @@
+"""Power and cross spectra of all channels, averaged over windows (Welch 1967), within stretches only."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from analysis.look.channels import Channel, Stretch
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_WINDOWS = 12
+"""Wished for, of half overlap; as many as that leave half of a coherence of 0.1 to chance."""
+_SHORTEST, _LONGEST = 32, 8192
+MOST_WINDOWS = 400
+"""More of them say nothing new, and take time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrossSpectra:
+    frequency_hz: FloatArray
+    """(lines,), without the mean's."""
+    matrix: ComplexArray
+    """(lines, channels, channels), densities in unit x unit / Hz; [:, i, j] is conj(i) j."""
+    windows: int
+    columns: tuple[str, ...]
+    """Labels of the channels."""
+
+    def power(self, channel: int) -> FloatArray:
+        density: FloatArray = self.matrix[:, channel, channel].real
+        return density
+
+    def coherence(self, one: int, other: int) -> FloatArray:
+        both = self.power(one) * self.power(other)
+        return np.asarray(np.abs(self.matrix[:, one, other]) ** 2 / np.where(both > 0, both, np.inf))
+
+
+def cross_spectra(
+    channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float, samples_per_window: int = 0
+) -> CrossSpectra | None:
+    """Windows with missing samples are left out. None where no window is whole."""
+    columns = np.column_stack([channel.samples for channel in channels])
+    total = sum(stop - start for start, stop in stretches)
+    usual = 2 ** int(np.log2(max(2 * total / _WINDOWS, _SHORTEST)))
+    length = min(samples_per_window or min(usual, _LONGEST), max(stop - start for start, stop in stretches))
+    if length < _SHORTEST:
+        return None
+    starts = [at for start, stop in stretches for at in range(start, stop - length + 1, max(1, length // 2))]
+    whole = [at for at in starts if np.isfinite(columns[at : at + length]).all()]
+    chosen = whole[:: max(1, -(-len(whole) // MOST_WINDOWS))]
+    if not chosen:
+        return None
+    window, ramp = np.hanning(length + 1)[:-1], _straight_lines(length)
+    summed = np.zeros((length // 2, len(channels), len(channels)), dtype=np.complex128)
+    for at in chosen:
+        piece = columns[at : at + length]
+        piece = piece - ramp @ (ramp.T @ piece)
+        lines = np.fft.rfft(piece * window[:, None], axis=0)[1 : length // 2 + 1]
+        summed += np.einsum("li,lj->lij", lines.conj(), lines)
+    scale = 2.0 / (rate_hz * float(np.sum(window**2)) * len(chosen))
+    frequency_hz = np.arange(1, length // 2 + 1) * (rate_hz / length)
+    return CrossSpectra(
+        frequency_hz,
+        np.asarray(summed * scale, dtype=np.complex128),
+        len(chosen),
+        tuple(channel.label for channel in channels),
+    )
+
+
+def _straight_lines(length: int) -> npt.NDArray[np.float64]:
+    """(length, 2), orthonormal: what is taken off each window."""
+    ramp = np.arange(length) - (length - 1) / 2
+    return np.column_stack([np.full(length, length**-0.5), ramp / np.sqrt(ramp @ ramp)])

@@ -1,0 +1,164 @@
+"""Which commands were driven, where in frequency, and how much of each response they explain linearly."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.look.channels import Channel
+from analysis.look.check import Check
+from analysis.look.cross_spectra import CrossSpectra
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+DRIVEN, COHERENCE = "driven axes", "coherence"
+BELOW_PEAK = 1e-2
+"""Of the highest density: lines with less are not driven."""
+LEAST_DRIVE = 1e-4
+"""Of the strongest command of the same unit, in power: less is no drive."""
+LOW, POOR = 0.8, 0.1
+"""Share of a response's power that is noticed; and so little that the channel may be another."""
+_BROAD = frozenset({"multisine", "noise", "binary", "sweep", "rest"})
+_HEARD = 0.01
+"""Share of a response's power in an octave that is worth naming."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenBand:
+    command: str
+    low_hz: float
+    high_hz: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResponseCoherence:
+    response: str
+    multiple: FloatArray
+    """(lines,): share of its power that all commands together explain linearly, 0 to 1."""
+    share: float
+    """Of its power in the driven band."""
+    lowest_hz: float
+    """Middle of the worst octave there, of those that hold some of its power."""
+    lowest: float
+    """Share of the power of that octave."""
+
+
+def driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[DrivenBand, ...]:
+    """Of what was decided beforehand where it was recorded, else of the command."""
+    role = "excitation" if any(_moves(c) and c.role == "excitation" for c in channels) else "command"
+    found = []
+    powers = {k: spectra.power(k) for k, channel in enumerate(channels) if channel.role == role}
+    for k, power in powers.items():
+        rivals = [other.sum() for j, other in powers.items() if channels[j].unit == channels[k].unit]
+        if power.max() <= 0 or power.sum() < LEAST_DRIVE * max(rivals):
+            continue
+        lines = spectra.frequency_hz[power > BELOW_PEAK * power.max()]
+        found.append(DrivenBand(channels[k].name, float(lines[0]), float(lines[-1])))
+    return tuple(found)
+
+
+def _moves(channel: Channel) -> bool:
+    return bool(channel.known.size and np.ptp(channel.known) > 0)
+
+
+def response_coherences(
+    spectra: CrossSpectra, channels: Sequence[Channel], bands: Sequence[DrivenBand]
+) -> tuple[ResponseCoherence, ...]:
+    """Empty where nothing is driven, or too few windows were averaged to tell."""
+    inputs = [k for k, c in enumerate(channels) if c.role == "command" and c.name in {band.command for band in bands}]
+    if not inputs or spectra.windows < 2 * len(inputs) + 2:
+        return ()
+    low, high = min(band.low_hz for band in bands), max(band.high_hz for band in bands)
+    inside = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
+    found = []
+    for k, channel in enumerate(channels):
+        if channel.role == "response" and _moves(channel):
+            multiple = _multiple(spectra, inputs, k)
+            power = spectra.power(k)[inside]
+            worst_hz, worst = _worst_octave(spectra.frequency_hz[inside], multiple[inside], power)
+            share = float(np.sum(multiple[inside] * power) / np.sum(power))
+            found.append(ResponseCoherence(channel.name, multiple, share, worst_hz, worst))
+    return tuple(found)
+
+
+def _multiple(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
+    """(lines,), without what as many windows give to commands by chance."""
+    power_in = spectra.matrix[:, inputs][:, :, inputs]
+    # A hint of independent noise in every command keeps collinear ones from being divided by nothing.
+    floor = 1e-9 * np.trace(power_in, axis1=1, axis2=2).real.clip(min=np.finfo(np.float64).tiny)
+    regular = power_in + floor[:, None, None] * np.eye(len(inputs))
+    across = spectra.matrix[:, inputs, response]
+    explained = np.einsum("li,li->l", across.conj(), np.linalg.solve(regular, across[..., None])[..., 0]).real
+    power = spectra.power(response)
+    raw = np.clip(explained / np.where(power > 0, power, np.inf), 0.0, 1.0)
+    by_chance = len(inputs) / spectra.windows
+    return np.asarray(np.clip((raw - by_chance) / (1 - by_chance), 0.0, 1.0))
+
+
+def _worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: FloatArray) -> tuple[float, float]:
+    octaves = np.floor(np.log2(frequency_hz))
+    shares = {}
+    for octave in np.unique(octaves):
+        here = power[octaves == octave]
+        if here.sum() >= _HEARD * power.sum():
+            shares[float(octave)] = float(np.sum(coherence[octaves == octave] * here) / here.sum())
+    worst = min(shares, key=lambda octave: shares[octave])
+    return float(2.0 ** (worst + 0.5)), shares[worst]
+
+
+def driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:
+    """Commands that never move, and segments that name an excitation that is not there."""
+    driven = {band.command for band in bands}
+    idle = [name for name in recording.command.channels if name not in driven]
+    found = [
+        Check(
+            DRIVEN,
+            "notice",
+            f"command '{name}' is not driven.",
+            "What it would move cannot be told; leave it out, or record it driven.",
+        )
+        for name in idle
+    ]
+    found += [Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in silent_segments(recording)]
+    said = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
+    return (*found, *((Check(DRIVEN, "fine", f"Command {said}."),) if said else ()))
+
+
+def silent_segments(recording: Recording) -> tuple[str, ...]:
+    """Segments that state an amplitude, but in which no command moves."""
+    found = []
+    for number, segment in enumerate(recording.segments, start=1):
+        piece = recording.command.samples[segment.start : segment.stop]
+        known = piece[np.isfinite(piece)]
+        still = known.size > 0 and not known.any()
+        if segment.kind not in ("rest", "free", "impact") and segment.amplitude > 0 and still:
+            found.append(
+                f"Segment {number} is a {segment.kind} of amplitude {segment.amplitude:g}, but no command moves in it."
+            )
+    return tuple(found)
+
+
+def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
+    """Of single steps, slow courses and controllers, windows say little: no more than a notice."""
+    kinds = {segment.kind for segment in recording.segments}
+    broad = bool(kinds) and kinds <= _BROAD and recording.excitation is None
+    return tuple(_coherence_check(one, broad) for one in coherences)
+
+
+def _coherence_check(one: ResponseCoherence, broad: bool) -> Check:
+    seen = (
+        f"Of the power of response '{one.response}' in the driven band, {one.share:.1%} is linear in the commands, "
+        f"least around {one.lowest_hz:.3g} Hz ({one.lowest:.0%})."
+    )
+    if one.share < POOR and broad:
+        return Check(
+            COHERENCE, "wrong", seen, "Look for a wrong channel, a large time shift, or an input that was not recorded."
+        )
+    if one.share < LOW:
+        return Check(
+            COHERENCE,
+            "notice",
+            seen,
+            "Expect noise, a nonlinearity, motion slower than a window, or an input that was not recorded.",
+        )
+    return Check(COHERENCE, "fine", seen)

@@ -1,0 +1,150 @@
+"""Positions, speeds and accelerations of one motion against each other, and channels that show the same thing twice."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from analysis.look.agreement import Agreement, agreement
+from analysis.look.channels import Channel, Stretch
+from analysis.look.check import Check
+from analysis.look.cross_spectra import CrossSpectra, cross_spectra
+from analysis.wording import typeset
+from equalizer.signals.signal import FloatArray
+
+KINEMATICS, LAGS = "derivatives", "lag between channels"
+_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^2": 2}
+_WORDS = {1: "the derivative", 2: "the second derivative"}
+LEAST_SHARE = 0.3
+"""Of a channel's power, in coherent lines: less, and it shows another motion."""
+SAME_SHARE, SAME_SPREAD = 0.8, 0.2
+"""What two channels of one unit must share, and how even their ratio must be, to be two views of one thing."""
+CLOSE, FAR = 0.05, 0.2
+"""Error of a factor that is noticed, and that is wrong."""
+LATE = 0.6
+"""Samples: a force that is held moves an acceleration by half of one, and so does a difference to the sample before."""
+_CAUSES = (
+    (1000.0, "mm taken for m, or ms for s"), (180 / np.pi, "degrees taken for radians"), (9.80665, "g for m/s^2"),
+    (2 * np.pi, "turns taken for radians, or Hz for rad/s"), (60.0, "per minute taken for per second"),
+    (30 / np.pi, "rpm taken for rad/s"), (25.4, "inches for millimetres"), (1 / 0.0254, "inches for metres"),
+    (1 / 0.3048, "feet for metres"), (2.0, "a range or a count that is twice"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class KinematicPair:
+    place: str
+    """Label of the channel that is differentiated."""
+    derivative: str
+    """Label of the channel that it is compared with."""
+    order: int
+    agreement: Agreement
+
+
+def kinematic_pairs(
+    channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
+) -> tuple[KinematicPair, ...]:
+    """For each speed and acceleration, the channel whose derivative shows it best; none where no derivative does."""
+    moving = [
+        channel for channel in channels if channel.unit in _ORDER and channel.known.size and np.ptp(channel.known) > 0
+    ]
+    return tuple(pair for later in moving if (pair := _best_pair(later, moving, stretches, rate_hz)))
+
+
+def _best_pair(
+    later: Channel, moving: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
+) -> KinematicPair | None:
+    found = []
+    for earlier in moving:
+        order = _ORDER[later.unit] - _ORDER[earlier.unit]
+        if order > 0 and later.unit.startswith(earlier.unit.split("/")[0]) and later.role != "excitation":
+            agreed = _compared(earlier, later, order, (stretches, rate_hz))
+            if agreed is not None and agreed.share >= LEAST_SHARE:
+                found.append(KinematicPair(earlier.label, later.label, order, agreed))
+    return max(found, key=lambda pair: pair.agreement.share, default=None)
+
+
+def _compared(
+    earlier: Channel, later: Channel, order: int, timing: tuple[Sequence[Stretch], float]
+) -> Agreement | None:
+    stretches, rate_hz = timing
+    differentiated = replace(earlier, samples=derivative(earlier.samples, order, rate_hz))
+    inner = [(start + 1, stop - 1) for start, stop in stretches if stop - start > 4]
+    spectra = cross_spectra((differentiated, later), inner, rate_hz) if inner else None
+    return agreement(spectra, 0, 1, _shrunk(spectra, order, rate_hz)) if spectra else None
+
+
+def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
+    """By central differences, without shift in time; NaN at both ends. order: 1 or 2."""
+    found = np.full(len(samples), np.nan)
+    if order == 1:
+        found[1:-1] = (samples[2:] - samples[:-2]) * (rate_hz / 2)
+    else:
+        found[1:-1] = (samples[2:] - 2 * samples[1:-1] + samples[:-2]) * rate_hz**2
+    return found
+
+
+def _shrunk(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
+    """(lines,): what central differences leave of a derivative."""
+    angle = 2 * np.pi * spectra.frequency_hz / rate_hz
+    shrunk = np.sin(angle) / angle if order == 1 else (np.sin(angle / 2) / (angle / 2)) ** 2
+    return np.maximum(shrunk, 1e-6)
+
+
+def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Check, ...]:
+    return tuple(_pair_check(pair, rate_hz) for pair in pairs)
+
+
+def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
+    agreed = pair.agreement
+    late = _lag_words(agreed.lag_samples, rate_hz)
+    seen = (
+        f"{pair.derivative} is {typeset(f'{agreed.factor:.4g}')} times {_WORDS[pair.order]} of {pair.place}{late} "
+        f"(lines with {agreed.share:.0%} of its power)."
+    )
+    off = abs(abs(agreed.factor) - 1)
+    if agreed.factor < 0:
+        return Check(KINEMATICS, "wrong", seen, f"Turn the sign of one of them{_cause(agreed.factor)}.")
+    if off > FAR:
+        return Check(KINEMATICS, "wrong", seen, f"Check the units and factors of both{_cause(agreed.factor)}.")
+    if off > CLOSE:
+        return Check(KINEMATICS, "notice", seen, "Check the calibration of both, and filters between them.")
+    if abs(agreed.lag_samples) > LATE:
+        return Check(KINEMATICS, "notice", seen, "A filter or a transfer delays one of them; shift it, or model it.")
+    return Check(KINEMATICS, "fine", seen)
+
+
+def _lag_words(lag: float, rate_hz: float) -> str:
+    if abs(lag) <= LATE:
+        return ""
+    return f", {abs(lag) / rate_hz * 1e3:.3g} ms ({abs(lag):.2g} samples) {'later' if lag > 0 else 'earlier'}"
+
+
+def _cause(factor: float) -> str:
+    """What is known to make such a factor."""
+    size = abs(factor)
+    for known, words in _CAUSES:
+        if min(abs(size / known - 1), abs(size * known - 1)) < CLOSE:
+            return f"; {known:.4g} is {words}, or the other way round"
+    return ""
+
+
+def lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
+    """Of channels of one unit that show the same thing: a command and its measurement, two sensors of one motion."""
+    found = tuple(_lag_pairs(channels, spectra, rate_hz))
+    return found or (Check(LAGS, "fine", "No two channels show the same thing, so no lag between them can be told."),)
+
+
+def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> Iterator[Check]:
+    for one, other in combinations(range(len(channels)), 2):
+        first, second = channels[one], channels[other]
+        if first.unit != second.unit or {first.role, second.role} == {"command", "excitation"}:
+            continue
+        agreed = agreement(spectra, one, other)
+        if agreed is None or agreed.share < SAME_SHARE or agreed.spread > SAME_SPREAD:
+            continue
+        late = _lag_words(agreed.lag_samples, rate_hz)
+        seen = f"{second.label} is {typeset(f'{agreed.factor:.4g}')} times {first.label}{late or ', at the same time'}."
+        do = "Shift the later one, or model what delays it." if late else ""
+        yield Check(LAGS, "notice" if late else "fine", seen, do)

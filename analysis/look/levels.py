@@ -1,0 +1,96 @@
+"""How strongly each segment was driven and answered, and whether the answer grows in proportion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.look.channels import Channel, rms
+from analysis.look.check import Check
+from analysis.wording import typeset
+from equalizer.signals.recording import Recording, Segment
+
+LEVELS = "levels"
+_APART = 1.5
+"""Strongest over weakest command from which levels can be compared."""
+EVEN, UNEVEN = 0.05, 0.3
+"""Relative change of response over command that is noticed in words, and said to be large."""
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentLevel:
+    number: int
+    """From 1; 0 for a recording without segments."""
+    kind: str
+    role: str
+    start_s: float
+    duration_s: float
+    period: int
+    rms: tuple[float, ...]
+    """About the mean, per channel."""
+
+
+def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
+    whole = (Segment(0, len(recording), "unmarked"),)
+    rate_hz = recording.sample_rate_hz
+    return tuple(
+        SegmentLevel(
+            number if recording.segments else 0,
+            segment.kind,
+            segment.role,
+            segment.start / rate_hz,
+            (segment.stop - segment.start) / rate_hz,
+            segment.period,
+            tuple(rms(_known(channel, segment)) for channel in channels),
+        )
+        for number, segment in enumerate(recording.segments or whole, start=1)
+    )
+
+
+def _known(channel: Channel, segment: Segment) -> np.ndarray:
+    piece = channel.samples[segment.start : segment.stop]
+    return np.asarray(piece[np.isfinite(piece)])
+
+
+def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Per response, over segments of the most usual kind in which the same commands move."""
+    commands = [k for k, channel in enumerate(channels) if channel.role == "command"]
+    kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
+    if not kinds or len({channels[k].unit for k in commands}) > 1:
+        return ()
+    usual = max(set(kinds), key=kinds.count)
+    rows = [(_strength(level, commands), level) for level in levels if level.kind == usual]
+    groups = {_mask(level, commands) for _, level in rows}
+    found = []
+    for group in groups:
+        alike = [(size, level) for size, level in rows if _mask(level, commands) == group and size > 0]
+        if len(alike) > 1 and max(s for s, _ in alike) > _APART * min(s for s, _ in alike):
+            found += [_proportion(alike, k, c) for k, c in enumerate(channels) if c.role == "response"]
+    return tuple(check for check in found if check is not None)
+
+
+def _strength(level: SegmentLevel, commands: Sequence[int]) -> float:
+    return float(np.hypot.reduce([level.rms[k] for k in commands]))
+
+
+def _mask(level: SegmentLevel, commands: Sequence[int]) -> tuple[bool, ...]:
+    strongest = max(level.rms[k] for k in commands)
+    return tuple(level.rms[k] > 0.1 * strongest for k in commands)
+
+
+def _proportion(alike: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel) -> Check | None:
+    ordered = sorted(alike, key=lambda row: row[0])
+    weakest, strongest = ordered[0], ordered[-1]
+    if weakest[1].rms[response] == 0 or strongest[1].rms[response] == 0:
+        return None
+    gains = [level.rms[response] / size for size, level in (weakest, strongest)]
+    change = gains[1] / gains[0] - 1
+    seen = (
+        f"From the weakest to the strongest {weakest[1].kind} ({strongest[0] / weakest[0]:.3g} times) the rms of "
+        f"{channel.label} over that of the command changes by {typeset(f'{100 * change:+.3g}')} %."
+    )
+    if abs(change) < EVEN:
+        return Check(LEVELS, "fine", seen)
+    large = abs(change) > UNEVEN
+    do = "The device is far from linear: friction, stops, hardening or saturation." if large else ""
+    return Check(LEVELS, "notice", seen, do or "The device, or its noise, is not quite in proportion.")

@@ -1,0 +1,82 @@
+"""Whether the numbers can be in their units: sizes that no device has, an accelerometer in g, offsets."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.look.channels import Channel, rms
+from analysis.look.check import Check, fine_if_none
+from equalizer.signals.units import UNSTATED
+
+UNITS, OFFSETS = "units", "static offset"
+_LARGEST = {
+    "N": 1e7, "N m": 1e7, "m": 1e3, "m/s": 1e3, "m/s^2": 1e5, "rad/s": 1e5, "rad/s^2": 1e8, "V": 1e4, "A": 1e4,
+    "K": 2e3, "Pa": 1e10,
+}  # fmt: skip
+"""Peaks beyond which a unit is doubted."""
+_SMALLEST = {
+    "N": 1e-7, "N m": 1e-9, "m": 1e-9, "m/s": 1e-8, "m/s^2": 1e-5, "rad": 1e-8, "rad/s": 1e-7, "V": 1e-8, "A": 1e-8,
+}  # fmt: skip
+"""Rms below which it is."""
+G, IN_G = 9.80665, (0.97, 1.03)
+STRONG = 0.5
+"""Mean over rms from which an offset is said."""
+
+
+def units(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    found = tuple(check for channel in channels if (check := _unit(channel)))
+    return fine_if_none(UNITS, found, "All sizes are possible in their units.")
+
+
+def _unit(channel: Channel) -> Check | None:
+    known = channel.known
+    if not known.size:
+        return None
+    if channel.unit == UNSTATED and channel.role != "condition":
+        return Check(
+            UNITS,
+            "notice",
+            f"{channel.label} has no unit: its scale is not known.",
+            "State the unit in the map; masses, dampings and stiffnesses are found in its terms otherwise.",
+        )
+    peak, moves = float(np.max(np.abs(known))), rms(known)
+    if peak > _LARGEST.get(channel.unit, np.inf):
+        return _doubted(channel, f"{channel.label} reaches {channel.of(peak)}.")
+    if 0 < moves < _SMALLEST.get(channel.unit, 0.0):
+        return _doubted(channel, f"{channel.label} moves by {channel.of(moves)} rms.")
+    mean = abs(float(known.mean()))
+    if channel.unit == "m/s^2" and IN_G[0] < mean < IN_G[1] and moves < mean:
+        seen = f"{channel.label} rests at {channel.of(float(known.mean()))}, where an accelerometer shows {G:.2f}."
+        return Check(UNITS, "wrong", seen, "State the unit g in the map: the numbers look like multiples of gravity.")
+    return None
+
+
+def _doubted(channel: Channel, seen: str) -> Check:
+    return Check(UNITS, "wrong", seen, f"Check the unit of {channel.label} in the map.")
+
+
+def offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Positions begin wherever they do, and conditions stay: both are left out."""
+    found = tuple(
+        check
+        for channel in channels
+        if channel.role in ("command", "response") and channel.unit not in ("m", "rad", "m/s", "rad/s")
+        if (check := _offset(channel))
+    )
+    return fine_if_none(OFFSETS, found, "No command and no force, acceleration or voltage stands beside zero.")
+
+
+def _offset(channel: Channel) -> Check | None:
+    known = channel.known
+    moves = rms(known)
+    if not known.size or moves == 0 or abs(float(known.mean())) < STRONG * moves:
+        return None
+    mean = float(known.mean())
+    seen = f"{channel.label} stands {channel.of(mean)} beside zero ({abs(mean) / moves:.3g} times its rms)."
+    if channel.unit == "m/s^2" and abs(abs(mean) / G - 1) < 0.03:
+        return Check(OFFSETS, "fine", f"{seen} That is gravity.")
+    if channel.role == "command":
+        return Check(OFFSETS, "notice", seen, "Linear models know no offset: say the working point, or take it off.")
+    return Check(
+        OFFSETS, "notice", seen, "Take it off where it is the sensor's; keep it where it is gravity or a load."
+    )

@@ -1,0 +1,164 @@
+"""What repeats: the declared periods checked, a period found where none is declared, and the noise between repeats."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.periods import look_samples, settled_periods
+from analysis.look.channels import Stretch, rms
+from analysis.look.check import Check
+from analysis.wording import listed, typeset
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+
+REPEATS = "repeats"
+SHORTEST = 16
+"""Samples of a period."""
+ALIKE, DIPPED = 0.98, 0.7
+"""Correlation of a command with itself a period later, and to which it must have fallen in between."""
+SAME, UNLIKE = 0.02, 0.2
+"""Rms by which the command of declared periods may differ, as a share of it."""
+LOUD = 0.3
+MOST_SAMPLES = 2**19
+
+
+@dataclass(frozen=True, slots=True)
+class RepeatNoise:
+    """Between periods of one segment."""
+
+    segment: int
+    """From 1; 0 where the period was found and not declared."""
+    period: int
+    looks: int
+    settled: bool
+    share: tuple[float, ...]
+    """Rms between repeats over rms of the mean period, per response channel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    found: int
+    """Samples of a period that was not declared; 0 = none."""
+    found_in: Stretch
+    noise: tuple[RepeatNoise, ...]
+
+
+def repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
+    if any(segment.period for segment in recording.segments):
+        return Repeats(0, (0, 0), _noise(recording, declared=True))
+    marked = [(segment.start, segment.stop) for segment in recording.segments]
+    for places in (marked, list(stretches)):  # a segment that was split for a test may hold less than two periods
+        start, stop = max(places, key=lambda place: place[1] - place[0], default=(0, 0))
+        if period := found_period(_decided(recording).samples[start:stop]):
+            as_said = replace(recording, segments=(Segment(start, stop, "multisine", 0.0, period),))
+            return Repeats(period, (start, stop), _noise(as_said, declared=False))
+    return Repeats(0, (0, 0), ())
+
+
+def _decided(recording: Recording) -> Signal:
+    excitation = recording.excitation
+    if excitation is None:
+        return recording.command
+    known = excitation.samples[np.isfinite(excitation.samples).all(axis=1)]
+    return excitation if len(known) and np.ptp(known, axis=0).max() > 0 else recording.command
+
+
+def found_period(command: FloatArray) -> int:
+    """The shortest after which the command repeats at least once more; 0 where there is none. command: (n, m)"""
+    used = command[:MOST_SAMPLES]
+    sizes = np.array([rms(column) for column in used.T])
+    if not np.isfinite(used).all() or not (sizes > 0).any() or len(used) < 2 * SHORTEST:
+        return 0
+    scaled = (used[:, sizes > 0] - used[:, sizes > 0].mean(axis=0)) / sizes[sizes > 0]
+    correlation = _correlation(scaled)[: len(used) // 2 + 1]
+    dips = np.flatnonzero(correlation < DIPPED)
+    if not len(dips):
+        return 0
+    after = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
+    if not len(after) or after[0] < SHORTEST:
+        return 0
+    # The top of the first hill that is high enough.
+    last = after[0] + int(np.argmax(np.diff(np.append(after, after[-1] + 2)) > 1))
+    return int(after[0] + np.argmax(correlation[after[0] : last + 1]))
+
+
+def _correlation(samples: FloatArray) -> FloatArray:
+    """(n,): with itself, a number of samples later, by the energy of both where they overlap."""
+    n = len(samples)
+    size = 2 ** int(np.ceil(np.log2(2 * n)))
+    spectrum = np.fft.rfft(samples, size, axis=0)
+    raw = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:n]
+    energy = np.concatenate([[0.0], np.cumsum(np.sum(samples**2, axis=1))])
+    lags = np.arange(n)
+    both = energy[n - lags] * (energy[n] - energy[lags])
+    return np.asarray(raw / np.sqrt(np.maximum(both, np.finfo(np.float64).tiny)))
+
+
+def _noise(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
+    found = []
+    for periods in settled_periods(recording):
+        if periods.looks < 2:
+            continue
+        looks = look_samples(recording.response.samples, periods)
+        mean = looks.mean(axis=0)
+        between = np.sqrt(np.sum((looks - mean) ** 2, axis=(0, 1)) / ((periods.looks - 1) * periods.length))
+        sizes = np.array([rms(column) for column in mean.T])
+        share = tuple((between / np.where(sizes > 0, sizes, np.inf)).tolist())
+        number = periods.index + 1 if declared else 0
+        found.append(RepeatNoise(number, periods.length, periods.looks, periods.settled, share))
+    return tuple(found)
+
+
+def repeat_checks(recording: Recording, seen: Repeats) -> tuple[Check, ...]:
+    wrong = [check for check in _declared(recording) if check is not None]
+    if seen.found:
+        times = (seen.found_in[1] - seen.found_in[0]) / seen.found
+        wrong.append(
+            Check(
+                REPEATS,
+                "notice",
+                f"The command repeats every {seen.found} samples ({seen.found / recording.sample_rate_hz:.4g} s), "
+                f"{times:.3g} times, but no segment says so.",
+                f"State period = {seen.found} in its segment: repeats tell noise from distortion.",
+            )
+        )
+    if not seen.noise:
+        none = "Nothing repeats, so noise cannot be told from what a model lacks."
+        wrong += [] if wrong else [Check(REPEATS, "notice", none, "Record some periods more than once.")]
+        return tuple(wrong)
+    return (*wrong, *_noise_checks(recording, seen.noise))
+
+
+def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:
+    channels = recording.response.channels
+    shares = np.array([one.share for one in noise])
+    said = listed([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
+    loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
+    text = f"Between repeats (up to {max(one.looks for one in noise)}) remain at least {said}, rms."
+    do = f"{listed(loud)} hardly repeat: average more periods, or drive more." if loud else ""
+    return (Check(REPEATS, "notice" if loud else "fine", text, do),)
+
+
+def _declared(recording: Recording) -> list[Check | None]:
+    """Segments whose command is another one declared period later."""
+    return [
+        _kept(_decided(recording).samples[segment.start : segment.stop], segment, number)
+        for number, segment in enumerate(recording.segments, start=1)
+        if segment.period and segment.stop - segment.start >= 2 * segment.period
+    ]
+
+
+def _kept(command: FloatArray, segment: Segment, number: int) -> Check | None:
+    size = rms(command[np.isfinite(command).all(axis=1)])
+    later = command[segment.period :] - command[: -segment.period]
+    off = float(np.sqrt(np.nanmean(later**2) / 2)) / size if size > 0 else 0.0
+    if off <= SAME:
+        return None
+    return Check(
+        REPEATS,
+        "wrong" if off > UNLIKE else "notice",
+        f"Segment {number} states a period of {segment.period} samples, but its command differs by {off:.1%} from one "
+        "period to the next.",
+        "Correct the period, or set it to 0.",
+    )

@@ -1,0 +1,97 @@
+"""`hapteq look`: what is in recordings, and what is wrong with them, before any model."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+if TYPE_CHECKING:
+    from analysis.look.overview import Overview
+
+
+def look(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings, REC.h5 ...", metavar="REC.h5 ...")],
+    out: Annotated[Path | None, typer.Option(help="Folder for a page with figures.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Also the checks that found nothing.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Signals, spectra, coherence, levels and repeats; and checks of units, clock, derivatives, lags, clipping and
+    steps. Exit code 0 also where something is wrong: that is a result."""
+    from study.cli.progress import late_bar
+    from study.workflows.look_at_recordings import look_at, look_document, write_look
+
+    with late_bar("Looking (%)", total=100) as show:
+        found = look_at(recordings, lambda share: show(round(100 * share)))
+    if as_json:
+        typer.echo(json.dumps(look_document(found), indent=2))
+    else:
+        for one in found:
+            say(look_lines(one, everything))
+    if out is not None:
+        typer.echo(f"Report: {write_look(found, out)}", err=True)
+
+
+def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
+    from analysis.reports.look_report import brief
+
+    yield brief(found)
+    yield from recording_lines(found)
+    yield ""
+    for check in found.checks:
+        if everything or check.level != "fine":
+            yield f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip()
+    fine = sum(check.level == "fine" for check in found.checks)
+    if not everything and fine:
+        yield f"fine    {fine} further checks (--all shows them)"
+    yield ""
+
+
+def recording_lines(found: "Overview") -> Iterable[str]:
+    """Courses, spectra, and tables of channels and segments."""
+    from study.tui.recording_drawing import course_lines, spectrum_lines
+
+    yield ""
+    for channel in found.channels:
+        yield from course_lines(channel)
+    if found.spectra is not None:
+        yield ""
+        yield from spectrum_lines(found)
+    yield from ("", *_tables(found))
+
+
+def _tables(found: "Overview") -> Iterable[str]:
+    from analysis.wording import typeset
+    from study.tui.text_rows import aligned
+
+    rows: list[tuple[str, ...]] = [("channel", "quantity", "unit", "lowest", "highest", "mean", "rms", "missing")]
+    for one in found.summaries:
+        sizes = [typeset(f"{value:.4g}") for value in (one.lowest, one.highest, one.mean, one.rms)]
+        rows.append((f"{one.role} {one.name}", one.quantity, one.unit, *sizes, str(one.missing)))
+    yield from aligned(tuple(rows))
+    segments = found.recording.segments
+    if segments:
+        yield ""
+        heads = [f"rms {channel.role} {channel.name}" for channel in found.channels]
+        table: list[tuple[str, ...]] = [("segment", "role", "start s", "length s", "period", *heads)]
+        for level in found.levels[:MOST_SEGMENTS]:
+            sizes = [f"{value:.4g}" for value in level.rms]
+            times = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
+            table.append((f"{level.number} {level.kind}", level.role, *times, *sizes))
+        yield from aligned(tuple(table))
+        if len(segments) > MOST_SEGMENTS:
+            yield f"and {len(segments) - MOST_SEGMENTS} segments more"
+
+
+MOST_SEGMENTS = 20
+
+
+def say(lines: Iterable[str]) -> None:
+    """Names in a file must not move the cursor."""
+    from study.session.printable import printable_text
+
+    for line in lines:
+        typer.echo(printable_text(line))

@@ -1,0 +1,87 @@
+"""Recordings looked at before any model, and the page about them."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.look.overview import Overview, overview
+from analysis.reports.look_report import pictures_of, render_look_report
+from study.local_clock import local_now
+from study.store.recording_file import read_recording
+from study.store.text_file import write_text
+from study.workflows.picture_files import write_pictures
+
+PAGE_NAME = "report.html"
+
+Progress = Callable[[float], None]
+
+
+def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
+    """Raises StudyError for a file that is no recording."""
+    found = []
+    for count, path in enumerate(paths, start=1):
+        found.append(overview(path.stem, read_recording(path)))
+        on_progress(count / len(paths))
+    return tuple(found)
+
+
+def write_look(found: Sequence[Overview], folder: Path) -> Path:
+    """report.html and figures/ in `folder`; returns the page. Raises CannotWriteError."""
+    pictures = pictures_of(found)
+    write_pictures(folder / "figures", [picture for drawn in pictures for picture in drawn])
+    provenance = {"recordings": ", ".join(one.name for one in found)}
+    write_text(folder / PAGE_NAME, render_look_report(found, pictures, provenance, local_now()), overwrite=True)
+    return folder / PAGE_NAME
+
+
+def recording_facts(found: Overview) -> tuple[str, ...]:
+    """What a recording says of itself, a line each."""
+    recording, meta = found.recording, found.recording.meta
+    parts = len(found.stretches)
+    facts = [
+        f"{found.name}: {recording.device}, {recording.response.duration_s:.4g} s at "
+        f"{recording.sample_rate_hz:.6g} Hz, {len(recording)} samples{f' in {parts} parts' if parts > 1 else ''}",
+        f"hold: {recording.hold.value}",
+    ]
+    left_out = ("provenance", "parts", "import")
+    facts += [f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in meta.items() if key not in left_out]
+    said = meta.get("import")
+    notes = said.get("notes", ()) if isinstance(said, dict) else ()
+    return (*facts, *(f"import: {note}" for note in notes))
+
+
+def look_document(found: Sequence[Overview]) -> list[dict[str, Any]]:
+    """For programs: one entry per recording, numbers in SI."""
+    return [_entry(one) for one in found]
+
+
+def _entry(one: Overview) -> dict[str, Any]:
+    recording = one.recording
+    return {
+        "recording": one.name,
+        "device": recording.device,
+        "sample_rate_hz": recording.sample_rate_hz,
+        "samples": len(recording),
+        "hold": recording.hold.value,
+        "time": "unknown" if recording.meta.get("time") == "unknown" else "known",
+        "channels": [_finite(asdict(summary)) for summary in one.summaries],
+        "segments": [asdict(level) for level in one.levels],
+        "driven": [asdict(band) for band in one.bands],
+        "coherence": [
+            {"response": c.response, "share": c.share, "lowest_hz": c.lowest_hz, "lowest": c.lowest}
+            for c in one.coherences
+        ],
+        "derivatives": [asdict(pair) for pair in one.pairs],
+        "found_period": one.repeats.found,
+        "repeats": [asdict(noise) for noise in one.repeats.noise],
+        "checks": [asdict(check) for check in one.checks],
+    }
+
+
+def _finite(entry: dict[str, Any]) -> dict[str, Any]:
+    """JSON knows no NaN: what is not known is null."""
+    return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in entry.items()}
