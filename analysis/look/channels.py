@@ -40,7 +40,7 @@ class Channel:
 
 def channels_of(recording: Recording) -> tuple[Channel, ...]:
     return tuple(
-        Channel(role, name, quantity, unit, samples)
+        Channel(role, name, quantity, unit, np.ascontiguousarray(samples))
         for role, signal in signals_of(recording).items()
         for name, quantity, unit, samples in zip(
             signal.channels, signal.quantities, signal.units, signal.samples.T, strict=True
