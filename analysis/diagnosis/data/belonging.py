@@ -1,5 +1,5 @@
-"""Whether recordings belong together, whether a model is of the same device, and whether there is anything to compare:
-what is found here has no answer at all, not even 'unexplained'."""
+"""Checks before a diagnosis: recordings of one device, a model of that device, enough data. What fails here is refused
+and gets no verdict, not even `unexplained`."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -153,7 +153,7 @@ def _never(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def _cycles(recording: Recording) -> float:
-    """How often the middle frequency of the command's power goes round; constant parts excite nothing."""
+    """Cycles of the median frequency of the command's power; constant parts excite nothing."""
     power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
     power[0] = 0.0
     return float(np.searchsorted(np.cumsum(power), power.sum() / 2)) if power.any() else 0.0

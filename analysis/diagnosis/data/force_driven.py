@@ -1,4 +1,4 @@
-"""Recordings in which a motion was imposed and a force measured, turned round: what a force does to a motion."""
+"""Recordings of an imposed motion and a measured force, with command and response exchanged."""
 
 from collections.abc import Sequence
 from dataclasses import replace

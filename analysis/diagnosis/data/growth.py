@@ -1,4 +1,4 @@
-"""How fast a model moves away from rest by itself."""
+"""Growth rate of a model's free motion: whether it is unstable."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Power on lines against noise: how much there is beyond the noise, and the chance of as much from noise alone."""
+"""Tests of line power against noise: the power beyond the noise, and its p-value."""
 
 import numpy as np
 import numpy.typing as npt

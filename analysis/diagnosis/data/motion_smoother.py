@@ -1,7 +1,7 @@
-"""How a model's bodies moved, from what was measured: states, and the force along each axis that the model lacks.
+"""States of a model, and the force along each axis that it lacks, estimated from measurements by a Kalman smoother.
 
-A Kalman smoother; the missing force is taken for a random walk (a latent force, Alvarez and others 2009; Rogers and
-Friis 2021). Unlike deconvolution it bears plants that drift.
+The missing force is modelled as a random walk (a latent force, Alvarez and others 2009; Rogers and
+Friis 2021). Unlike deconvolution this works for plants that drift.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a recording's response and position hold that does not repeat: their noise, by the best means that it offers."""
+"""The noise of a recording's response and position, estimated by the best of three methods that it allows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

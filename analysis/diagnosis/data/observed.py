@@ -1,5 +1,4 @@
-"""What was observed, ready to be compared with a prediction: signals in units of their noise, and which samples count
-for what."""
+"""A recording ready for comparison: its signals, and which samples serve to fit, to choose and to test by."""
 
 from dataclasses import dataclass, replace
 

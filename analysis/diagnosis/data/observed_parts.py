@@ -1,4 +1,4 @@
-"""Recordings as they are compared: cut where one part of them ends and the next, made after a pause, begins."""
+"""Recordings cut into their parts, at pauses between them; each part is compared by itself."""
 
 from collections.abc import Sequence
 from dataclasses import replace

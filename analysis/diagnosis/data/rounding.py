@@ -1,4 +1,4 @@
-"""What rounding to steps does to noise: seldom all of it shows between repeats, for the same movement is rounded alike.
+"""Quantisation noise: differences between repeats show only a part of it, because equal motions are rounded alike.
 
 With a movement over many steps, the rounding error has variance step² / 12 and does not depend on the noise before it.
 Its part that repeats has the Fourier series of a saw tooth, blurred by the noise (Widrow and Kollar 2008).

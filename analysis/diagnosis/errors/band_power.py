@@ -1,4 +1,4 @@
-"""What can be predicted of impacts: not when they come, but how strong each channel is in each band of each segment.
+"""Error measure for impacts: the power of each channel in each band and segment, because waveforms are unpredictable.
 
 The logarithm of the amplitude in half octaves (Welch's spectra over 1 s), the noise counted in. Two motions of a device
 that rattles, apart at first by less than any sensor sees, agree in it to a few per cent.
@@ -54,7 +54,7 @@ class BandPower:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """(stretches, bands, c): logarithm of the amplitude; NaN where noise drowns it."""
+        """(stretches, bands, c): logarithm of the amplitude; NaN where it is below the noise."""
         power = self._power([record.measured for record in self.measure.records])
         with np.errstate(divide="ignore"):
             return np.where(power > HEARD * self._noise, 0.5 * np.log(power), np.nan)

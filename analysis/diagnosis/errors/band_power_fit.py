@@ -1,4 +1,4 @@
-"""Numbers of a hypothesis, and of the model, by the band powers of the response: Gauss and Newton's steps.
+"""Least squares on band powers by Gauss and Newton's steps, for the numbers of a hypothesis and of the model.
 
 Chance is in each prediction, so numbers are moved far to see what they do, and each band of a segment weighs by how
 much chance there is in it.

@@ -1,4 +1,4 @@
-"""How far a model with effects is from what was observed, sample by sample, in units of the noise.
+"""Port of the error measures: residuals of a model with effects, sample by sample, in units of the noise.
 
 Three ways of looking, one per file: `free_simulation`, `windows`, `predicted_force`; which one suits is said by
 `choose_measure`.

@@ -1,4 +1,4 @@
-"""Recordings seen as forces along a measured motion: within which band, with which noise."""
+"""Recordings as forces along the measured motion: choice of the band, and the noise in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""A claim about what is missing: effects of the catalogue, each at an axis or channel, with numbers to be found."""
+"""Hypotheses about what is missing: effects of the catalogue, each at an axis or channel, with free numbers."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

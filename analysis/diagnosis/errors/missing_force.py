@@ -1,4 +1,4 @@
-"""The force along each driven axis that would explain what a model does not, and the motion that goes with it.
+"""The force along each driven axis that would explain a model's residual, and the motion that it causes.
 
 Deconvolution through the model, line by line, with the noise as the measure of what may be left (a latent force in the
 sense of Rogers and Friis 2021, by Wiener's filter).

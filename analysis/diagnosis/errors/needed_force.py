@@ -1,4 +1,4 @@
-"""The force that a model would need along a measured motion: the inverse problem, line by line."""
+"""Inverse dynamics: the force that a model needs for a measured motion, line by line."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Least squares on the error measure: a model's open numbers, held by their calibration, and a hypothesis's numbers.
+"""Regularised least squares: the model's own numbers, with their calibration as prior, and a hypothesis's numbers.
 
 Gauss and Newton's steps inside bounds. What the model's own numbers do is computed once and kept; what a hypothesis's
 numbers do, at each step.
@@ -19,14 +19,14 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.signal import FloatArray
 
 MOVED = 0.1
-"""Standard deviations that a number is moved by to see what it does."""
+"""Step of the finite differences, in standard deviations."""
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 """Of a hypothesis's number, by its scale: a factor of e, so many times its start, none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """What the model's numbers do to the residuals of the fitting samples."""
+    """Sensitivity of the prediction to the model's own numbers, on the samples to fit."""
 
     at: FloatArray
     """(t,): deviations where it was taken,"""
@@ -141,7 +141,7 @@ def _longest_s(measure: ErrorMeasure) -> float:
 
 
 def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
-    """(numbers, samples): what the hypothesis's numbers do to the prediction."""
+    """(numbers, samples): sensitivity of the prediction to the hypothesis's numbers."""
     model: MechanicalModel = tuning.tuned(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
     columns = np.empty((len(moves), len(errors)))

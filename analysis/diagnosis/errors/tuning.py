@@ -1,4 +1,4 @@
-"""The numbers of a mechanical model that calibration left a little open, and the model that other values of them give.
+"""The free numbers of a mechanical model within its calibration's tolerances, and the model that they give.
 
 Open are the grounded mass, damping and stiffness at the driven axes and, for every mode of what hangs on them, its
 frequency, mass and damping. In the coordinates of Craig and Bampton (1968): the driven axes, and what moves while they

@@ -1,4 +1,4 @@
-"""What a simulation leaves unexplained, as a force along each axis and the motion that goes with it."""
+"""The residual of a simulation as a missing force along each axis, with its motion."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Short simulations, each from a state that was estimated from the measured motion: plants that drift cannot drift far.
+"""Multiple short simulations, each from a smoothed state, so that plants without a restoring force cannot drift far.
 
 What is left of an error in the state is fitted to each window, and does not count.
 """

@@ -1,5 +1,5 @@
-"""Chance of a statistic when blocks of a series are shuffled against another: blocks are longer than the series
-remembers, so that neighbouring samples do not count as independent."""
+"""Block permutation test: blocks are longer than the correlation time, so that neighbouring samples do not count as
+independent."""
 
 from collections.abc import Callable
 from itertools import pairwise

@@ -1,5 +1,4 @@
-"""The mismatch that a good model leaves on recordings in which nothing is missing: learned, so that it is not taken for
-physics."""
+"""The mismatch that a model leaves on clean recordings, by cell and by channel: it is not evidence for an effect."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

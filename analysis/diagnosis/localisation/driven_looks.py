@@ -1,4 +1,4 @@
-"""Each periodic segment as mean lines and their errors, what the command itself brings to silent lines taken out."""
+"""Mean spectrum and standard error of each periodic segment, the command's own part on silent lines removed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -33,7 +33,7 @@ _BLOCK_LINES = 8
 _TINY = np.finfo(np.float64).tiny
 
 
-# Position clean but response off means the response's sensor: no force moves one without the other.
+# A mismatch of the response that the position does not show is the sensor's: a force would move both.
 @dataclass(frozen=True, slots=True)
 class SensorRule:
     verdict: Literal["response sensor", "motion", "undecided"]

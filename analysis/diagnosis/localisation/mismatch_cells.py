@@ -1,4 +1,4 @@
-"""Where a prediction and a recording disagree: channel x driving input x octave x level, with how much and how surely.
+"""Tests of prediction against recording, per cell: channel x driving input x octave x level.
 
 The residual is tested against noise and a margin of equivalence: a model that is two per cent off is not wrong physics.
 """

@@ -1,4 +1,4 @@
-"""What a prediction leaves of a recording, segment by segment, as power on lines: of the mean period where periods
+"""Power spectrum of the residual, segment by segment: of the mean period where periods
 repeat, of overlapping windows elsewhere (Welch)."""
 
 from collections.abc import Sequence

@@ -1,5 +1,5 @@
-"""In which state a mismatch sits: at what position, speed, command, response or time a residual force or residual is
-large, or depends on the state by its sign."""
+"""Dependence of a residual on the state (position, speed, command, response, time): where it is large, or whether its
+sign follows the state's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

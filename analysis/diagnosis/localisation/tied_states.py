@@ -1,4 +1,4 @@
-"""Which states a mismatch is tied to: asked of the force that is missing along each axis, or of a sensor's error."""
+"""Which states a mismatch depends on, for the missing force along each axis or a sensor's error."""
 
 from collections.abc import Sequence
 from dataclasses import replace

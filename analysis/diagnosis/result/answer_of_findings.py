@@ -1,4 +1,4 @@
-"""A diagnosis of one real recording, put into plain values."""
+"""The findings on one real recording as plain values."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""What a finished search says, put into the document and what is drawn beside it."""
+"""Assembles the findings of a finished search: the document, and the data of its figures."""
 
 from collections.abc import Sequence
 from dataclasses import replace

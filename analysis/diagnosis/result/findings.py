@@ -1,4 +1,4 @@
-"""All that a diagnosis found: the document that is handed on, and what its figures and sentences are drawn from."""
+"""All findings of a diagnosis: the document, and the data of its figures and sentences."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The effects that a diagnosis names, as its document says them: numbers with intervals, rivals with reasons."""
+"""The named effects for the document: numbers with intervals, rivals with reasons, probabilities."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -182,8 +182,8 @@ def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[
 
 # How likely each contender is the right one, from how far apart they stand.
 def probabilities(contenders: Sequence[Contender], left: float) -> tuple[float, ...]:
-    """One each, in sum less than 1; the first is the one to prefer. What only refines it counts for it. left: errors
-    of the whole explanation in the worst channel, in units of the noise."""
+    """One each, in sum less than 1; the first contender is the preferred one, and its refinements count for it. left:
+    errors of the whole explanation in the worst channel, in units of the noise."""
     if not contenders:
         return ()
     best = contenders[0]
@@ -194,6 +194,6 @@ def probabilities(contenders: Sequence[Contender], left: float) -> tuple[float, 
 
 
 def elsewhere(left: float) -> float:
-    """The chance that what is named is not what is there, though nothing else in the catalogue does better."""
+    """The probability that no contender is right, though none in the catalogue is better."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

@@ -1,4 +1,4 @@
-"""The recording that would tell rivals apart: where they differ most after the rival was allowed to re-tune.
+"""Optimal experiment to discriminate two rivals: where they differ most after the rival was re-tuned.
 
 Hunter and Reiner (1965), with what has been recorded so far holding the rival's numbers. A difference that the rival
 can tune away, or that its tolerance covers, is none.

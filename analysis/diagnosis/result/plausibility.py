@@ -1,4 +1,4 @@
-"""What of a fit no engineer would believe, a sentence each."""
+"""Implausible results of a fit, such as a negative damping, a sentence each."""
 
 from collections.abc import Iterator, Sequence
 

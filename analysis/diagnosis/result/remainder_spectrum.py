@@ -1,4 +1,4 @@
-"""What predictions leave on held-out data, over frequency, beside the noise."""
+"""Residual spectra on held-out data, beside the noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

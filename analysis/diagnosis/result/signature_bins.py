@@ -1,4 +1,4 @@
-"""Means over bins, with standard errors that know how little independent neighbouring samples are."""
+"""Means over bins, with standard errors that allow for correlated samples."""
 
 import numpy as np
 import numpy.typing as npt

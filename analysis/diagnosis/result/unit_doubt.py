@@ -1,5 +1,5 @@
-"""Channels that the model foresees but for a factor or a sign: a unit or a wire is wrong more often than a device is so
-far off."""
+"""Channels that differ from the prediction by a constant factor or a sign: a wrong unit or wire is likelier than such a
+device."""
 
 from collections.abc import Sequence
 
