@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
+from study.cli.screen import columns
 
 if TYPE_CHECKING:
     from analysis.look.overview import Overview
@@ -37,13 +38,14 @@ def look(
 
 def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
     from analysis.reports.look_report import brief
+    from study.tui.text_rows import hanging
 
     yield brief(found)
     yield from recording_lines(found)
     yield ""
     for check in found.checks:
         if everything or check.level != "fine":
-            yield f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip()
+            yield from hanging(f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip(), 8, columns())
     fine = sum(check.level == "fine" for check in found.checks)
     if not everything and fine:
         yield f"fine    {fine} further checks (--all shows them)"
@@ -71,7 +73,7 @@ def _tables(found: "Overview") -> Iterable[str]:
     for one in found.summaries:
         sizes = [typeset(f"{value:.4g}") for value in (one.lowest, one.highest, one.mean, one.rms)]
         rows.append((f"{one.role} {one.name}", one.quantity, one.unit, *sizes, str(one.missing)))
-    yield from aligned(tuple(rows))
+    yield from aligned(tuple(rows), columns())
     segments = found.recording.segments
     if segments:
         yield ""
@@ -81,7 +83,7 @@ def _tables(found: "Overview") -> Iterable[str]:
             sizes = [f"{value:.4g}" for value in level.rms]
             times = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
             table.append((f"{level.number} {level.kind}", level.role, *times, *sizes))
-        yield from aligned(tuple(table))
+        yield from aligned(tuple(table), columns())
         if len(segments) > MOST_SEGMENTS:
             yield f"and {len(segments) - MOST_SEGMENTS} segments more"
 

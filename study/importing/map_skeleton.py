@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from study.importing.array_groups import groups_in
 from study.importing.arrays import Arrays
-from study.importing.signal_words import named, roles_of, unit_in
+from study.importing.signal_words import named, proposed_roles, unit_in
 
 _LEAST_SAMPLES = 16
 _CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}
@@ -58,10 +58,9 @@ def _lines(whole: Arrays) -> Iterator[str]:
 
 
 def _roles(arrays: Arrays, clocks: list[str]) -> dict[str, str]:
-    """By name, where the names and units of all channels say them; else none."""
+    """By name, where names and units say them."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= _LEAST_SAMPLES and name not in clocks]
-    found = roles_of([named(name) for name in channels])
-    return dict(zip(channels, found, strict=True)) if found else {}
+    return dict(zip(channels, proposed_roles([named(name) for name in channels]), strict=True))
 
 
 def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:

@@ -4,6 +4,7 @@ the channels of a file are to each other."""
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.import_map import SignalRole
@@ -23,6 +24,12 @@ _WORDS = {
 }
 _QUANTITY = {word: quantity for quantity, words in _WORDS.items() for word in words}
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
+_SAID: dict[str, SignalRole] = {
+    **dict.fromkeys(("command", "cmd", "commanded"), "command"),
+    **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
+}  # fmt: skip
+_SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
+"""Input and output of a textbook, where both are there and no `x` beside them: then `y` would be an axis."""
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
 
@@ -65,21 +72,48 @@ def named(header: str) -> Named:
     return Named(header, name, told, word, True)
 
 
-def roles_of(columns: Sequence[Named]) -> list[SignalRole] | None:
-    """Forces are commands, where there are none voltages and currents; accelerations and velocities are responses,
-    places responses where there are no others. None where something is left open."""
-    quantities = {column.quantity for column in columns}
-    drives = _DRIVES if quantities & set(_DRIVES) else _FEEDS
-    answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
-    if not (quantities & set(drives) and quantities & set(answers)):
+def roles_of(columns: Sequence[Named]) -> Sequence[SignalRole] | None:
+    """By quantity: forces are commands, where there are none voltages or currents; accelerations and velocities are
+    responses, places responses where there are no others. None where something is left open, or a name says else."""
+    by_quantity = _by_quantity(columns)
+    found = [role for column in columns if (role := by_quantity.get(column.quantity)) and role != "helper"]
+    said = [_said_role(column, columns) for column in columns]
+    if len(found) < len(columns) or not {"command", "response"} <= set(found):
         return None
+    return found if all(name in ("", role) for name, role in zip(said, found, strict=True)) else None
+
+
+def proposed_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
+    """By names, then by quantity; empty where that leaves one open, and all where there would be no command or no
+    response. A reference is a helper, and so are currents and voltages beside a force."""
+    by_quantity = _by_quantity(columns)
+    found: list[SignalRole | Literal[""]] = [
+        _said_role(column, columns) or by_quantity.get(column.quantity, "") for column in columns
+    ]
+    if not {"command", "response"} <= set(found):
+        found = ["" for _ in columns]
+    return found
+
+
+def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
+    words = [part.lower() for part in _WORD.findall(column.name)]
+    firsts = {one.name.split("_")[0].lower() for one in columns}
+    if {"u", "y"} <= firsts and "x" not in firsts and words and words[0] in _SHORT:
+        return _SHORT[words[0]]
+    return next((_SAID[word] for word in words if word in _SAID), "")
+
+
+def _by_quantity(columns: Sequence[Named]) -> dict[str, SignalRole]:
+    quantities = {column.quantity for column in columns}
+    answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
     by_quantity: dict[str, SignalRole] = {"temperature": "condition"}
+    if quantities & set(_DRIVES):
+        by_quantity.update({**dict.fromkeys(_FEEDS, "helper"), **dict.fromkeys(_DRIVES, "command")})
+    elif len(quantities & set(_FEEDS)) == 1:  # which of both would be the command cannot be told
+        by_quantity.update(dict.fromkeys(_FEEDS, "command"))
     by_quantity.update(dict.fromkeys(_PLACES, "position"))
     by_quantity.update(dict.fromkeys(answers, "response"))
-    by_quantity.update(dict.fromkeys(drives, "command"))
-    if not quantities <= set(by_quantity):
-        return None
-    return [by_quantity[column.quantity] for column in columns]
+    return by_quantity
 
 
 def _unit_at_end(name: str) -> str:

@@ -77,7 +77,7 @@ def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_pa
     with pytest.raises(UnusableFileError) as refused:
         parse_map(text, tmp_path / "m.toml")
     assert any(problem.startswith('device is ""') for problem in refused.value.problems)
-    assert any(problem.startswith('channel[1].role is ""') for problem in refused.value.problems)
+    assert any(problem.startswith('channel[2].role is ""') for problem in refused.value.problems)
 
 
 def test_a_completed_skeleton_is_a_map(tmp_path):
@@ -135,6 +135,25 @@ def test_a_proposal_for_several_runs_needs_a_device_and_no_more(tmp_path):
     np.savez(tmp_path / "a.npz", fs_Hz=100.0, **arrays)
     text = map_skeleton(read_arrays(tmp_path / "a.npz", CsvMap())).replace('device = ""', 'device = "rig"')
     found = build_recording(parse_map(text, tmp_path / "m.toml"), [tmp_path / "a.npz"]).recording
-    assert (found.command.unit, found.response.unit, found.sample_rate_hz, len(found)) == ("N", "m", 100.0, 80)
-    np.testing.assert_allclose(found.response.samples[40:, 0], arrays["A02__u_mm"] / 1000)
+    assert (found.command.unit, found.response.unit, found.sample_rate_hz, len(found)) == ("m", "N", 100.0, 80)
+    np.testing.assert_allclose(found.command.samples[40:, 0], arrays["A02__u_mm"] / 1000)
     assert [part["prefix"] for part in found.meta["parts"]] == ["A01__", "A02__"]
+
+
+@pytest.mark.parametrize(
+    ("names", "roles"),
+    [
+        (("u_V", "theta_ref_deg", "theta_deg"), ["command", "helper", "response"]),
+        (("u_Nm", "theta_rad", "omega_rad_s", "current_A"), ["command", "position", "response", "helper"]),
+        (("u_mm", "y_N"), ["command", "response"]),
+        (("x_mm", "y_mm", "force_N"), ["response", "response", "command"]),
+        (("position_rad", "current_A", "voltage_raw"), ["", "", ""]),
+        (("torque_cmd", "torque_Nm", "speed"), ["command", "command", "response"]),
+        (("knob", "force_N", "a_g"), ["", "command", "response"]),
+        (("knob", "dial"), ["", ""]),
+    ],
+)
+def test_roles_are_proposed_where_names_say_them(tmp_path, names, roles):
+    text = map_skeleton(Arrays(tmp_path / "a.npz", runs(*names)))
+    found = [line.split('"')[1] for line in text.splitlines() if line.startswith("role = ")]
+    assert found == roles
