@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from analysis.diagnosis.types import Mask
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, new_figure, plain_axes
 from analysis.look.channels import Channel
@@ -118,6 +119,12 @@ def _shade_bands(panel: Axes, found: Overview) -> None:
         panel.axvspan(low, high, color=_BAND, zorder=0)
 
 
+def _in_band(found: Overview) -> Mask:
+    assert found.spectra is not None
+    low, high = min(band.low_hz for band in found.bands), max(band.high_hz for band in found.bands)
+    return np.asarray((found.spectra.frequency_hz >= low) & (found.spectra.frequency_hz <= high))
+
+
 def _coherence(found: Overview, name: str) -> Picture:
     assert found.spectra is not None
     figure = new_figure(8.6, 3.0)
@@ -125,9 +132,10 @@ def _coherence(found: Overview, name: str) -> Picture:
     plain_axes(panel)
     _shade_bands(panel, found)
     for k, one in enumerate(found.coherences):
-        panel.plot(
-            found.spectra.frequency_hz, one.multiple, color=COLOURS[k % len(COLOURS)], lw=1.1, label=one.response
-        )
+        colour = COLOURS[k % len(COLOURS)]
+        panel.plot(found.spectra.frequency_hz, one.multiple, color=colour, lw=0.7, alpha=0.3)
+        inside = _in_band(found)
+        panel.plot(found.spectra.frequency_hz[inside], one.multiple[inside], color=colour, lw=1.3, label=one.response)
     panel.set_xscale("log")
     panel.set_xlim(float(found.spectra.frequency_hz[0]), float(found.spectra.frequency_hz[-1]))
     panel.set_ylim(0, 1.02)
@@ -138,7 +146,7 @@ def _coherence(found: Overview, name: str) -> Picture:
         name=name,
         title="Coherence",
         caption="Share of each response's power that all commands together explain linearly, without what as many "
-        "windows explain by chance. Shade: driven band.",
+        "windows explain by chance. Shade: driven band; beside it, faint, chance and noise have their say.",
         figure=figure,
     )
 
@@ -160,7 +168,7 @@ def _levels(found: Overview, name: str) -> Picture:
             markersize=5,
             linewidth=0.8,
             linestyle=":" if found.channels[k].role == "command" else "-",
-            label=f"{found.channels[k].label} ({found.channels[k].of(strongest[k])})",
+            label=f"{found.channels[k].label} ({_pretty(found.channels[k].of(strongest[k]))})",
         )
     panel.set_ylim(0, 1.05)
     panel.set_xlabel("Segment", fontsize=10)
@@ -203,10 +211,11 @@ def _pair_panel(panel: Axes, pair: KinematicPair, found: Overview) -> None:
     later = by_label[pair.derivative]
     start, stop = _liveliest(later, found.stretches)
     times_s = np.arange(start, stop) / rate_hz
-    differences = derivative(by_label[pair.place].samples, pair.order, rate_hz)
+    # Of this stretch alone: where two parts meet, the place jumps.
+    differences = derivative(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
     plain_axes(panel)
     panel.plot(times_s, later.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
-    panel.plot(times_s, differences[start:stop], color=BLUE, linewidth=1.0)
+    panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
     panel.set_title(f"{pair.derivative} ({_pretty(later.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
     panel.set_xlim(float(times_s[0]), float(times_s[-1]))
 
