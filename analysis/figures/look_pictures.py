@@ -174,7 +174,8 @@ def _levels(found: Overview, name: str) -> Picture:
     panel.set_xlabel("Segment", fontsize=10)
     panel.set_ylabel("Rms over that of the strongest", fontsize=10)
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
+    if shown:
+        figure.legend(loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)
     return Picture(
         name=name,
         title="Levels",

@@ -32,8 +32,8 @@ class CrossSpectra:
         return density
 
     def coherence(self, one: int, other: int) -> FloatArray:
-        both = self.power(one) * self.power(other)
-        return np.asarray(np.abs(self.matrix[:, one, other]) ** 2 / np.where(both > 0, both, np.inf))
+        both = np.sqrt(self.power(one)) * np.sqrt(self.power(other))
+        return np.asarray((np.abs(self.matrix[:, one, other]) / np.where(both > 0, both, np.inf)) ** 2)
 
 
 def cross_spectra(
