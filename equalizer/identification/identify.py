@@ -16,7 +16,7 @@ from equalizer.identification.candidates import (
     subspace_starts,
 )
 from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.misfit import Misfit, misfit_of
+from equalizer.identification.misfit import Misfit, misfit_of, unknowns_of
 from equalizer.identification.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.model_uncertainty import parameter_draws, response_deviation
 from equalizer.identification.refusals import IdentificationRefused, lines_or_refusal
@@ -30,6 +30,9 @@ from equalizer.signals.signal import FloatArray
 
 FIRST_SEARCH = 0.8
 """Share of the progress that is told of it; poles are relaxed in the rest."""
+BAND_POINTS = 200
+WIDTHS = np.sinh(np.linspace(-4, 4, 41))
+"""Places about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
 SAMPLED_BEFORE_WRITTEN = 1.0
 """A response is read just before its row's command is written, so a device answers one sample later at the earliest."""
 
@@ -51,7 +54,7 @@ class Identified:
     misfit: Misfit
     """What is: the lines' own difference to the model beyond their noise."""
     expected_error: float | None
-    """Both together, likewise relative."""
+    """Likewise relative: scatter, and the most misfit that the lines may hide; in 95 % of cases not exceeded."""
     lines: int
     candidates: tuple[Candidate, ...]
     chosen: Candidate
@@ -148,22 +151,22 @@ def _identified(
     chosen = after.candidate
     low, high = settings.band_hz
     p, m = lines.response.shape[1:]
-    unknowns = settings.order * (p + m) + p * m
+    unknowns = unknowns_of(settings.order, p, m)
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
     inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
     modelled = chosen.fitted.response(lines.z)
     error = lines.relative_error(modelled)[inside]
     slow = () if settings.longest_decay_s else slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
-    misfit = misfit_of(lines, modelled, inside)
+    misfit = misfit_of(lines, modelled, inside, unknowns)
     model = _model(chosen, lines, cost, like, settings, slow)
     return Identified(
         model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((error**2).mean())),
         worst_relative_error=float(error.max()),
-        scatter=(scatter := _scatter(model, lines.frequency_hz[inside])),
+        scatter=(scatter := _scatter(model, lines.frequency_hz[inside], slow)),
         misfit=misfit,
-        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.error)),
+        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.most)),
         lines=int(inside.sum()),
         candidates=found,
         chosen=chosen,
@@ -173,12 +176,16 @@ def _identified(
     )
 
 
-def _scatter(model: IdentifiedModel, frequency_hz: FloatArray) -> float | None:
-    if model.samples is None:
+def _scatter(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
+    """As an integral over the band, and so also between lines, where a narrow resonance has its peak."""
+    if model.samples is None or len(frequency_hz) < 2:
         return None
-    some = frequency_hz[:: max(1, len(frequency_hz) // 200)]
-    size = np.sqrt((np.abs(model_response(model, some)) ** 2).sum())
-    return float(np.sqrt((response_deviation(model, some) ** 2).sum()) / size)
+    low, high = frequency_hz[0], frequency_hz[-1]
+    peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
+    grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
+    each_hz = np.gradient(grid)[:, None, None]
+    size = np.sqrt((each_hz * np.abs(model_response(model, grid)) ** 2).sum())
+    return float(np.sqrt((each_hz * response_deviation(model, grid) ** 2).sum()) / size)
 
 
 def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:

@@ -9,6 +9,7 @@ from equalizer.identification.weighted_lines import WeightedLines, weighted_line
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
 
 NOISE_TRUSTED = 1.1
 """The noise power of an estimate is itself estimated, from few looks: below this factor nothing is said to be left."""
@@ -18,6 +19,9 @@ NOISE_TRUSTED = 1.1
 class Misfit:
     error: float
     """Root mean square of model - estimate beyond the noise, relative to the response's; 0 where only noise is left."""
+    most: float
+    """Likewise, the most that the lines would still take for noise in 95 % of cases: the chance scatter of noise and of
+    its estimate, and what the fit took up of it, hide that much. Not below `error`."""
     cost: float
     """Squared difference over noise variance, mean over all entries of the lines: about 1 at the noise."""
     smooth: float | None
@@ -26,22 +30,40 @@ class Misfit:
     by the scatter of the lines."""
 
 
-def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray) -> Misfit:
-    """modelled: (lines, p, m). inside: (lines,), those that count."""
+ONE_SIDED_95 = 1.645
+
+
+def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:
+    """modelled: (lines, p, m). inside: (lines,), those that count. unknowns: that the fit had, in real numbers."""
     left = (modelled - lines.response)[inside]
     weight = lines.weight[inside]
     size = float((np.abs(lines.response[inside]) ** 2).sum())
     beyond = float((np.abs(left) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
+    hidden = float((np.abs(left) ** 2).sum() - _least_noise(1 / weight**2, unknowns))
     weighted = weight * left
     power = float((np.abs(weighted) ** 2).sum())
     smooth = None
     if power > NOISE_TRUSTED * weighted.size and len(weighted) > 1:
         both = float((weighted[1:] * weighted[:-1].conj()).real.sum()) * len(weighted) / (len(weighted) - 1)
         smooth = both / (power - weighted.size)
-    return Misfit(float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300))), power / max(weighted.size, 1), smooth)
+    error, most = (float(np.sqrt(max(part, 0.0) / max(size, 1e-300))) for part in (beyond, max(beyond, hidden)))
+    return Misfit(error, most, power / max(weighted.size, 1), smooth)
+
+
+def _least_noise(variance: FloatArray, unknowns: int) -> float:
+    """Power of the noise that is left beside a fit, at the low end of its chances."""
+    total = float(variance.sum())
+    entries = total**2 / max(float((variance**2).sum()), 1e-300)  # those that carry it
+    return total * (1 - unknowns / (2 * max(variance.size, 1)) - ONE_SIDED_95 * float(np.sqrt(2 / max(entries, 1.0))))
 
 
 def misfit_of_estimate(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:
     """Of the reliable lines in the model's band."""
     lines = weighted_lines((estimate,), model.band_hz)
-    return misfit_of(lines, model_response(model, lines.frequency_hz), np.ones(len(lines), bool))
+    modelled, every = model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
+    return misfit_of(lines, modelled, every, unknowns_of(model.order, *model.D.shape))
+
+
+def unknowns_of(order: int, p: int, m: int) -> int:
+    """Of a model of p outputs and m inputs: real numbers that no change of its state's coordinates alters."""
+    return order * (p + m) + p * m

@@ -15,7 +15,8 @@ class ModelQuality:
     that cannot be."""
 
     expected_error: float
-    """Of the model against the device: not smaller than any of those below, except the noise."""
+    """Of the model against the device, in 95 % of cases not exceeded on recordings like these: not smaller than any of
+    those below, except the noise."""
     misfit_error: float
     """Against the lines that it was fitted to, beyond their noise."""
     scatter_error: float | None = None
@@ -45,9 +46,11 @@ def model_quality(
     scatter_error: float | None,
     held_out: tuple[float, float | None, float] | None,
     remarks: tuple[str, ...] = (),
+    most_misfit: float = 0.0,
 ) -> ModelQuality:
-    """held_out: error, noise, seconds. What a test shows is an upper limit of what a model may claim."""
-    own = float(np.hypot(misfit_error, scatter_error or 0.0))
+    """held_out: error, noise, seconds; an error that a test showed is the least that is claimed. most_misfit: that the
+    noise of the fitted lines may hide."""
+    own = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
     error, noise, seconds = held_out or (None, None, None)
     return ModelQuality(max(own, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)
 

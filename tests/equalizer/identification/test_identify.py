@@ -54,7 +54,9 @@ def test_it_takes_less_than_five_seconds(timed):
 def test_what_is_left_is_noise_and_the_model_knows_its_own_error(measuring, centre, found):
     assert found.cost == pytest.approx(1.0, abs=0.05)
     assert found.model.provenance["residual_over_noise"] == pytest.approx(np.sqrt(found.cost))
-    assert found.expected_error == pytest.approx(measuring.errors_of(found.model, centre, GRID)[0], rel=0.35)
+    true, _ = measuring.errors_of(found.model, centre, GRID)
+    assert found.scatter == pytest.approx(true, rel=0.35)
+    assert true <= found.expected_error < 3 * true  # with what the noise of the lines may hide
 
 
 def test_no_pole_outlives_the_bound(found):

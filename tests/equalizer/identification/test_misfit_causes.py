@@ -70,6 +70,6 @@ def test_a_test_that_errs_more_than_the_fit_names_no_more_than_is_known(plants, 
     segments = (Segment(0, 4000, "sweep", 1.0, 2000), Segment(4000, 8000, "multisine", level, 2000, "test"))
     recording = synthetic.recording_of(commands, commands, segments)
     tested = HeldOut(error=0.2, noise=0.01, seconds=2.0)
-    (said,) = held_out_remarks(tested, 1.0, Misfit(0.01, 1.0, None), (recording,))
+    (said,) = held_out_remarks(tested, 1.0, Misfit(0.01, 0.01, 1.0, None), (recording,))
     assert told in said
-    assert held_out_remarks(HeldOut(0.015, 0.01, 2.0), 1.0, Misfit(0.01, 1.0, None), (recording,)) == ()
+    assert held_out_remarks(HeldOut(0.015, 0.01, 2.0), 1.0, Misfit(0.01, 0.01, 1.0, None), (recording,)) == ()
