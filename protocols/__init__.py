@@ -1,4 +1,5 @@
-"""What an experiment is: the numbers and rules that are fixed before anybody sits down. Pure; imports nothing of ours.
+"""What an experiment is: the numbers and rules that are fixed before a participant sits down. Pure; imports none of
+our packages.
 
 Read in this order: `staircase_rule` and `staircase` (the rule that decides the next level), `study_protocol` and
 `recording_protocol` (what a TOML file may say), `schedule` (order and draws from keys), `trial` (the row that

@@ -24,7 +24,7 @@ TABLES_SINCE = {
     "limits": SittingLimits(),
     "debrief": (),
 }
-"""Tables that came after the first locks and sessions, as they are where nobody writes them: then they do not count,
+"""Tables that came after the first locks and sessions, as they are where no file writes them: then they do not count,
 or an old fingerprint would fit no more."""
 
 SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}

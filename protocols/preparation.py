@@ -26,7 +26,7 @@ Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 
 @dataclass(frozen=True, config=STRICT)
 class ConsentSettings:
-    """What a participant agrees to, and what keeps somebody from taking part."""
+    """What a participant agrees to, and what keeps a person from taking part."""
 
     version: Annotated[
         str,
@@ -116,7 +116,7 @@ class PracticeSettings:
             ge=1,
             le=200,
             description="A practice run ends after so many trials, passed or not. Default 10. Not passing excludes "
-            "nobody: at high frequencies it is a finding.",
+            "no participant: at high frequencies it is a finding.",
         ),
     ] = 10
     feedback: Annotated[

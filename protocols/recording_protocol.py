@@ -29,7 +29,7 @@ class RecordingProtocol:
     hand: Annotated[
         Literal["none", "held"],
         Field(
-            description="Whether somebody holds the handle. Default 'none', because a spring repeats and a grip does "
+            description="Whether a person holds the handle. Default 'none', because a spring repeats and a grip does "
             "not; only a protocol that says 'held' is ever played into a hand."
         ),
     ] = "none"

@@ -28,7 +28,7 @@ Role = Annotated[
     Literal["fit", "test", ""],
     Field(
         description="What the excitation is for: 'fit' a model, or 'test' it on what it has not seen. Default: empty, "
-        "for whoever uses the recording to decide."
+        "decided when the recording is used."
     ),
 ]
 

@@ -1,4 +1,4 @@
-"""Pydantic's errors in the words of somebody who edits a protocol file: key, what is wrong, what is allowed."""
+"""Pydantic's errors in the words of a protocol file's author: key, what is wrong, what is allowed."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches

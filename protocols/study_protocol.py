@@ -149,7 +149,7 @@ class TrainingSettings:
             ge=0,
             le=1000,
             description="A training run ends after this many trials at the latest. Default 0: a whole staircase, "
-            "so that nobody starts untrained.",
+            "so that no participant starts untrained.",
         ),
     ] = 0
     feedback: Annotated[

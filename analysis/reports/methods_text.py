@@ -143,7 +143,7 @@ def _beside(protocol: StudyProtocol) -> tuple[str, ...]:
         sentences.append(
             f"Practice at {_hz(practice.frequencies_hz)} was at {fixed}{levels_words(practice)}, {feedback} "
             f"feedback, until {practice.right_needed} of the last {practice.of_last} answers were right or "
-            f"{practice.trial_limit} trials were over. It excluded nobody and enters no result."
+            f"{practice.trial_limit} trials were over. It excluded no participant and enters no result."
         )
     if catch.one_in:
         sentences.append(

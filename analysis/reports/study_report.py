@@ -131,7 +131,7 @@ def _beside(analysis: StudyAnalysis) -> list[Section]:
         steer = "Trials at full level, mixed into the test runs. They moved no staircase and enter no threshold."
         sections.append(Section("Catch trials", paragraphs=(steer,), tables=(catch_table(analysis),)))
     if analysis.practice:
-        enter = "Short runs at a fixed level, before the test runs. They enter no result; not passing excluded nobody."
+        enter = "Short runs at a fixed level, before the test runs. They enter no result and excluded no participant."
         sections.append(Section("Practice", paragraphs=(enter,), tables=(practice_table(analysis),)))
     return sections
 

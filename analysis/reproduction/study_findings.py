@@ -19,8 +19,9 @@ LIMIT_RULE = (
 )
 
 _DIFFERS = (
-    "Nobody took part: the participants are simulated, and how their thresholds rise with frequency was set beforehand "
-    "so that a study of ten resembles the published one in its main lines. That it does is no evidence about people; "
+    "No person took part: the participants are simulated, and how their thresholds rise with frequency was set "
+    "beforehand so that a study of ten resembles the published one in its main lines. That it does is no evidence "
+    "about people; "
     "what is tried out here is the procedure, the analysis and the figure.",
     "The paper prints no threshold as a number, so levels are not compared, only what its text says of them.",
     "As in the paper, thresholds that the cap cut off enter means as plain numbers, and means near the cap are too "

@@ -20,7 +20,7 @@ LEFT_ALONE = {
     "body_on_actuator": IN_MODEL,
     "end_stop": "a motion that reaches a stop should be made smaller",
     "pose_dependent_inertia": "take a model identified at the place; over a vibration the inertia stays the same",
-    "time_varying_grip": "nobody knows the grip ahead of time",
+    "time_varying_grip": "the grip is not known ahead of time",
     "force_saturation": "there is no more force than that: the cap keeps it",
     "slew_limit": "there is no faster force than that",
 }

@@ -122,7 +122,7 @@ def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
 def _known(name: str) -> HiddenEffect:
     found = EFFECTS.get(name) or DECOYS.get(name)
     if found is None:
-        raise ValueError(f"nobody knows how to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
+        raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
     return found
 
 

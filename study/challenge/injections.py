@@ -154,7 +154,7 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
     wanted = next((one for one in INJECTIONS if one.effect == effect), None)
     if wanted is None:
         raise ValueError(
-            f"nobody knows how to inject '{effect}'; known are {', '.join(one.effect for one in INJECTIONS)}"
+            f"there is no way to inject '{effect}'; known are {', '.join(one.effect for one in INJECTIONS)}"
         )
     if not 0.0 <= strength <= 1.0:
         raise ValueError(f"strength is {strength}; it must lie between 0 and 1")

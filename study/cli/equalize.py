@@ -32,7 +32,7 @@ def equalize(
     ] = None,
     repeat: Annotated[
         int | None,
-        typer.Option(min=1, help="Play on the device, measure, correct, up to so many times. Nobody may hold it."),
+        typer.Option(min=1, help="Play on the device, measure, correct, up to so many times. No person may hold it."),
     ] = None,
     device: Annotated[str | None, typer.Option(help="Device to repeat on: simulated.")] = None,
     earlier: Annotated[

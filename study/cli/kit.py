@@ -1,4 +1,4 @@
-"""`hapteq kit`: a laboratory's own blind test of the diagnosis, on a device that somebody changes on purpose."""
+"""`hapteq kit`: a laboratory's own blind test of the diagnosis, on a device that is changed on purpose."""
 
 from pathlib import Path
 from typing import Annotated
@@ -21,10 +21,10 @@ def draw(
     out: Annotated[Path, typer.Option(help="The table to write, LABELS.csv; for the one who changes the device.")],
     repeats: Annotated[int, typer.Option(min=1, max=20, help="Of each change; nothing is changed twice as often.")] = 2,
     seed: Annotated[
-        int | None, typer.Option(min=0, callback=checked_seed, help="Of the order [default: one that nobody knows].")
+        int | None, typer.Option(min=0, callback=checked_seed, help="Of the order [default: drawn at random].")
     ] = None,
 ) -> None:
-    """Draw the order of the changes. Whoever diagnoses must not see it."""
+    """Draw the order of the changes. The person who diagnoses must not see it."""
     from analysis.proof.lab_kit import CHANGES
     from study.workflows.lab_kit import draw_labels
 
@@ -37,7 +37,7 @@ def draw(
 
 @app.command("seal")
 def seal(labels: LabelsArgument) -> None:
-    """Hash the completed table. Give the hash to whoever diagnoses, and the table to nobody."""
+    """Hash the completed table. Give the hash to the person who diagnoses, and keep the table."""
     from study.workflows.lab_kit import seal_labels
 
     typer.echo(seal_labels(labels))

@@ -166,7 +166,7 @@ def as_typed(sentence: str) -> str:
 
 
 def _refused_by_the_system(problem: OSError) -> StudyError:
-    """Whatever nobody named better: a folder without rights, a full disk, a terminal that went away."""
+    """What has no named error: a folder without rights, a full disk, a terminal that went away."""
     where = f" ({problem.filename})" if problem.filename else ""
     return StudyError(
         "The system refused",

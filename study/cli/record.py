@@ -47,7 +47,7 @@ def record(
 
 
 def announce(notice: str) -> None:
-    """Say it, and wait until somebody has read it where somebody is there."""
+    """Say it, and wait for Enter where there is a terminal."""
     from study.cli.screen import has_keys
 
     typer.echo(notice, err=True)

@@ -28,7 +28,7 @@ def has_screen() -> bool:
 
 
 def has_keys() -> bool:
-    """Whether somebody may sit at a keyboard."""
+    """Whether there may be a keyboard."""
     return sys.stdin is not None and sys.stdin.isatty()
 
 

@@ -22,7 +22,7 @@ def twin(
     as_json: JsonOption = False,
 ) -> None:
     """Excite the device well above its friction at two levels, fit masses, dampers, cables and modes from the command
-    to the acceleration, take off the damping that is friction's, and write the rest with its tolerances. Nobody may
+    to the acceleration, take off the damping that is friction's, and write the rest with its tolerances. No person may
     hold the handle."""
     from study.cli.progress import late_bar
     from study.cli.record import announce

@@ -183,7 +183,7 @@ class TrialSpoiled:
 
 @dataclass(frozen=True, config=FACT)
 class SessionInterrupted:
-    """Somebody left on purpose, or a fault ended the sitting. It can be resumed."""
+    """The participant or experimenter left on purpose, or a fault ended the sitting. It can be resumed."""
 
     utc: UtcTime
     reason: str

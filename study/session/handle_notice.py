@@ -14,6 +14,6 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
             "stops."
         )
     return (
-        f"Nobody may hold the handle: '{device}' is going to move by itself {for_how_long}, pushed with up to "
+        f"No person may hold the handle: '{device}' is going to move by itself {for_how_long}, pushed with up to "
         f"{peak_n:g} N and held at its place by a weak spring. Keep hands away and the workspace free; Ctrl-C stops."
     )

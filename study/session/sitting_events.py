@@ -26,7 +26,7 @@ class DoseElsewhere:
 
 @dataclass(frozen=True, config=FACT)
 class FormFilled:
-    """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why somebody may not take part)
+    """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why a person may not take part)
     is not kept: `answers` holds what the study needs."""
 
     utc: UtcTime

@@ -95,6 +95,6 @@ def practice_over(result: PracticeResult, talk: Conversation) -> None:
     if result.passed:
         talk.say("That is enough to go on.")
     else:
-        talk.say("Some vibrations are hard to tell, for anybody. The study goes on all the same.")
+        talk.say("Some vibrations are hard to tell for everyone. The study goes on all the same.")
     talk.say("Press Enter to go on.")
     talk.answer_or_leave()

@@ -47,7 +47,7 @@ class ScreenServer(Server):
 
     async def on_startup(self, app: web.Application) -> None:
         self._say(f"The study is at {self.public_url}/{self._token}/ for one window at a time. Ctrl-C ends it.")
-        self._say("Keep this address to yourself: whoever has it can take the study. It is a new one each time.")
+        self._say("Keep this address to yourself: any browser that has it can take the study. It changes each time.")
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
         if request.headers.get("Origin") not in self._origins:

@@ -30,7 +30,7 @@ READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
 
 TWIN_SAID = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
-    "recordings with nobody at the handle, as `hapteq twin` writes it."
+    "recordings without a hand at the handle, as `hapteq twin` writes it."
 )
 
 

@@ -77,7 +77,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
         raise StudyError(
             "The forces would be too strong",
             f"{plan.trajectory.name}: {limit}.",
-            "Scale the accelerations, give --constrain, or raise --cap for a device that nobody holds.",
+            "Scale the accelerations, give --constrain, or raise --cap for a device that no hand holds.",
             saved="Nothing was written.",
         ) from limit
     except ValueError as problem:

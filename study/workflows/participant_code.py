@@ -15,7 +15,7 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
             raise WrongUseError(
                 f"{subject} withdrew",
                 f"The participant of {folder.name} withdrew, and the data were erased.",
-                "Use a new code: nobody gets this one again.",
+                "Use a new code: this one is not given again.",
             )
         begun = begun_in(folder)
         if begun is not None and begun.simulated != simulated:

@@ -103,8 +103,8 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
     if seal is None:
         said, who = sealed_hash(path), f"{beside.name} says"
         how = (
-            f"compared only with {beside.name} beside them, which whoever holds the table can write anew: give --seal "
-            "the hash that was handed over before the diagnoses"
+            f"compared only with {beside.name} beside them, which can be written anew together with the table: give "
+            "--seal the hash that was handed over before the diagnoses"
         )
     else:
         said, who, how = _hash(seal), "--seal gives", "the hash that --seal gives"
@@ -113,7 +113,7 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
     raise StudyError(
         "The labels are not those that were sealed",
         f"{path.name} has the hash {digest}; {who} {said}." if said else f"There is no seal in {beside.name}.",
-        "Score the table as it was sealed before the diagnoses; what was changed in it since, nobody can trust.",
+        "Score the table as it was sealed before the diagnoses; changes made to it since cannot be trusted.",
         saved=UNSCORED,
     )
 

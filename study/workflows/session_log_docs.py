@@ -37,5 +37,5 @@ def session_log_markdown() -> Iterable[str]:
     )
     yield (
         "Checksums and seal have no key: they show damage, and edits by those who do not compute them again. They are "
-        "no proof of who wrote a log or that nobody forged it; a copy in other hands is."
+        "no proof of who wrote a log, nor against forgery; a copy kept elsewhere is."
     )

@@ -4,11 +4,30 @@ import re
 from pathlib import Path
 
 import numpy as np
+from typer.main import get_command
 
 from equalizer.plant.identified_model import IdentifiedModel
+from study.cli.main import app
 from study.store.identified_model_file import write_identified_model
 
 DOCS = Path(__file__).parents[2] / "docs"
+VAGUE = re.compile(r"\b(whoever|nobody|somebody|anybody)\b", re.IGNORECASE)
+"""Words for people whose part (participant, experimenter, person at the handle) has to be said."""
+
+
+def test_people_are_named_by_their_part():
+    root = DOCS.parent
+    written = [*DOCS.rglob("*.md"), *DOCS.rglob("*.json"), root / "README.md", *(root / "protocols").glob("*.toml")]
+    found = [f"{path.name}: {match.group()}" for path in written for match in VAGUE.finditer(path.read_text("utf-8"))]
+    assert found == []
+
+
+def test_help_names_people_by_their_part():
+    parts = [root := get_command(app), *root.commands.values()]
+    parts += [part for group in parts[1:] if hasattr(group, "commands") for part in group.commands.values()]
+    said = [text for part in parts for text in (part.help, *(getattr(p, "help", "") for p in part.params)) if text]
+    assert len(said) > 100
+    assert [text for text in said if VAGUE.search(text)] == []
 
 
 def test_the_rendering_loop_of_the_equalizer_page_runs(plants, tmp_path, monkeypatch):

@@ -120,8 +120,8 @@ def _gaps(command: Signal, name: str) -> Iterator[str]:
     if missing:
         first = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
         yield (
-            f"{name} misses the command in {missing} samples (the first is {first}), so nobody can say what the device "
-            "was told; cut the recording there"
+            f"{name} misses the command in {missing} samples (the first is {first}), so it is not known what "
+            "the device was told; cut the recording there"
         )
 
 
@@ -209,8 +209,8 @@ def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
         yield f"the model's input lets {', '.join(idle)} drive nothing"
     elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
         yield (
-            f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so nobody can "
-            "tell them apart; make one command of those that push the same"
+            f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
+            "be told apart; make one command of those that push the same"
         )
     if blind:
         yield f"the model's output lets {', '.join(blind)} see nothing"
@@ -232,7 +232,7 @@ def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     slowest_hz = min((float(swing_hz) for swing_hz in swings_hz if swing_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
         yield (
-            f"the model swings at {slowest_hz:.3g} Hz and faster, which nobody can see at a rate of "
+            f"the model swings at {slowest_hz:.3g} Hz and faster, which cannot be seen at a rate of "
             f"{recording.sample_rate_hz:g} Hz; the recording must state its rate in hertz"
         )
 

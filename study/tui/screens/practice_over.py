@@ -13,7 +13,7 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.said import Said
 
 ENOUGH = "That is enough to go on."
-HARD = "Some vibrations are hard to tell, for anybody. The study goes on all the same."
+HARD = "Some vibrations are hard to tell for everyone. The study goes on all the same."
 
 
 class PracticeOverScreen(Screen[None]):
@@ -21,7 +21,7 @@ class PracticeOverScreen(Screen[None]):
 # End of a practice
 
 - The practice shows what each vibration feels like. Its answers enter no result.
-- Some vibrations are hard to tell, for anybody. The study goes on all the same.
+- Some vibrations are hard to tell for everyone. The study goes on all the same.
 - **Enter** goes on.
 """
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"
@@ -39,7 +39,7 @@ class PracticeOverScreen(Screen[None]):
                 yield Said("That is enough to go on.", classes="gap")
             else:
                 yield Said(
-                    "Some vibrations are hard to tell, for anybody. The study goes on all the same.", classes="gap"
+                    "Some vibrations are hard to tell for everyone. The study goes on all the same.", classes="gap"
                 )
             yield Said("Press Enter to go on.", classes="gap")
         yield Footer(show_command_palette=False)

@@ -117,7 +117,7 @@ class NewSessionForm(Vertical):
 
     def _standing_problem(self, code: str) -> str:
         """What the list already knows against a code; the program that begins a session checks again."""
-        return next((f"{code} withdrew: nobody gets this code again." for line in self._sessions(code)
+        return next((f"{code} withdrew: this code is not given again." for line in self._sessions(code)
                      if line.standing == "withdrawn"), "")  # fmt: skip
 
     def _notice(self, code: str) -> str:

@@ -50,7 +50,7 @@ def test_nothing_missing_is_an_empty_truth():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"effects": ["stiction"]}, "nobody knows how to conceal 'stiction'"),
+        ({"effects": ["stiction"]}, "there is no way to conceal 'stiction'"),
         ({"effects": ["cogging"], "strength": 1.5}, "strength is 1.5; it must lie between 0 and 1"),
         ({"effects": ["hand_impedance"], "concealed": "retuned"}, "from a calibrated model only"),
     ],

@@ -10,7 +10,7 @@ import pytest
 from study.cli.progress import late_bar
 from study.cli.record import announce
 
-NOTICE = "Nobody may hold the handle."
+NOTICE = "No person may hold the handle."
 
 
 class ATerminal(io.StringIO):

@@ -13,7 +13,7 @@ def shipped(name: str):
 
 def test_without_a_hand_nobody_may_hold_the_handle():
     said = handle_notice(shipped("sweep_band"), "omega.3", 298.0)
-    assert said.startswith("Nobody may hold the handle: 'omega.3' is going to move by itself for about 5 min")
+    assert said.startswith("No person may hold the handle: 'omega.3' is going to move by itself for about 5 min")
     assert "up to 3 N" in said
 
 
@@ -21,7 +21,7 @@ def test_in_a_hand_the_hand_is_asked_for():
     said = handle_notice(shipped("sweep_hand"), "omega.3", 269.0)
     assert "hold the handle of 'omega.3' now" in said
     assert "up to 1.5 N" in said
-    assert "Nobody" not in said
+    assert "No person" not in said
 
 
 @pytest.mark.parametrize(("total_s", "words"), [(0.2, "about 1 s"), (59.0, "about 59 s"), (60.0, "about 1 min")])

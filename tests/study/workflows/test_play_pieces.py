@@ -166,7 +166,7 @@ def test_before_a_real_device_moves_it_is_said_who_may_hold_the_handle(tmp_path,
     progress: list[float] = []
     record_on(device_that_clips_at(1e3, simulated=False), plan(tmp_path / "r.h5"), progress.append, still)
     assert len(said) == 1
-    assert said[0].startswith("Nobody may hold the handle: 'mass'")
+    assert said[0].startswith("No person may hold the handle: 'mass'")
     assert progress != []
 
 

@@ -184,7 +184,9 @@ def test_a_model_of_no_device_is_refused(changes, words):
 def test_two_actuators_of_one_motion_are_refused():
     eye = np.eye(2)
     both = MechanicalModel("m", "acceleration", eye, eye, eye, np.ones((2, 2)), eye)
-    assert "2 inputs drive only 1 motion, so nobody can tell" in refusal(require_model_of, both, [recording(axes=2)])
+    assert "2 inputs drive only 1 motion, so they cannot be told apart" in refusal(
+        require_model_of, both, [recording(axes=2)]
+    )
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_without_a_model_it_says_where_one_comes_from_and_begins_nothing(on_scre
     [
         ("ada", "'ada' is no participant code; a code has 1 to 16 letters and digits"),
         ("", "A code is needed"),
-        ("P02", "P02 withdrew: nobody gets this code again."),
+        ("P02", "P02 withdrew: this code is not given again."),
     ],
 )
 def test_a_wrong_code_begins_nothing_and_says_why(on_screen, home, typed, said):
