@@ -121,6 +121,7 @@ def test_a_diagnosis_is_shown_in_words(run, tmp_path):
     assert out.startswith("The model answers as the device does")
     assert "repeats allow" in out
     assert json.loads(run("show", path, "--json")[1])["verdict"].startswith("The model answers as the device does")
+    assert run("show", tmp_path) == (0, out, "")
 
 
 def test_a_file_that_is_no_diagnosis_is_an_error_with_words(run, tmp_path):
