@@ -135,7 +135,9 @@ def test_a_person_reads_local_times_and_a_script_reads_utc(run, taken, tmp_path,
     data = Path(shutil.copytree(taken, tmp_path / "data"))
     begun = datetime.fromisoformat(json.loads(run("sessions", "--data", data, "--json")[1])[0]["begun_utc"])
     local = begun.astimezone()
-    assert f"{local:%Y-%m-%d %H:%M} +0{local.utcoffset().seconds // 3600}:00" in run("sessions", "--data", data)[1]
+    header, row = run("sessions", "--data", data)[1].splitlines()
+    assert f"begun (+0{local.utcoffset().seconds // 3600}:00)" in header
+    assert f"{local:%Y-%m-%d %H:%M}" in row
     said = run("show", "P01_001", "--data", data, "--log")[1]
     assert f"{local:%Y-%m-%d %H:%M:%S} +0" in said
     assert f"{local:%H:%M:%S}  Session P01_001 began" in said
