@@ -1,15 +1,21 @@
 """From recordings and a model to findings: the whole diagnosis, without files, clocks or screens."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from analysis.diagnosis.balance.first_model import first_model
+from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.observed_parts import names_of_parts
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import Chosen, measure_by_force, measure_of
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.assemble_findings import assembled
+from analysis.diagnosis.result.candidates import with_balances
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
+from analysis.diagnosis.search.by_balance import balances_of, searched_by_balance
 from analysis.diagnosis.search.impacts import rattling
 from analysis.diagnosis.search.learn_clean_floor import learned_from
 from analysis.diagnosis.search.patience import always
@@ -20,7 +26,7 @@ from analysis.diagnosis.search.seen_directly import seen_directly
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
 
@@ -32,6 +38,8 @@ class DiagnosisSettings:
     """Of the recordings, for the reader."""
     clean: tuple[Recording, ...] = ()
     """Of the device when it was in order: what it differed by then from its model, re-tuned, is no mismatch."""
+    fitted: bool = False
+    """The model was fitted to these recordings by the program: evidence is then weighed in the force balance."""
     patient: Patience = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
 
@@ -45,26 +53,104 @@ def diagnose(
 ) -> Findings:
     """recordings: of one device, alike in channels, units and rate; see `belonging` for what is refused. Raises
     NothingLearned where the clean recordings say nothing of these."""
-    progress("measuring the noise", 0.0)
-    chosen = measure_of(recordings, model, settings.clean)
-    tuning = tuning_of(model, recordings[0].command.channels)
+    balances: tuple[Balance, ...] = ()
+    if settings.fitted and not settings.clean:
+        progress("weighing laws in the force balance", 0.0)
+        balances = balances_of(recordings, frozenset(settings.without), settings.patient)
+        for number, look in enumerate(_looks(recordings, model, balances)):
+            progress("fitting the named laws", 0.2 + 0.3 * number)
+            arena = _arena(look, settings, map_)
+            found = searched_by_balance(arena, balances)
+            if found is not None:
+                return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
+    progress("measuring the noise", 0.3 if balances else 0.0)
+    look = _Look(model, measure_of(recordings, model, settings.clean))
+    seen = _by_search(recordings, look, settings, map_, progress, bool(balances))
+    progress("writing down what was found", 0.95)
+    return _assembled(recordings, settings, look, seen, balances)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Look:
+    """A model, and how its errors are measured."""
+
+    model: MechanicalModel
+    chosen: Chosen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    searched: Searched
+    floor: CleanFloor
+
+
+def _looks(recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance]) -> Iterator[_Look]:
+    """In a free simulation, the strictest, where the fitted model bears one; else along the measured motion, with the
+    balance's own linear numbers."""
+    if not any(balance.named for balance in balances):
+        return
+    chosen = measure_of(recordings, model)
+    if chosen.measure.name == "free simulation":
+        yield _Look(model, chosen)
+    try:
+        rigid = first_model(balances, recordings[0], model.name)
+        if rigid is not None:
+            band_hz = balances[0].searched.regression.motions[0].band_hz
+            yield _Look(rigid, measure_by_force(recordings, rigid, band_hz))
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return
+
+
+def _arena(look: _Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
+    measure, tuning = (
+        look.chosen.measure,
+        tuning_of(look.model, look.chosen.measure.records[0].recording.command.channels),
+    )
+    return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without))
+
+
+def _by_search(
+    recordings: Sequence[Recording],
+    look: _Look,
+    settings: DiagnosisSettings,
+    map_: Mapper,
+    progress: Progress,
+    weighed: bool,
+) -> _Seen:
+    """weighed: in a force balance, which tells of all laws along a motion that is not simulated freely."""
+    chosen, arena = look.chosen, _arena(look, settings, map_)
     catalogue = [effect for effect in CATALOGUE if effect.name not in settings.without]
     refined = {name for effect in catalogue for name in effect.simpler}
-    arena = Arena(chosen.measure.shortened(), chosen.measure, tuning, map_, frozenset(settings.without))
     catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
     may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
+    if weighed and chosen.measure.name != "free simulation":
+        return _Seen(searched(arena, [], progress, settings.patient), CleanFloor())
     if settings.clean:
-        learned = learned_from(settings.clean, model, recordings, map_, progress)
+        learned = learned_from(settings.clean, look.model, recordings, map_, progress)
         told = [effect for effect in may_be_named if chosen.measure.tells(effect)]
         arena = replace(arena, certain=seen_directly(recordings, settings.clean, told))
-        seen, floor = searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor
+        found = _Seen(searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor)
     else:
-        seen, floor = searched(arena, catalogue, progress, settings.patient), CleanFloor()
+        found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
+    seen = found.searched
     if seen.judged.verdict in ("unexplained", "partly_explained") and not arena.certain and settings.patient():
         progress("looking for play that rattles", 0.9)
         rattled = rattling(seen.arena, seen.found, chosen.floors, may_be_named)
-        seen = seen if rattled is None else Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,))
-    progress("writing down what was found", 0.95)
-    found = seen.found if seen.judged.named else replace(seen.found, after=seen.found.retuned)
-    whole = assembled(seen.arena, found, seen.judged, chosen.floors, names_of_parts(recordings, settings.names), floor)
-    return replace(whole, remarks=(*chosen.remarks, *seen.remarks, *whole.remarks))
+        if rattled is not None:
+            return replace(found, searched=Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+    return found
+
+
+def _assembled(
+    recordings: Sequence[Recording],
+    settings: DiagnosisSettings,
+    look: _Look,
+    seen: _Seen,
+    balances: Sequence[Balance],
+) -> Findings:
+    searched, names = seen.searched, names_of_parts(recordings, settings.names)
+    found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
+    whole = assembled(searched.arena, found, searched.judged, look.chosen.floors, names, seen.floor)
+    diagnosis = with_balances(whole.diagnosis, balances, recordings[0].command.channels)
+    remarks = (*look.chosen.remarks, *searched.remarks, *whole.remarks)
+    return replace(whole, diagnosis=diagnosis, remarks=remarks)

@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 
 FORMAT, VERSION = "hapteq-diagnosis", 1
-STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 Verdict = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained"]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -88,6 +88,10 @@ class NamedEffect:
     probability: Share
     parameters: dict[str, Estimate]
     rivals: tuple[Rival, ...] = ()
+    class_: Annotated[
+        tuple[EffectWord, ...],
+        Field(alias="class", description="Laws that these data cannot part, this one first; empty where they can."),
+    ] = ()
 
     @model_validator(mode="after")
     def _as_in_the_vocabulary(self) -> Self:
@@ -99,6 +103,20 @@ class NamedEffect:
         if known.main.name not in self.parameters:
             raise ValueError(f"{self.effect} lacks its main parameter, {known.main.name} ({known.main.unit})")
         return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class Candidate:
+    """Physics that would explain some of the mismatch, and is not confirmed."""
+
+    effect: EffectWord
+    place: Place
+    axis: str | None
+    parameters: dict[str, float]
+    """SI"""
+    held_out_gain: Annotated[Share, Field(description="Of the error power on data that nothing was fitted to.")]
+    share_of_black_box: Annotated[Share, Field(description="Of what all laws together take of the linear error power.")]
+    why_not: str
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -142,6 +160,9 @@ class Diagnosis:
         ),
     ]
     next_experiment: NextExperiment | None
+    candidates: Annotated[
+        tuple[Candidate, ...], Field(description="The best that were not confirmed, the first first.")
+    ] = ()
 
     @model_validator(mode="after")
     def _verdict_fits(self) -> Self:
@@ -165,7 +186,7 @@ class Diagnosis:
 
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain values, without format and version."""
-    plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json")
+    plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
     return plain
 
 

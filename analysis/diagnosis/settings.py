@@ -44,6 +44,7 @@ RETUNING_BOUND = 4.0  # standard deviations of the calibration
 UNSTATED_SHARE = 0.1  # one standard deviation of what has no stated tolerance, of the largest at any axis
 UNSTATED_MODES = 0.02  # the same of a mode's frequency
 RIGID_SHARE, RIGID_MASS_SHARE = 0.25, 0.05  # the same of damping and stiffness, and of mass, of a fitted rigid model
+MASSLESS_SHARE = 1e-3  # of the force's rms: the inertia of a body that shows none; principle: far below any error
 SPRING_SHARE = 0.05  # of the misfit that springs must take to be part of it
 RETUNING_NAMED, RETUNING_DOUBTED = 1.0, 3.0  # standard deviations from which a moved number is named, and doubted
 

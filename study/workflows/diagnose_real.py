@@ -51,7 +51,10 @@ def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progres
     try:
         read = _read(wanted, on_progress)
         settings = DiagnosisSettings(
-            names=(wanted.name,), clean=() if read.before is None else (read.before,), patient=patient
+            names=(wanted.name,),
+            clean=() if read.before is None else (read.before,),
+            fitted=wanted.model() is None,
+            patient=patient,
         )
         with worker_threads() as threads:
             found = diagnose((read.recording,), read.model, settings, threads.map, on_progress)

@@ -83,7 +83,8 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     held = with_spring(model, spring)
     begun = FITTED if plan.model is None else READ
     known = () if clean is None else clean.recordings
-    settings = DiagnosisSettings(without=plan.without, names=found.names, clean=known)
+    fitted = plan.model is None and not found.simulated
+    settings = DiagnosisSettings(without=plan.without, names=found.names, clean=known, fitted=fitted)
     try:
         with worker_threads() as threads:
             findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))

@@ -86,9 +86,31 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: 
         except np.linalg.LinAlgError:
             if not all(has_motion(record.recording, model) for record in records):
                 return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
-    views = force_views(records, model, floors)
-    said = f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
-    return Chosen(replace(views.measure, known=known), views.floors, (*remarks, said))
+    return _by_force(records, model, floors, remarks)
+
+
+def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> Chosen:
+    """The force that the model needs along the measured motion, up to a frequency, whatever the rule says; see
+    `has_motion`."""
+    records = observed_parts(recordings, model.outputs)
+    known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
+    floors = [noise_floor(one.recording) for one in records]
+    return _by_force(records, model, floors, (BY_FORCE, *_of_known(known)), band_hz)
+
+
+def _by_force(
+    records: Sequence[Observed],
+    model: MechanicalModel,
+    floors: Sequence[NoiseFloor],
+    remarks: tuple[str, ...],
+    band_hz: float | None = None,
+) -> Chosen:
+    known = placed_effects(model, records[0].recording.command.channels, records[0].recording.response.channels)
+    views = force_views(records, model, floors, band_hz)
+    said = (
+        f"The forces are compared up to {views.measure.band_hz:.3g} Hz." if np.isfinite(views.measure.band_hz) else ""
+    )
+    return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, said))))
 
 
 def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:
@@ -150,6 +172,10 @@ def _slowest(model: MechanicalModel) -> float:
 IMPOSED = (
     "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
     "with the measured one."
+)
+BY_FORCE = (
+    "The force that the model needs along the measured motion is compared with the one that entered: the motion was "
+    "measured, and small errors of a model that was fitted to it would grow in a simulation."
 )
 CLOSED_LOOP = (
     "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "

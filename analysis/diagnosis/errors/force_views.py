@@ -35,14 +35,16 @@ class ForceViews:
     """Of the views, per record."""
 
 
-def force_views(records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor]) -> ForceViews:
-    """records: with motion, see `has_motion`."""
+def force_views(
+    records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
+) -> ForceViews:
+    """records: with motion, see `has_motion`. band_hz: up to which forces are compared; None = by the noise."""
     motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
     entered = [
         entered_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
         for record in records
     ]
-    band_hz = _band(records, motions, entered, floors, model)
+    band_hz = band_hz or _band(records, motions, entered, floors, model)
     views, seen = [], []
     for record, motion, force, floor in zip(records, motions, entered, floors, strict=True):
         view = _view(record, force, band_hz)

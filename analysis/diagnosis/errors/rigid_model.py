@@ -13,7 +13,7 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.force_views import force_views
 from analysis.diagnosis.errors.needed_force import needed_force
 from analysis.diagnosis.errors.predicted_force import PredictedForce
-from analysis.diagnosis.settings import RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
+from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -71,6 +71,7 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
     loose, left_loose = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), aim)
     sprung = left < (1 - SPRING_SHARE) * left_loose
     mass, damping = ((matrix + matrix.T) / 2 for matrix in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
+    mass = mass + np.diag(np.maximum(_least_mass(shapes[:, :m], aim) - np.diagonal(mass), 0.0))
     stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
     # A body that pushes itself is no linear model; what makes it seem so is for the diagnosis.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
@@ -80,6 +81,11 @@ def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalMod
         RIGID_MASS_SHARE * largest[0], RIGID_SHARE * largest[1] or None, RIGID_SHARE * largest[2] or None, None
     )
     return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=open_)
+
+
+def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
+    """(m,): of bodies whose inertia shows in no force: no simulation goes without one."""
+    return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
 
 
 def _least_squares(shapes: FloatArray, aim: FloatArray) -> tuple[FloatArray, float]:

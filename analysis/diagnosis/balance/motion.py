@@ -1,0 +1,232 @@
+"""Positions, velocities and accelerations of what moves, and the forces on it, from one part of a recording.
+
+Differentiation is done line by line of the spectrum, below a band's end that is the highest at which the motion's
+white noise makes at most a hundredth of the acceleration's mean square: regression on a noisier acceleration would
+underestimate the mass by more (errors in variables; Soderstrom, Automatica 43:939, 2007).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, rfft, rfftfreq
+from scipy.signal import welch
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.types import Mask
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.band_limited import low_pass
+from equalizer.signals.recording import Hold, Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+NOISE_SHARE = 0.01
+"""Of the acceleration's mean square that the motion's noise may make: the bias of a mass, as a share of it."""
+WIDEST = 0.2
+"""The band's end at most, over the sample rate."""
+NARROWEST_CYCLES = 20.0
+"""The band's end at least, in cycles per recording."""
+OVERSAMPLED = 4.0
+"""Samples that are kept per period of the band's end."""
+EDGE = 0.5
+"""Periods of the band's end at either end of a part that the filter does not see whole."""
+
+
+class NoMotionError(ValueError):
+    """The recording holds no motion from which forces could be told."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """One part of a recording; all at the recording's rate, band-limited but for the force."""
+
+    rate_hz: float
+    band_hz: float
+    """Infinite where no time is known: then nothing is filtered, and there are no accelerations."""
+    step: int
+    """Every so many samples are kept after filtering."""
+    channels: tuple[str, ...]
+    order: int
+    """Derivative of the position that was measured: 0, 1 or 2."""
+    position: FloatArray
+    """(n, d): as measured, or the integral from the first sample on,"""
+    velocity: FloatArray
+    acceleration: FloatArray
+    force: FloatArray
+    """(n, m): as commanded or measured."""
+    condition: FloatArray
+    """(n, q): what was known beside, as deviation in standard deviations; q may be 0."""
+    fit: Mask
+    """(n,): to fit and to choose by,"""
+    test: Mask
+    """and only to look at in the end."""
+
+    def reduced(self, columns: FloatArray) -> FloatArray:
+        """(kept samples, k): columns (n, k) with what lies above the band taken off."""
+        if not np.isfinite(self.band_hz):
+            return columns
+        filtered = _filtered(columns, self.rate_hz, lambda f: low_pass(f, self.band_hz))
+        return filtered[:: self.step]
+
+    def kept(self, mask: Mask) -> Mask:
+        """Of the kept samples, those of a mask (n,) that the filter sees whole."""
+        edge = int(EDGE * self.rate_hz / self.band_hz) + 1
+        inside = np.zeros(len(mask), dtype=np.bool_)
+        inside[edge : len(mask) - edge] = True
+        return (mask & inside)[:: self.step]
+
+
+def moving_signal(recording: Recording) -> Signal | None:
+    """The measured motion of the lowest derivative, of one kind: positions before velocities before accelerations."""
+    found: list[tuple[int, Signal]] = []
+    for signal in (recording.position, recording.response):
+        if signal is None:
+            continue
+        orders = [DERIVATIVE_OF_QUANTITY.get(quantity) for quantity in signal.quantities]
+        known = [order for order in orders if order is not None]
+        if not known:
+            continue
+        lowest = min(known)
+        places = [k for k, order in enumerate(orders) if order == lowest and np.nanstd(signal.samples[:, k]) > 0]
+        if places:
+            found.append((lowest, _channels(signal, places)))
+    return min(found, key=lambda item: item[0])[1] if found else None
+
+
+def motions_of(records: Sequence[Observed], late_s: float = 0.0) -> tuple[Motion, ...]:
+    """late_s: by which the motion is read, or the force acts, later than the clock says. Raises NoMotionError where there is none. records: alike in channels, units and rate."""
+    signals = [moving_signal(one.recording) for one in records]
+    if not signals or any(signal is None for signal in signals):
+        raise NoMotionError("no response is a motion")
+    moved = [signal for signal in signals if signal is not None]
+    order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
+    rate_hz = records[0].recording.sample_rate_hz
+    filled = [_filled(signal.samples) for signal in moved]
+    untimed = any(one.recording.meta.get("time") == "unknown" for one in records)
+    band_hz = np.inf if untimed else _band_hz(filled, rate_hz, order)
+    conditions = _conditions(records)
+    return tuple(
+        _motion(record, (samples, order), (band_hz, late_s), condition, moved[0].channels)
+        for record, samples, condition in zip(records, filled, conditions, strict=True)
+    )
+
+
+def _motion(
+    record: Observed,
+    measured: tuple[FloatArray, int],
+    filter_: tuple[float, float],
+    condition: FloatArray,
+    names: tuple[str, ...],
+) -> Motion:
+    (samples, order), (band_hz, late_s) = measured, filter_
+    rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
+    # A held command is, over its time, centred half a sample after the reading.
+    early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
+    early_s += late_s
+    lowest_hz = 2 * rate_hz / len(samples) if order == 2 else 0.0
+    if not np.isfinite(band_hz):
+        return _untimed(record, samples, condition, names)
+    position, velocity, acceleration = (
+        _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
+    )
+    return Motion(
+        rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
+        acceleration, _filled(record.command), condition, record.fit | record.choose, record.test,
+    )  # fmt: skip
+
+
+def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]) -> Motion:
+    """Without a clock: positions, and which way each changes from sample to sample."""
+    return Motion(
+        record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
+        np.zeros_like(samples), _filled(record.command), condition, record.fit | record.choose, record.test,
+    )  # fmt: skip
+
+
+def _derivative(
+    samples: FloatArray, rate_hz: float, band: tuple[float, float], times: int, early_s: float
+) -> FloatArray:
+    """times: below zero, integrals; of an acceleration without what lies below the band's beginning."""
+    band_hz, lowest_hz = band
+    line, slope = _straight(samples, rate_hz)
+
+    def gain(frequency_hz: FloatArray) -> FloatArray:
+        turn = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
+        shaped = low_pass(frequency_hz, band_hz) * np.exp(turn * early_s)
+        if lowest_hz > 0:
+            shaped = shaped * (1 - low_pass(frequency_hz, lowest_hz))
+        return np.asarray(shaped * turn**times)
+
+    if times < 0 and lowest_hz == 0:
+        # A velocity: its integral goes on and on, which no finite number of lines holds.
+        smooth = _derivative(samples, rate_hz, band, 0, early_s)
+        return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
+    if times < 0:
+        return _filtered(samples, rate_hz, gain, straightened=False)
+    bent = _filtered(samples - line, rate_hz, gain, straightened=False)
+    if times == 0:
+        return bent + line + slope * early_s
+    return bent + slope if times == 1 else bent
+
+
+def _filtered(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
+    """Continued beyond both ends as an odd function about them."""
+    line = _straight(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
+    bent = samples - line
+    whole = np.concatenate([bent, -bent[-2:0:-1]])
+    spectrum = rfft(whole, axis=0)
+    lines = rfftfreq(len(whole), 1 / rate_hz)
+    return np.asarray(irfft(gain(lines)[:, None] * spectrum, len(whole), axis=0)[: len(samples)] + line)  # type: ignore[operator]
+
+
+def _straight(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    along = np.linspace(0.0, 1.0, len(samples))[:, None]
+    line = (1 - along) * samples[0] + along * samples[-1]
+    return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
+
+
+def _band_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
+    """The median over recordings and channels of the highest end that the noise allows."""
+    ends = [_end_hz(column, rate_hz, 2 * (2 - order)) for one in samples for column in one.T]
+    longest = max(len(one) for one in samples)
+    return float(np.clip(np.median(ends), NARROWEST_CYCLES * rate_hz / longest, WIDEST * rate_hz))
+
+
+def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
+    flat = column - np.linspace(column[0], column[-1], len(column))
+    frequency_hz, density = welch(flat, rate_hz, nperseg=min(len(flat), 4096))
+    frequency_hz, density = frequency_hz[1:], density[1:]
+    floor = float(np.median(density[3 * len(density) // 4 :]))
+    signal = np.cumsum(np.maximum(density - floor, 0.0) * frequency_hz**power)
+    noise = np.cumsum(floor * frequency_hz**power)
+    allowed = np.flatnonzero(noise <= NOISE_SHARE * signal)
+    return float(frequency_hz[allowed[-1]] if len(allowed) else frequency_hz[0])
+
+
+def _conditions(records: Sequence[Observed]) -> list[FloatArray]:
+    signals = [getattr(one.recording, "condition", None) for one in records]
+    if any(signal is None for signal in signals):
+        return [np.zeros((len(one.command), 0)) for one in records]
+    filled = [_filled(signal.samples) for signal in signals if signal is not None]
+    whole = np.vstack(filled)
+    spread = whole.std(axis=0)
+    told = spread > 0
+    return [(one[:, told] - whole.mean(axis=0)[told]) / spread[told] for one in filled]
+
+
+def _channels(signal: Signal, places: Sequence[int]) -> Signal:
+    return Signal(
+        signal.samples[:, list(places)], signal.sample_rate_hz, tuple(signal.quantities[k] for k in places),
+        tuple(signal.units[k] for k in places), tuple(signal.channels[k] for k in places),
+    )  # fmt: skip
+
+
+def _filled(samples: FloatArray) -> FloatArray:
+    """Straight across what is missing."""
+    whole, places = np.array(samples, dtype=np.float64), np.arange(len(samples))
+    for column in whole.T:
+        known = np.isfinite(column)
+        if known.any() and not known.all():
+            column[:] = np.interp(places, places[known], column[known])
+        elif not known.any():
+            column[:] = 0.0
+    return whole

@@ -1,0 +1,178 @@
+"""Sums of one to three laws that explain a force along a measured motion: a beam search over folds' errors."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.laws import Law, Scales, laws_of, likely_pitches, pitched, scales_of
+from analysis.diagnosis.balance.motion import Motion, NoMotionError
+from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of, with_law
+from analysis.diagnosis.types import Patience
+from equalizer.signals.signal import FloatArray
+
+MOST_LAWS = 3
+BEAM = 5
+"""Structures of each size that are taken further."""
+NOTICED = 0.02
+"""Share of the error power that a further law must take, over the folds; and in more folds than it adds to, by:"""
+SURE = 2.0
+"""standard errors of its mean gain over the folds."""
+REFINED = (0.8, 0.93, 1.075, 1.25)
+"""Factors by which nonlinear numbers are moved, as long as that helps."""
+ROUNDS = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Structure:
+    """Laws by their place in a regression, and each fold's sum of squares."""
+
+    laws: tuple[int, ...]
+    errors: FloatArray
+
+    @property
+    def error(self) -> float:
+        return float(self.errors.sum())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Searched:
+    regression: Regression
+    """With the final structures' own laws, refined, among its laws."""
+    linear: Structure
+    best: Structure
+    ranked: tuple[Structure, ...]
+    """The best structure of each set of effects, of all sizes, the best first."""
+    complete: bool
+    """The search was not ended early."""
+
+
+def search_structures(
+    motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], patient: Patience
+) -> Searched:
+    """without: effects that are not to be considered."""
+    if not any(one.kept(one.fit).any() for one in motions):
+        raise NoMotionError("too little of the motion is to be fitted to")
+    scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
+    turns = any(one.turns for one in scales)
+    laws = [law for law in laws_of(motions, rotational) if law.effect not in without]
+    first = regression_of(motions, axis, laws, turns)
+    if "cogging" not in without:
+        first = _with_pitches(first, scales, (), turns)
+        grown = _grown(first, [_linear(first)])
+        if grown:
+            first = _with_pitches(first, scales, grown[0].laws, turns)
+    linear = _linear(first)
+    beam, ranked, best = [linear], [linear], linear
+    for _ in range(MOST_LAWS):
+        if not patient():
+            break
+        grown = _grown(first, beam)
+        if not grown:
+            break
+        first = _refined(first, grown[:BEAM])
+        grown = [replace(one, errors=first.crossed(first.chosen(one.laws))) for one in grown]
+        ranked += grown
+        beam = sorted(grown, key=lambda one: one.error)[:BEAM]
+        if not better(best, beam[0]):
+            break
+        best = beam[0]
+    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda one: one.error)), patient())
+
+
+def better(plain: Structure, richer: Structure) -> bool:
+    """Whether the folds agree that more laws are worth it."""
+    gains = plain.errors - richer.errors
+    spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+    return richer.error < (1 - NOTICED) * plain.error and float(gains.sum()) > SURE * spread
+
+
+def _linear(regression: Regression) -> Structure:
+    return Structure((), regression.crossed(regression.chosen(())))
+
+
+def _grown(regression: Regression, beam: Sequence[Structure]) -> list[Structure]:
+    """Each with one law more, the best of each set of effects, the best first."""
+    found: dict[tuple[tuple[str, int], ...], Structure] = {}
+    for structure in beam:
+        held = {regression.laws[k].key for k in structure.laws}
+        for number, law in enumerate(regression.laws):
+            if law.key in held:
+                continue
+            laws = tuple(sorted((*structure.laws, number)))
+            grown = Structure(laws, regression.crossed(regression.chosen(laws)))
+            name = tuple(sorted(regression.laws[k].key for k in laws))
+            if name not in found or grown.error < found[name].error:
+                if _possible(regression, laws):
+                    found[name] = grown
+    return sorted(found.values(), key=lambda one: one.error)
+
+
+def _possible(regression: Regression, laws: Sequence[int]) -> bool:
+    return all(values is not None for values in values_of(regression, laws))
+
+
+def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, float] | None]:
+    """Each law's numbers with all of them fitted together; None where its signs are not physics."""
+    columns = regression.chosen(laws)
+    weights = regression.weights(columns)
+    mass, begin, found = float(weights[_mass_place(regression)]), regression.base, []
+    for number in laws:
+        law, place = regression.laws[number], regression.places[number]
+        count = place.stop - place.start
+        found.append(law.values(weights[begin : begin + count], law.numbers, mass))
+        begin += count
+    return found
+
+
+def _mass_place(regression: Regression) -> int:
+    return min(regression.axis, len(regression.motions[0].channels) - 1)
+
+
+def _with_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int], turns: bool) -> Regression:
+    """And with the pitches that the remainder of some laws shows."""
+    left = regression.remainder(regression.chosen(laws))
+    more = [
+        pitched(c, pitch, of)
+        for c, of in enumerate(scales)
+        for pitch in likely_pitches(regression.motions, left, c, of)
+    ]
+    return regression_of(regression.motions, regression.axis, (*regression.laws, *more), turns) if more else regression
+
+
+def _refined(regression: Regression, structures: Sequence[Structure]) -> Regression:
+    """The nonlinear numbers of the structures' laws moved to where the folds' errors are least, each law in the first
+    structure that has it."""
+    seen: set[int] = set()
+    for structure in structures:
+        for place, number in enumerate(structure.laws):
+            if number not in seen and regression.laws[number].bounded:
+                seen.add(number)
+                moved = with_law(regression, number, _moved(of_laws(regression, structure.laws), place))
+                regression = moved or regression
+    return regression
+
+
+def _moved(alone: Regression, place: int) -> Law:
+    laws = tuple(range(len(alone.laws)))
+    best = float(alone.crossed(alone.chosen(laws)).sum())
+    for _ in range(ROUNDS):
+        tried = []
+        for there in _neighbours(alone.laws[place]):
+            other = with_law(alone, place, there)
+            if other is not None and _possible(other, laws):
+                tried.append((float(other.crossed(other.chosen(laws)).sum()), other))
+        if not tried or min(tried, key=lambda one: one[0])[0] >= best * (1 - 1e-4):
+            break
+        best, alone = min(tried, key=lambda one: one[0])
+    return alone.laws[place]
+
+
+def _neighbours(law: Law) -> Iterator[Law]:
+    for place, (low, high) in enumerate(law.bounded):
+        fine = law.effect == "cogging"
+        for factor in REFINED:
+            value = law.numbers[place] * (1 + (factor - 1) * (0.05 if fine else 1.0))
+            if low <= value <= high:
+                numbers = (*law.numbers[:place], float(value), *law.numbers[place + 1 :])
+                yield replace(law, numbers=numbers)

@@ -1,0 +1,245 @@
+"""Which laws of a force balance earn a name: by what they take of the error on samples that nothing was fitted to.
+
+No real device is within its sensors' noise of any model, so that nothing is asked of a remainder in units of noise. A
+law is judged by its gain on held-out blocks against the same sum of laws without it, with an interval from resampled
+blocks (Kunsch, Ann. Stat. 17:1217, 1989), against the best rival in its place, and by the share that it takes of what
+all laws together could (a ceiling). Laws that cannot be told apart on these blocks are returned as a class.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from analysis.diagnosis.balance.laws import Law
+from analysis.diagnosis.balance.regression import Block, Regression, of_everything
+from analysis.diagnosis.balance.structures import Searched, Structure, values_of
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.signals.signal import FloatArray
+
+PLAIN = 0.1
+"""Share of what the best structure takes of the linear model's error that a plainer one may leave to be preferred."""
+CEILING = 0.5
+"""Share of what all laws together take of it that the named ones must reach, so that a name tells the main story;"""
+SMALL = 0.05
+"""and of which each must take so much."""
+ALMOST = 0.15
+"""Share of a law's gain by which a rival in its place must stay behind to be told from it."""
+DRAWS, SEED, LEVEL = 2000, 1, 0.025
+MOST_ALIKE = 4
+"""Effects of a class; more of them tell nothing."""
+LEAST_BLOCKS = 4
+FAMILIES = (
+    {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
+     "position_dependent_friction", "quadratic_damping"},
+    {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
+)  # fmt: skip
+"""Effects that may stand in one class: they act alike. Of different families, none is named."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighed:
+    """One law, as a reader would judge it."""
+
+    place: int
+    """In the regression."""
+    law: Law
+    values: dict[str, float]
+    gain: float
+    """Share of the held-out error power that goes with it, beside the other laws;"""
+    gain_low: float
+    """its lower end, at 97.5 %."""
+    share: float
+    """Of what all laws together take of the linear model's error."""
+    alike: tuple[str, ...]
+    """Effects that do as well in its place."""
+    probability: float
+    """Share of resampled blocks in which none of them leaves less."""
+    why_not: str
+    """Empty where it is to be named."""
+
+    @property
+    def named(self) -> bool:
+        return not self.why_not
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Balance:
+    """What a recording's forces say along one axis."""
+
+    searched: Searched
+    chosen: Structure
+    laws: tuple[Weighed, ...]
+    """Of the chosen structure, the largest gain first,"""
+    others: tuple[Weighed, ...]
+    """and others that would take some of what it leaves, or that came next."""
+    linear: float
+    """Held-out error of mass, damping and stiffness alone, over the signal's rms;"""
+    error: float
+    """of the chosen structure;"""
+    ceiling: float
+    """and of all laws together."""
+    complete: bool
+
+    @property
+    def named(self) -> tuple[Weighed, ...]:
+        return tuple(one for one in self.laws if one.named)
+
+
+def weigh(searched: Searched) -> Balance:
+    regression = searched.regression
+    chosen = _plainest(searched)
+    held = _held_out(regression, chosen.laws)
+    linear = _held_out(regression, ())
+    ceiling = _ceiling(regression, held)
+    room = max(float(linear.sum() - ceiling), 1e-300)
+    told = 1 - float(held.sum() - ceiling) / room
+    laws = [_weighed(regression, chosen.laws, number, (held, room, told)) for number in chosen.laws]
+    others = _others(regression, searched, chosen, (held, room))
+    size = max(sum(block.signal for block in _judging(regression)), 1e-300)
+    rms = [float(np.sqrt(error / size)) for error in (linear.sum(), held.sum(), ceiling)]
+    ordered = tuple(sorted(laws, key=lambda each: -each.gain))
+    return Balance(searched, chosen, ordered, others, rms[0], rms[1], rms[2], searched.complete)
+
+
+def _plainest(searched: Searched) -> Structure:
+    """The structure of fewest numbers that leaves hardly more than the best."""
+    allowed = searched.best.error + PLAIN * (searched.linear.error - searched.best.error)
+    enough = [one for one in searched.ranked if one.error <= allowed]
+    return min(enough, key=lambda one: (_numbers(searched.regression, one), one.error), default=searched.linear)
+
+
+def _numbers(regression: Regression, structure: Structure) -> int:
+    """The width within which a dry friction turns round counts for none."""
+    count = 0
+    for number in structure.laws:
+        law, place = regression.laws[number], regression.places[number]
+        count += place.stop - place.start + (0 if law.effect == "coulomb_friction" else len(law.numbers))
+    return count
+
+
+def _judging(regression: Regression) -> tuple[Block, ...]:
+    return regression.test if len(regression.test) >= LEAST_BLOCKS else regression.fit
+
+
+def _held_out(regression: Regression, laws: Sequence[int]) -> FloatArray:
+    columns = regression.chosen(laws)
+    return regression.held_out(columns) if len(regression.test) >= LEAST_BLOCKS else regression.crossed(columns)
+
+
+def _ceiling(regression: Regression, held: FloatArray) -> float:
+    """No more than what the chosen structure leaves."""
+    crossed, blocks = of_everything(regression, range(regression.columns[0].shape[1]))
+    whole = float(blocks.sum()) if len(regression.test) >= LEAST_BLOCKS else crossed
+    return min(whole, float(held.sum()))
+
+
+def _weighed(
+    regression: Regression, laws: Sequence[int], number: int, against: tuple[FloatArray, float, float]
+) -> Weighed:
+    held, room, told = against
+    rest = tuple(each for each in laws if each != number)
+    without = _held_out(regression, rest)
+    gain, low = _gain(without, held)
+    share = float((without - held).sum()) / room
+    law = regression.laws[number]
+    values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
+    alike, likely = _alike(regression, rest, number, (without, held))
+    why_not = _why_not(law, values, (gain, low, share, told), alike)
+    return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not)
+
+
+def _gain(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
+    """Share of the error power that goes, and its lower end, from resampled blocks."""
+    whole = max(float(without.sum()), 1e-300)
+    drawn = _drawn(len(without))
+    shares = 1 - with_it[drawn].sum(axis=1) / np.maximum(without[drawn].sum(axis=1), 1e-300)
+    return float(1 - with_it.sum() / whole), float(np.quantile(shares, LEVEL))
+
+
+def _plainer(effect: str) -> tuple[str, ...]:
+    """What a law holds as a special case: beside that it always leaves less."""
+    return EFFECTS[effect].simpler if effect in EFFECTS else ()
+
+
+def _drawn(blocks: int) -> npt.NDArray[np.int64]:
+    return np.random.default_rng(SEED).integers(blocks, size=(DRAWS, blocks))
+
+
+def _alike(
+    regression: Regression, rest: tuple[int, ...], number: int, errors: tuple[FloatArray, FloatArray]
+) -> tuple[tuple[str, ...], float]:
+    """Effects that leave hardly more in a law's place, and how often none of them leaves less."""
+    without, held = errors
+    own = regression.laws[number]
+    found: dict[str, tuple[float, tuple[int, ...]]] = {}
+    for place, law in enumerate(regression.laws):
+        if law.effect == own.effect or law.linear or (own.linear and not law.linear):
+            continue
+        laws = (*rest, place)
+        if any(regression.laws[k].key == law.key for k in rest) or values_of(regression, laws)[-1] is None:
+            continue
+        crossed = float(regression.crossed(regression.chosen(laws)).sum())
+        if law.effect not in found or crossed < found[law.effect][0]:
+            found[law.effect] = crossed, laws
+    gained = float((without - held).sum())
+    alike, drawn = [], _drawn(len(held))
+    first = np.ones(DRAWS, dtype=np.bool_)
+    for effect, (_, laws) in found.items():
+        behind = _held_out(regression, laws) - held
+        if own.effect not in _plainer(effect):
+            first &= behind[drawn].sum(axis=1) >= 0
+        if float(behind.sum()) <= ALMOST * gained:
+            alike.append((float(behind.sum()), effect))
+    return tuple(effect for _, effect in sorted(alike)), float(first.mean())
+
+
+def _why_not(
+    law: Law, values: dict[str, float] | None, numbers: tuple[float, float, float, float], alike: tuple[str, ...]
+) -> str:
+    """A sentence; empty where it is to be named."""
+    _, low, share, told = numbers
+    if law.linear:
+        return "a linear model of a higher order: part of the first model, no missing physics"
+    if values is None:
+        return "its numbers have signs that such physics cannot have"
+    if low <= 0:
+        return "its gain on held-out data is not larger than what varies between stretches"
+    if share < SMALL:
+        return f"it takes {100 * share:.1f} % of what all laws together take"
+    if told < CEILING:
+        return f"with it, {100 * (1 - told):.0f} % of what all laws together take are left: the main part is another"
+    family = next((one for one in FAMILIES if law.effect in one), {law.effect})
+    strange = [effect for effect in alike if effect not in family]
+    others = [effect for effect in alike if law.effect not in _plainer(effect)]
+    if strange or len(others) >= MOST_ALIKE:
+        return f"these data cannot tell it from {', '.join(strange or alike)}"
+    return "" if law.effect in EFFECTS_BY_NAME else "no simulation of ours plays it yet"
+
+
+def _others(
+    regression: Regression, searched: Searched, chosen: Structure, against: tuple[FloatArray, float]
+) -> tuple[Weighed, ...]:
+    """The best further law of each effect beside the chosen structure, the largest gain first."""
+    held, room = against
+    effects = {regression.laws[k].effect for k in chosen.laws}
+    best: dict[str, tuple[float, int]] = {}
+    for number, law in enumerate(regression.laws):
+        if law.effect in effects or values_of(regression, (*chosen.laws, number))[-1] is None:
+            continue
+        error = float(regression.crossed(regression.chosen((*chosen.laws, number))).sum())
+        if law.effect not in best or error < best[law.effect][0]:
+            best[law.effect] = error, number
+    found = []
+    for _, number in sorted(best.values())[:8]:
+        laws = (*chosen.laws, number)
+        errors = _held_out(regression, laws)
+        gain, low = _gain(held, errors)
+        values = values_of(regression, laws)[-1] or {}
+        share = float((held - errors).sum()) / room
+        why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"
+        if gain > 0 and low > 0:
+            found.append(Weighed(number, regression.laws[number], values, gain, low, share, (), 0.0, why))
+    return tuple(sorted(found, key=lambda each: -each.gain))
