@@ -60,7 +60,8 @@ def diagnose(
         for number, look in enumerate(_looks(recordings, model, balances)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             arena = _arena(look, settings, map_)
-            found = searched_by_balance(arena, balances)
+            repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
+            found = searched_by_balance(arena, balances, repeats)
             if found is not None:
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)

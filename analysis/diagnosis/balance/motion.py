@@ -93,7 +93,8 @@ def moving_signal(recording: Recording) -> Signal | None:
 
 
 def motions_of(records: Sequence[Observed], late_s: float = 0.0) -> tuple[Motion, ...]:
-    """late_s: by which the motion is read, or the force acts, later than the clock says. Raises NoMotionError where there is none. records: alike in channels, units and rate."""
+    """late_s: by which the motion is read, or the force acts, later than the clock says. records: alike in channels,
+    units and rate. Raises NoMotionError where there is none."""
     signals = [moving_signal(one.recording) for one in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a motion")

@@ -1,8 +1,8 @@
 """Products of all laws' columns, block by block, from which any sum of laws is fitted and tested without new passes.
 
-The base of each balance is mass, damping and stiffness along every measured motion and a constant. Errors are those of
-the force within the band. A fold's error is that of numbers fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111,
-1974).
+The base of each balance is mass, damping and stiffness along every measured motion and a constant. Errors are those
+of the force within the band. A fold's error is that of numbers fitted to all other folds (Stone, J. R. Stat. Soc. B
+36:111, 1974).
 """
 
 from collections.abc import Sequence
@@ -10,38 +10,25 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from analysis.diagnosis.balance.laws import Law
+from analysis.diagnosis.balance.blocks import (
+    RIDGE,
+    Block,
+    blocks_of,
+    column_scale,
+    error_of,
+    part_of_block,
+    shrunk,
+    solved,
+    total,
+)
+from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
-FOLDS = 8
-"""Blocks of the samples to fit, and as many of those to test by, at least."""
-MOST_SAMPLES = 20_000
-"""That numbers are fitted to, and as many to test by: of each block, the first."""
-_RIDGE = 1e-10
-"""Of a column's own power, against columns that are the same."""
 RIDGES = tuple(10.0**exponent for exponent in range(-8, 1))
 """Of the mean power of a column: shrinkages of the sum of all laws, of which folds choose."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Block:
-    """A stretch of samples: products of columns with themselves and with the force."""
-
-    gram: FloatArray
-    """(k, k)"""
-    pull: FloatArray
-    """(k,)"""
-    power: float
-    """Sum of squares of the force,"""
-    signal: float
-    """and of what it differs by from its mean over all that is fitted."""
-    motion: int
-    rows: npt.NDArray[np.intp]
-    """Of the motion's kept samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,22 +60,22 @@ class Regression:
 
     def weights(self, columns: Sequence[int]) -> FloatArray:
         """(len(columns),): fitted to all blocks to fit, in the columns' own units."""
-        return np.asarray(self._fitted(_total(self.fit, columns)) / self.scale[list(columns)])
+        return np.asarray(self._fitted(total(self.fit, columns)) / self.scale[list(columns)])
 
     def crossed(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each block's sum of squares with numbers fitted to the others."""
-        whole = _total(self.fit, columns)
+        whole = total(self.fit, columns)
         found = []
         for block in self.fit:
-            own = _of(block, columns)
+            own = part_of_block(block, columns)
             rest = (whole[0] - own[0], whole[1] - own[1])
-            found.append(_error(own, self._fitted(rest), block.power))
+            found.append(error_of(own, self._fitted(rest), block.power))
         return np.array(found)
 
     def held_out(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each test block's sum of squares."""
-        found = self._fitted(_total(self.fit, columns))
-        return np.array([_error(_of(block, columns), found, block.power) for block in self.test])
+        found = self._fitted(total(self.fit, columns))
+        return np.array([error_of(part_of_block(block, columns), found, block.power) for block in self.test])
 
     def _fitted(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Least squares in which the axis has no mass and no damping below zero."""
@@ -96,7 +83,7 @@ class Regression:
         found = np.zeros(len(products[1]))
         for _ in self.positive:
             found[:] = 0.0
-            found[free] = _solved((products[0][np.ix_(free, free)], products[1][free]), _RIDGE)
+            found[free] = solved((products[0][np.ix_(free, free)], products[1][free]), RIDGE)
             below = [place for place in self.positive if found[place] < 0]
             if not below:
                 break
@@ -127,13 +114,13 @@ def regression_of(motions: Sequence[Motion], axis: int, laws: Sequence[Law], tur
             begin = places[-1].stop
     rows = tuple(np.hstack([part[k] for part in parts]) for k in range(len(motions)))
     fit = [one.kept(one.fit) for one in motions]
-    scale = _scale(rows, fit)
+    scale = column_scale(rows, fit)
     test = [one.kept(one.test) for one in motions]
     mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
     d, own = len(motions[0].channels), min(axis, len(motions[0].channels) - 1)
     return Regression(
         tuple(motions), axis, tuple(kept), base, (own, d + own, own), tuple(places), scale, rows, tuple(aims),
-        _blocks(rows, aims, fit, (scale, mean)), _blocks(rows, aims, test, (scale, mean)),
+        blocks_of(rows, aims, fit, (scale, mean)), blocks_of(rows, aims, test, (scale, mean)),
     )  # fmt: skip
 
 
@@ -145,20 +132,22 @@ def of_everything(regression: Regression, columns: Sequence[int]) -> tuple[float
     """All of these columns together, shrunk towards the base alone as much as folds ask for: its crossed error, and
     each test block's. What no sum of a few laws should be expected to beat: a ceiling."""
     free = np.array([k < regression.base for k in columns])
-    whole = _total(regression.fit, columns)
+    whole = total(regression.fit, columns)
 
     def crossed(ridge: float) -> float:
-        total = 0.0
+        squares = 0.0
         for block in regression.fit:
-            own = _of(block, columns)
-            shrunk = _shrunk((whole[0] - own[0], whole[1] - own[1]), ridge, free)
-            total += _error(own, shrunk, block.power)
-        return total
+            own = part_of_block(block, columns)
+            weights = shrunk((whole[0] - own[0], whole[1] - own[1]), ridge, free)
+            squares += error_of(own, weights, block.power)
+        return squares
 
     errors = [crossed(ridge) for ridge in RIDGES]
     best = int(np.argmin(errors))
-    found = _shrunk(whole, RIDGES[best], free)
-    return errors[best], np.array([_error(_of(block, columns), found, block.power) for block in regression.test])
+    found = shrunk(whole, RIDGES[best], free)
+    return errors[best], np.array(
+        [error_of(part_of_block(block, columns), found, block.power) for block in regression.test]
+    )
 
 
 def _base(motion: Motion, turns: bool) -> FloatArray:
@@ -170,56 +159,6 @@ def _base(motion: Motion, turns: bool) -> FloatArray:
 def _seen(columns: Sequence[FloatArray]) -> Mask:
     size = np.sqrt(np.mean(np.vstack(columns) ** 2, axis=0))
     return np.asarray(size > 1e-12 * max(float(size.max(initial=0.0)), 1e-290))
-
-
-def _scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
-    size = np.sqrt(np.mean(np.vstack([r[mask] for r, mask in zip(rows, fit, strict=True)]) ** 2, axis=0))
-    return np.where(size > 0, size, 1.0)
-
-
-def _blocks(
-    rows: Sequence[FloatArray], aims: Sequence[FloatArray], masks: Sequence[Mask], units: tuple[FloatArray, float]
-) -> tuple[Block, ...]:
-    scale, mean = units
-    total = sum(int(mask.sum()) for mask in masks)
-    found = []
-    share = min(1.0, MOST_SAMPLES / max(total, 1))
-    for number, (columns, aim, mask) in enumerate(zip(rows, aims, masks, strict=True)):
-        places = np.flatnonzero(mask)
-        count = int(np.clip(round(2 * FOLDS * len(places) / max(total, 1)), 1, len(places) or 1))
-        for whole in np.array_split(places, count) if len(places) else []:
-            part = whole[: max(int(share * len(whole)), 1)]
-            x, y = columns[part] / scale, aim[part]
-            found.append(Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), number, part))
-    return tuple(found)
-
-
-def _of(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    at = list(columns)
-    return block.gram[np.ix_(at, at)], block.pull[at]
-
-
-def _total(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    at = list(columns)
-    gram = sum((block.gram[np.ix_(at, at)] for block in blocks), np.zeros((len(at), len(at))))
-    pull = sum((block.pull[at] for block in blocks), np.zeros(len(at)))
-    return np.asarray(gram), np.asarray(pull)
-
-
-def _solved(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
-    gram, pull = products
-    return np.asarray(np.linalg.solve(gram + np.diag(ridge * np.diagonal(gram) + 1e-300), pull))
-
-
-def _shrunk(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
-    gram, pull = products
-    size = float(np.trace(gram)) / len(gram)
-    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, _RIDGE, ridge) * size), pull))
-
-
-def _error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
-    gram, pull = own
-    return max(power - 2 * float(weights @ pull) + float(weights @ gram @ weights), 0.0)
 
 
 def with_law(regression: Regression, number: int, law: Law) -> Regression | None:
@@ -235,7 +174,7 @@ def with_law(regression: Regression, number: int, law: Law) -> Regression | None
         for old, new in zip(regression.columns, columns, strict=True)
     )
     scale = regression.scale.copy()
-    scale[place] = _scale(columns, [one.kept(one.fit) for one in regression.motions])
+    scale[place] = column_scale(columns, [one.kept(one.fit) for one in regression.motions])
     laws = (*regression.laws[:number], law, *regression.laws[number + 1 :])
     changed = replace(regression, laws=laws, columns=rows, scale=scale)
     return replace(

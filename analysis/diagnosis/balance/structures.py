@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.laws import Law, Scales, laws_of, likely_pitches, pitched, scales_of
+from analysis.diagnosis.balance.law import Law, Scales, scales_of
+from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of, with_law
 from analysis.diagnosis.types import Patience
@@ -102,9 +103,8 @@ def _grown(regression: Regression, beam: Sequence[Structure]) -> list[Structure]
             laws = tuple(sorted((*structure.laws, number)))
             grown = Structure(laws, regression.crossed(regression.chosen(laws)))
             name = tuple(sorted(regression.laws[k].key for k in laws))
-            if name not in found or grown.error < found[name].error:
-                if _possible(regression, laws):
-                    found[name] = grown
+            if (name not in found or grown.error < found[name].error) and _possible(regression, laws):
+                found[name] = grown
     return sorted(found.values(), key=lambda one: one.error)
 
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.balance.laws import Law
-from analysis.diagnosis.balance.regression import Block, Regression, of_everything
+from analysis.diagnosis.balance.blocks import Block
+from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.regression import Regression, of_everything
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME

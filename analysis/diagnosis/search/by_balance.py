@@ -15,7 +15,7 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.search.explain import Explanation, retuned_alone
+from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.rivalry import Arena, Contender, refine
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise
@@ -42,16 +42,21 @@ def balances_of(recordings: Sequence[Recording], without: frozenset[str], patien
         return ()
 
 
-def searched_by_balance(arena: Arena, balances: Sequence[Balance]) -> Searched | None:
-    """None where nothing is named, or where simulations do not bear it out."""
+def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool) -> Searched | None:
+    """repeats: the noise is known from what repeats; else nothing counts as explained. None where nothing is named, or
+    where simulations do not bear it out."""
     named = [
-        (axis, one) for axis, balance in enumerate(balances) for one in balance.named if _plays(axis, one.law, one)
+        (axis, law)
+        for axis, balance in enumerate(balances)
+        for law in balance.named
+        if law.law.effect != CONSTANT and _plays(axis, law)
     ]
     if not named:
         return None
     constant, start = _constants(balances), _zeros(arena)
-    before = arena.confirmed(arena.contender(evaluated(arena.measure, arena.tuning, start, constant)))
-    retuned = arena.contender(refine(arena, before.fitted if constant.claims else retuned_alone(arena)))
+    given = evaluated(arena.measure, arena.tuning, start, constant)
+    before = arena.confirmed(arena.contender(given))
+    retuned = arena.contender(refine(arena, given))
     steps: list[Contender] = [retuned for _ in constant.claims]
     whole, deviations = retuned.fitted.hypothesis, _released(arena.tuning, balances)
     for axis, law in named:
@@ -63,7 +68,8 @@ def searched_by_balance(arena: Arena, balances: Sequence[Balance]) -> Searched |
     if not _borne_out(arena, ends[1], ends[2]):
         return None
     explained = Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
-    whole_story = as_good_as_noise(explained) and not np.nanmax(ends[2].standing.test, initial=0.0) > HELD_OUT_ERROR
+    whole_story = repeats and as_good_as_noise(explained)
+    whole_story = whole_story and not np.nanmax(ends[2].standing.test, initial=0.0) > HELD_OUT_ERROR
     return Searched(arena, explained, Judgement("explained" if whole_story else "partly_explained", True))
 
 

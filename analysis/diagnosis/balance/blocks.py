@@ -1,0 +1,84 @@
+"""Blocks of samples by their products, which are all that least squares needs of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from analysis.diagnosis.types import Mask
+from equalizer.signals.signal import FloatArray
+
+FOLDS = 8
+"""Blocks of the samples to fit, and as many of those to test by, at least."""
+MOST_SAMPLES = 20_000
+"""That numbers are fitted to, and as many to test by: of each block, the first."""
+RIDGE = 1e-10
+"""Of a column's own power, against columns that are the same."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """A stretch of samples: products of columns with themselves and with the force."""
+
+    gram: FloatArray
+    """(k, k)"""
+    pull: FloatArray
+    """(k,)"""
+    power: float
+    """Sum of squares of the force,"""
+    signal: float
+    """and of what it differs by from its mean over all that is fitted."""
+    motion: int
+    rows: npt.NDArray[np.intp]
+    """Of the motion's kept samples."""
+
+
+def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
+    size = np.sqrt(np.mean(np.vstack([r[mask] for r, mask in zip(rows, fit, strict=True)]) ** 2, axis=0))
+    return np.where(size > 0, size, 1.0)
+
+
+def blocks_of(
+    rows: Sequence[FloatArray], aims: Sequence[FloatArray], masks: Sequence[Mask], units: tuple[FloatArray, float]
+) -> tuple[Block, ...]:
+    scale, mean = units
+    total = sum(int(mask.sum()) for mask in masks)
+    found = []
+    share = min(1.0, MOST_SAMPLES / max(total, 1))
+    for number, (columns, aim, mask) in enumerate(zip(rows, aims, masks, strict=True)):
+        places = np.flatnonzero(mask)
+        count = int(np.clip(round(2 * FOLDS * len(places) / max(total, 1)), 1, len(places) or 1))
+        for whole in np.array_split(places, count) if len(places) else []:
+            part = whole[: max(int(share * len(whole)), 1)]
+            x, y = columns[part] / scale, aim[part]
+            found.append(Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), number, part))
+    return tuple(found)
+
+
+def part_of_block(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    at = list(columns)
+    return block.gram[np.ix_(at, at)], block.pull[at]
+
+
+def total(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    at = list(columns)
+    gram = sum((block.gram[np.ix_(at, at)] for block in blocks), np.zeros((len(at), len(at))))
+    pull = sum((block.pull[at] for block in blocks), np.zeros(len(at)))
+    return np.asarray(gram), np.asarray(pull)
+
+
+def solved(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
+    gram, pull = products
+    return np.asarray(np.linalg.solve(gram + np.diag(ridge * np.diagonal(gram) + 1e-300), pull))
+
+
+def shrunk(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
+    gram, pull = products
+    size = float(np.trace(gram)) / len(gram)
+    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge) * size), pull))
+
+
+def error_of(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
+    gram, pull = own
+    return max(power - 2 * float(weights @ pull) + float(weights @ gram @ weights), 0.0)

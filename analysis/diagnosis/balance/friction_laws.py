@@ -1,0 +1,107 @@
+"""Dry friction and damping along one measured motion, over grids of speeds, widths and time constants."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import (
+    Columns,
+    Law,
+    Numbers,
+    Scales,
+    named,
+    positive,
+    relative_time,
+    sliding,
+    through_lines,
+)
+from analysis.diagnosis.balance.motion import Motion
+from equalizer.effects.bristle_kernel import bent
+from equalizer.signals.signal import FloatArray
+
+SHARP = 0.01
+"""Of the rms speed: within which a dry friction's sign turns round, where nothing shows a wider one."""
+
+
+def friction_laws(c: int, of: Scales) -> Iterator[Law]:
+    sharp = SHARP * of.speed
+    spans = ((0.1 * sharp, 0.5 * of.speed),)
+    for width in sharp * np.geomspace(1.0, 50.0, 7):
+        yield Law(
+            "coulomb_friction", c, (float(width),), lambda m, n: sliding(m.velocity[:, c : c + 1], n[0]),
+            positive("level"), bounded=spans,
+        )  # fmt: skip
+    for slow in of.speed * np.geomspace(0.03, 1.5, 7):
+        yield Law("stribeck_friction", c, (float(slow),), _stribeck(c, sharp), _stribeck_values, bounded=spans)
+    widths = np.geomspace(0.003, 0.5, 7) if of.turns else of.travel * np.geomspace(0.001, 0.3, 9)
+    for width in widths:
+        yield Law(
+            "presliding_hysteresis", c, (float(width),), lambda m, n: bent(m.position[:, c], n[0])[:, None],
+            _presliding_values, bounded=((0.1 * widths[0], widths[-1]),),
+        )  # fmt: skip
+    yield Law("asymmetric_friction", c, (), _asymmetric(c, sharp), _asymmetric_values)
+    if np.isfinite(of.band_hz):
+        yield Law(
+        "drifting_friction", c, (), lambda m, _: sliding(m.velocity[:, [c]], sharp) * relative_time(m), named("change"),
+    )  # fmt: skip
+    if not of.turns:
+        yield Law("position_dependent_friction", c, (), _position_dependent(c, sharp), _position_dependent_values)
+
+
+def _stribeck(c: int, sharp: float) -> Columns:
+    def columns(m: Motion, n: Numbers) -> FloatArray:
+        v = m.velocity[:, c : c + 1]
+        return np.hstack([sliding(v, sharp), sliding(v, sharp) * np.exp(-((v / n[0]) ** 2))])
+
+    return columns
+
+
+def _stribeck_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    if w[0] <= 0 or w[1] <= 0:
+        return None
+    return {"coulomb": float(w[0]), "static": float(w[0] + w[1]), "speed": n[0]}
+
+
+def _presliding_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    return {"level": float(w[0]), "stiffness": float(w[0] / n[0])} if w[0] > 0 else None
+
+
+def _asymmetric(c: int, sharp: float) -> Columns:
+    return lambda m, _: np.hstack(
+        [np.maximum(sliding(m.velocity[:, [c]], sharp), 0.0), np.minimum(sliding(m.velocity[:, [c]], sharp), 0.0)]
+    )
+
+
+def _asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    return {"level_positive": float(w[0]), "level_negative": float(w[1])} if w.min() > 0 else None
+
+
+def _position_dependent(c: int, sharp: float) -> Columns:
+    def columns(m: Motion, _: Numbers) -> FloatArray:
+        rubbing, q = sliding(m.velocity[:, [c]], sharp), m.position[:, [c]]
+        return np.hstack([rubbing, rubbing * q, rubbing * q**2])
+
+    return columns
+
+
+def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    if w[0] <= 0:
+        return None
+    return {"level": float(w[0]), "slope_per_m": float(w[1] / w[0]), "bend_per_m2": float(w[2] / w[0])}
+
+
+def damping_laws(c: int, of: Scales) -> Iterator[Law]:
+    yield Law(
+        "quadratic_damping", c, (), lambda m, _: m.velocity[:, [c]] * np.abs(m.velocity[:, [c]]),
+        positive("coefficient"),
+    )  # fmt: skip
+    yield Law("drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * relative_time(m), named("change"))
+    if not np.isfinite(of.band_hz):
+        return
+    for tau in np.geomspace(0.5 / of.band_hz, of.seconds / 10, 7):
+        yield Law(
+            "viscoelastic_relaxation", c, (float(tau),),
+            lambda m, n: through_lines(m.velocity[:, [c]], m.rate_hz, lambda s: n[0] / (1 + n[0] * s)),
+            lambda w, n, mass: {"stiffness": float(w[0]), "time_constant": n[0]} if w[0] > 0 else None,
+            linear=True, bounded=((0.1 / of.band_hz, of.seconds / 4),),
+        )  # fmt: skip

@@ -1,0 +1,90 @@
+"""A term of a force balance: its columns along a measured motion, and the parameters that its weights stand for."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, rfft, rfftfreq
+
+from analysis.diagnosis.balance.motion import Motion
+from equalizer.signals.signal import FloatArray
+
+Numbers = tuple[float, ...]
+"""Nonlinear numbers: speeds, pitches, time constants; in SI."""
+Columns = Callable[[Motion, Numbers], FloatArray]
+"""(n, weights)"""
+Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
+"""Of weights (weights,), nonlinear numbers and the moving mass: the effect's parameters; None where no such physics has
+these signs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Law:
+    effect: str
+    """A name of the vocabulary, or one written like them for physics that it lacks."""
+    channel: int
+    """Of the motion; -1 = none."""
+    numbers: Numbers
+    columns: Columns
+    values: Values
+    linear: bool = False
+    """In the motion: a linear model of a higher order could take its place."""
+    bounded: tuple[tuple[float, float], ...] = ()
+    """Between which each nonlinear number stays."""
+
+    @property
+    def key(self) -> tuple[str, int]:
+        return self.effect, self.channel
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """Of one channel's motion where it is fitted."""
+
+    speed: float
+    """rms"""
+    travel: float
+    """From end to end,"""
+    low: float
+    high: float
+    seconds: float
+    band_hz: float
+    turns: bool
+    """It goes round and round, so that no position is special but within a turn."""
+    rotational: bool
+
+
+def scales_of(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
+    position = np.concatenate([one.position[one.fit, channel] for one in motions])
+    velocity = np.concatenate([one.velocity[one.fit, channel] for one in motions])
+    low, high = float(position.min()), float(position.max())
+    seconds = sum(int(one.fit.sum()) for one in motions) / motions[0].rate_hz
+    speed = float(np.sqrt(np.mean(velocity**2)))
+    turns = rotational and high - low > 4 * np.pi
+    return Scales(speed, high - low, low, high, seconds, motions[0].band_hz, turns, rotational)
+
+
+def relative_time(motion: Motion) -> FloatArray:
+    """(n, 1): from -1 to 1 over the part."""
+    return np.linspace(-1.0, 1.0, len(motion.force))[:, None]
+
+
+def sliding(velocity: FloatArray, width: float) -> FloatArray:
+    """The sign of a velocity, turned round within `width` of standstill."""
+    return np.asarray(np.tanh(velocity / width))
+
+
+def named(*names: str) -> Values:
+    return lambda w, n, mass: dict(zip(names, map(float, w), strict=True))
+
+
+def positive(name: str) -> Values:
+    return lambda w, n, mass: {name: float(w[0])} if w[0] > 0 else None
+
+
+def through_lines(samples: FloatArray, rate_hz: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """A causal linear filter from rest, by lines; padded by as much again, so that its memory does not wrap round."""
+    count = len(samples)
+    spectrum = rfft(samples, 2 * count, axis=0)
+    s = 2j * np.pi * rfftfreq(2 * count, 1 / rate_hz)
+    return np.asarray(irfft(gain(s)[:, None] * spectrum, 2 * count, axis=0)[:count])

@@ -1,0 +1,83 @@
+"""Springs that are not linear, stops, play, weight on a lever, and linear dynamics of a higher order."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import Columns, Law, Numbers, Scales, named, through_lines
+from analysis.diagnosis.balance.motion import Motion
+from equalizer.signals.signal import FloatArray
+
+
+def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
+    yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, named("k3"))
+    yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, named("k2"))
+    for share in (0.02, 0.05, 0.1, 0.2):
+        for end, side in ((of.high - share * of.travel, 1.0), (of.low + share * of.travel, -1.0)):
+            yield Law(
+                "end_stop", c, (float(end),),
+                _beyond(c, side),
+                lambda w, n, mass: {"position": n[0], "stiffness": float(w[0])} if w[0] > 0 else None,
+            )  # fmt: skip
+    for half in of.travel * np.geomspace(0.01, 0.3, 6):
+        yield Law(
+            "backlash", c, (float(half),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
+            lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
+            bounded=((1e-3 * of.travel, 0.45 * of.travel),),
+        )  # fmt: skip
+    if of.rotational and of.travel > 0.5:
+        yield Law(
+            "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
+            lambda w, n, mass: {"torque": float(np.hypot(*w)), "angle": float(np.arctan2(w[1], w[0]))},
+        )  # fmt: skip
+
+
+def _beyond(c: int, side: float) -> Columns:
+    return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - n[0]), 0.0)
+
+
+def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
+    if not of.turns:
+        yield Law(
+            "pose_dependent_inertia", c, (),
+            lambda m, _: m.position[:, [c]] * m.acceleration[:, [c]] + 0.5 * m.velocity[:, [c]] ** 2,
+            lambda w, n, mass: {"per_m": float(w[0] / mass)} if mass > 0 else None,
+        )  # fmt: skip
+    for ratio in (0.02, 0.1, 0.4):
+        for f in of.band_hz * np.geomspace(0.02, 1.2, 12):
+            yield Law(
+                "extra_mode", c, (float(f), ratio), lambda m, n: _carried(m, c, n), _mode_values, linear=True,
+                bounded=((0.005 * of.band_hz, 1.5 * of.band_hz), (0.002, 1.0)),
+            )  # fmt: skip
+    yield Law(
+        "amplifier_lag", c, (), lambda m, _: through_lines(m.acceleration[:, [c]], m.rate_hz, lambda s: s),
+        lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, linear=True,
+    )  # fmt: skip
+
+
+def _carried(m: Motion, c: int, n: Numbers) -> FloatArray:
+    """The force per mass of a body on a spring that hangs on the axis."""
+    turn, loss = 2 * np.pi * n[0], 2 * n[1] * 2 * np.pi * n[0]
+    return through_lines(
+        m.acceleration[:, [c]], m.rate_hz, lambda s: (turn**2 + loss * s) / (s**2 + loss * s + turn**2)
+    )
+
+
+def _mode_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    return {"frequency": n[0], "mass": float(w[0]), "damping_ratio": n[1]} if w[0] > 0 else None
+
+
+def condition_laws(motions: Sequence[Motion], c: int) -> Iterator[Law]:
+    for k in range(motions[0].condition.shape[1]):
+        yield Law(
+            "condition_dependent_damping", c, (float(k),),
+            lambda m, n: m.condition[:, [int(n[0])]] * m.velocity[:, [c]], named("change"),
+        )  # fmt: skip
+        yield Law(
+            "condition_dependent_friction", c, (float(k),),
+            lambda m, n: m.condition[:, [int(n[0])]] * np.sign(m.velocity[:, [c]]), named("change"),
+        )  # fmt: skip
+        yield Law(
+            "condition_dependent_stiffness", c, (float(k),),
+            lambda m, n: m.condition[:, [int(n[0])]] * m.position[:, [c]], named("change"),
+        )  # fmt: skip
