@@ -187,6 +187,9 @@ class Diagnosis:
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain values, without format and version."""
     plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
+    for entry, optional in ((plain, "candidates"), *((effect, "class") for effect in plain["effects"])):
+        if not entry[optional]:
+            del entry[optional]
     return plain
 
 
