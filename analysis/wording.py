@@ -60,3 +60,11 @@ def listed(things: Sequence[str]) -> str:
     if len(things) > _NAMED:
         return f"{', '.join(things[:_NAMED])} and {len(things) - _NAMED} more"
     return " and ".join((", ".join(things[:-1]), things[-1])) if len(things) > 1 else "".join(things)
+
+
+def capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
+def ended(sentence: str) -> str:
+    return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."

@@ -12,9 +12,10 @@ from analysis.diagnosis.errors.choose_measure import Chosen, measure_by_force, m
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.assemble_findings import assembled
-from analysis.diagnosis.result.candidates import with_balances
+from analysis.diagnosis.result.candidates import reached_of, with_balances
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
+from analysis.diagnosis.result.state_maps import state_maps
 from analysis.diagnosis.search.by_balance import balances_of, searched_by_balance
 from analysis.diagnosis.search.impacts import rattling
 from analysis.diagnosis.search.learn_clean_floor import learned_from
@@ -154,4 +155,6 @@ def _assembled(
     whole = assembled(searched.arena, found, searched.judged, look.chosen.floors, names, seen.floor)
     diagnosis = with_balances(whole.diagnosis, balances, recordings[0].command.channels)
     remarks = (*look.chosen.remarks, *searched.remarks, *whole.remarks)
-    return replace(whole, diagnosis=diagnosis, remarks=remarks)
+    reached = reached_of(diagnosis, balances, recordings[0].command.channels)
+    maps = state_maps(diagnosis, balances, whole.evidence, recordings[0])
+    return replace(whole, diagnosis=diagnosis, remarks=remarks, reached=reached, state_maps=maps)

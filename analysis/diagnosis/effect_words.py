@@ -89,14 +89,76 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class LawWords:
+    """Of a law that the vocabulary lacks."""
+
+    words: EffectWords
+    units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """By parameter: SI, of a translational and of a rotational model."""
+
+
+_FORCE, _DAMPING, _STIFFNESS = ("N", "N m"), ("N s/m", "N m s/rad"), ("N/m", "N m/rad")
+_CHANGE = "± {} from beginning to end"
+_PER_CONDITION = "{} per standard deviation of the condition"
+LAW_WORDS: Mapping[str, LawWords] = {
+    "gravity_torque": LawWords(
+        EffectWords("a weight on a lever (gravity torque)", {"torque": _BARE, "angle": "zero at an angle of {}"}),
+        {"torque": ("N m", "N m"), "angle": ("rad", "rad")},
+    ),
+    "viscoelastic_relaxation": LawWords(
+        EffectWords(
+            "a spring that gives way in time (viscoelastic relaxation)",
+            {"stiffness": _BARE, "time_constant": "time constant {}"},
+        ),
+        {"stiffness": _STIFFNESS, "time_constant": ("s", "s")},
+    ),
+    "drifting_friction": LawWords(
+        EffectWords("dry friction that changes during the recording", {"change": _CHANGE}), {"change": _FORCE}
+    ),
+    "drifting_damping": LawWords(
+        EffectWords("damping that changes during the recording", {"change": _CHANGE}), {"change": _DAMPING}
+    ),
+    "drifting_force": LawWords(
+        EffectWords("a force that drifts during the recording", {"rate_per_s": _CHANGE}), {"rate_per_s": _FORCE}
+    ),
+    "condition_dependent_friction": LawWords(
+        EffectWords("dry friction that depends on the recorded condition", {"change": _PER_CONDITION}),
+        {"change": _FORCE},
+    ),
+    "condition_dependent_damping": LawWords(
+        EffectWords("damping that depends on the recorded condition", {"change": _PER_CONDITION}),
+        {"change": _DAMPING},
+    ),
+    "condition_dependent_stiffness": LawWords(
+        EffectWords("stiffness that depends on the recorded condition", {"change": _PER_CONDITION}),
+        {"change": _STIFFNESS},
+    ),
+}
+"""Laws of the force balance that no simulation plays."""
+
 OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
 """Faults of the whole sensor or logger, which need no place where all channels share them."""
 
 
 def noun_of(effect: str) -> str:
     """What people call it; its own name with spaces where there is no word for it."""
-    known = EFFECT_WORDS.get(effect)
+    known = _words(effect)
     return known.noun if known else effect.replace("_", " ")
+
+
+def _words(effect: str) -> EffectWords | None:
+    law = LAW_WORDS.get(effect)
+    return EFFECT_WORDS.get(effect) if law is None else law.words
+
+
+def si_unit(effect: str, parameter: str, rotational: bool) -> str:
+    """Of a parameter; 1 where it is not known."""
+    if effect in LAW_WORDS:
+        return LAW_WORDS[effect].units.get(parameter, ("1", "1"))[rotational]
+    known = EFFECTS_BY_NAME.get(effect)
+    units = {} if known is None else {each.name: each.unit_in(rotational, "1") for each in known.parameters}
+    return units.get(parameter, "1")
 
 
 def place_words(place: Place, axis: str | None, single: bool = False) -> str:
@@ -118,7 +180,7 @@ _SEATS: Mapping[str, tuple[str, str]] = {
 
 def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
-    known = EFFECT_WORDS.get(effect)
+    known = _words(effect)
     named = dict(known.numbers) if known else {}
     if not named:
         main = EFFECTS_BY_NAME[effect].main.name if effect in EFFECTS_BY_NAME else next(iter(parameters), "")

@@ -66,6 +66,13 @@ def percent_text(share: float, ci95: tuple[float, float] | None = None) -> str:
     return f"{value} %{bracket}{interval}"
 
 
+def error_text(error: float | None) -> str:
+    """ "14 %" of the signal."""
+    if error is None:
+        return "unknown"
+    return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
+
+
 def probability_text(probability: float) -> str:
     return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
 

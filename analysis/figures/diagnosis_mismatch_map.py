@@ -10,13 +10,19 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.figures.diagnosis_style import STAGES, Stage
+from analysis.figures.diagnosis_style import STAGES, Stage, ratio_ticks
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, new_figure, say_nothing_to_draw
 from equalizer.signals.signal import FloatArray
 
 _LOUDEST = 300.0
-"""In units of the noise: the end of the colours."""
+"""In units of the noise: the end of the colours at least."""
+_DARK = 0.62
+"""Of the colours' range, from which on numbers are white."""
+_LETTER_IN = 0.075
+"""Width of a letter beside the map."""
+_ROW_IN, _BETWEEN_IN = 0.25, 0.2
+"""Height of a row of cells, and between panels."""
 _MOST_LEVELS = 4
 _NUMBERED = 1.15
 """Below it a cell is as good as noise and stays bare."""
@@ -54,7 +60,7 @@ def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
             title=f"Where model and device disagree, driven by {input_}",
             caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and the "
             "margin of equivalence, at a false discovery rate of 1 %. Rows: measured channels; columns: octaves, by "
-            "their lower edge; grey: not driven there; without "
+            f"their lower edge{_level_words(maps, input_, unit)}; grey: not driven there; without "
             f"a number: below {_NUMBERED:g}." + _grouped_words(maps, input_),
             figure=draw_mismatch_map(maps, input_, unit),
             folded=number > 1,
@@ -69,7 +75,7 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
     layout = _layout(maps, input_)
     if not layout.stages or not layout.bands:
         return say_nothing_to_draw(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
-    figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (0.2 + 0.25 * len(layout.channels)))
+    figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_BETWEEN_IN + _ROW_IN * len(layout.channels)))
     axes, beside = _placed_axes(figure, layout)
     table, frames = _filled(maps, input_, layout)
     panels = [layout.corner(row, column) for row, column in np.ndindex(len(layout.levels), len(layout.stages))]
@@ -79,26 +85,43 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
         axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=order))
     height, width = table.shape
     extent = (-0.5, width / _FINE - 0.5, height / _FINE - 0.5, -0.5)
-    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, _LOUDEST), aspect="auto",
+    loudest = _loudest(table)
+    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, loudest), aspect="auto",
                         interpolation="nearest", extent=extent)  # fmt: skip
     axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
     if len(layout.bands) <= _NUMBERS_FIT:
         _write_numbers(axes, table, panels, layout)
     _label(axes, layout, unit)
     bar = figure.colorbar(image, cax=beside)
-    bar.set_ticks([1, 3, 10, 30, 100, 300], labels=["1", "3", "10", "30", "100", "≥ 300"])
-    bar.minorticks_off()
+    ratio_ticks(bar.ax.yaxis, 1.0, loudest)
     bar.set_label("residual / noise", fontsize=9)
     beside.tick_params(labelsize=8)
     return figure
+
+
+def _loudest(table: FloatArray) -> float:
+    """The end of the colours: none of the cells is beyond it, so that the worst can be told from the next."""
+    most = float(np.nanmax(table, initial=1.0))
+    return _LOUDEST if most <= _LOUDEST else float(10 ** np.ceil(np.log10(most)))
+
+
+def _upright(layout: _Layout) -> bool:
+    """Levels are written along the panels' sides; else, where those are too short, behind the channels."""
+    longest = max((len(f"at {level:.3g} N m") for level in layout.levels), default=0)
+    return _LETTER_IN * (longest - 2) <= _BETWEEN_IN + _ROW_IN * len(layout.channels)
+
+
+def _row_label(channel: tuple[str, str], level: float, layout: _Layout) -> str:
+    said = _channel(channel, layout)
+    return said if _upright(layout) or not level else f"{said} at {level:.3g}"
 
 
 def _placed_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
     """The map and the bar of its colours. What stands around them is known, and need not be measured."""
     figure.set_layout_engine("none")
     width, height = figure.get_size_inches()
-    longest = max(len(_channel(one, layout)) for one in layout.channels)
-    left = (0.33 if any(layout.levels) else 0.1) + 0.075 * longest
+    longest = max(len(_row_label(one, level, layout)) for one in layout.channels for level in layout.levels)
+    left = (0.33 if any(layout.levels) and _upright(layout) else 0.1) + _LETTER_IN * longest
     bottom, top, right = 0.5 / height, 1 - 0.26 / height, 1 - 1.0 / width
     axes = figure.add_axes((left / width, bottom, right - left / width, top - bottom))
     beside = figure.add_axes((right + 0.09 / width, bottom + 0.05 * (top - bottom), 0.22 / width, 0.9 * (top - bottom)))
@@ -131,7 +154,7 @@ def _write_numbers(axes: Axes, table: FloatArray, panels: Sequence[FloatArray], 
             x, y = float(corner[0]) + column, float(corner[1]) + row
             value = table[round(_FINE * y), round(_FINE * x)]
             if value >= _NUMBERED:
-                colour = "white" if value > 35 else BLACK
+                colour = "white" if np.log(value) > _DARK * np.log(_loudest(table)) else BLACK
                 axes.text(x, y, _short(value), ha="center", va="center", fontsize=6.2, color=colour)
 
 
@@ -140,7 +163,8 @@ def _label(axes: Axes, layout: _Layout, unit: str) -> None:
     xs = [layout.corner(0, column)[0] + band for column in stages for band in range(len(layout.bands))]
     ys = [layout.corner(row, 0)[1] + channel for row in levels for channel in range(len(layout.channels))]
     axes.set_xticks(xs, [f"{low:g}" for low, _ in layout.bands] * len(stages), fontsize=7.5)
-    axes.set_yticks(ys, [_channel(one, layout) for one in layout.channels] * len(levels), fontsize=8.5)
+    rows = [_row_label(one, level, layout) for level in layout.levels for one in layout.channels]
+    axes.set_yticks(ys, rows, fontsize=8.5)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("Octave from (Hz)", fontsize=9.5)
@@ -149,9 +173,9 @@ def _label(axes: Axes, layout: _Layout, unit: str) -> None:
                       textcoords="offset points", fontsize=10)  # fmt: skip
     middle = (len(layout.channels) - 1) / 2
     for row in levels:
-        if layout.levels[row]:
+        if layout.levels[row] and _upright(layout):
             axes.annotate(
-                f"at {layout.levels[row]:.3g} {unit}", (0.02, layout.corner(row, 0)[1] + middle),
+                f"at {layout.levels[row]:.3g} {unit}".rstrip(), (0.02, layout.corner(row, 0)[1] + middle),
                 xycoords=("figure fraction", "data"), rotation="vertical", ha="center", va="center", fontsize=10,
             )  # fmt: skip
 
@@ -186,6 +210,11 @@ def _short(value: float) -> str:
 
 def _worst(maps: Maps, input_: str) -> float:
     return max((one.in_noise for cells in maps.values() for one in cells if one.input == input_), default=0.0)
+
+
+def _level_words(maps: Maps, input_: str, unit: str) -> str:
+    levels = {one.amplitude for cells in maps.values() for one in cells if one.input == input_}
+    return f", at levels of the excitation{f' in {unit}' if unit else ''}" if any(levels) else ""
 
 
 def _grouped_words(maps: Maps, input_: str) -> str:

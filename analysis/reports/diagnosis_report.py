@@ -3,15 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
+from analysis.diagnosis.result.ceiling_wording import black_box_beats, black_box_sentence, ceiling_sentences
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.localisation_words import localisation_sentences
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.result.wording import (
     answer_of,
-    black_box_beats,
-    black_box_sentence,
-    capital,
     confirmation_sentence,
     effect_sentence,
     effect_title,
@@ -27,6 +25,7 @@ from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_distortion import distortion_sections
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_tables import (
+    candidate_table,
     channel_table,
     error_table,
     mismatch_table,
@@ -35,6 +34,7 @@ from analysis.reports.diagnosis_tables import (
     rival_table,
 )
 from analysis.reports.page import Page, Section, Table, render_page
+from analysis.wording import capital
 
 
 def render_diagnosis_report(
@@ -47,11 +47,12 @@ def render_diagnosis_report(
         _where(found, pictures),
         *distortion_sections(found),
         *(_effect(found, number, pictures) for number in range(len(diagnosis.effects))),
+        *_candidates(found),
         *_tried(pictures),
         _errors(found, pictures),
         _remainder(found, pictures),
         _own_numbers(found),
-        *_one_sentence("A black box beside it", black_box_sentence(found.black_box, bool(diagnosis.effects))),
+        *_beside(found),
         *_one_sentence("The next recording", next_experiment_sentence(diagnosis)),
         *_remarks(found),
         Section("How this was done", paragraphs=method_paragraphs(found)),
@@ -89,6 +90,17 @@ def _answer(found: Findings) -> list[Section]:
     return [Section("What the model lacks", points=(*points, *filter(None, after)))]
 
 
+def _candidates(found: Findings) -> list[Section]:
+    table = candidate_table(found)
+    return [] if table is None else [Section("What else may be missing", tables=(table,))]
+
+
+def _beside(found: Findings) -> list[Section]:
+    said = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
+    paragraphs = tuple(filter(None, (*ceiling_sentences(found.reached), said)))
+    return [Section("A black box beside it", paragraphs=paragraphs)] if paragraphs else []
+
+
 _NO_MAP = "There is no map: the noise of this recording is not known."
 
 
@@ -96,14 +108,17 @@ def _where(found: Findings, pictures: Sequence[Picture]) -> Section:
     said = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
     listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch)
     return Section(
-        "Where model and device disagree", paragraphs=said, pictures=_named(pictures, "mismatch-map"), tables=(listed,)
+        "Where model and device disagree",
+        paragraphs=said,
+        pictures=(*_named(pictures, "state"), *_named(pictures, "mismatch-map")),
+        tables=(listed,),
     )
 
 
 def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Section:
     effect = found.diagnosis.effects[number]
     placed = next((one.effect for one in found.named if one.effect.name == effect.effect), None)
-    paragraphs = [_said(found, effect, signature_texts(found)), share_sentence(effect)]
+    paragraphs = [share_sentence(effect)]
     if placed is not None:
         paragraphs += [f"Equation: {placed.equation}.", f"Source: {placed.source}."]
     rivals = rival_sentences(effect)
@@ -111,7 +126,7 @@ def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Sectio
         paragraphs.append("No rival came near.")
     return Section(
         capital(effect_title(effect, _single(found))),
-        paragraphs=(*paragraphs, *filter(None, (inseparable_sentence(effect),))),
+        paragraphs=tuple(paragraphs),
         pictures=_signature(found, effect, pictures),
         tables=(parameter_table(effect), *((rival_table(effect),) if effect.rivals else ())),
     )

@@ -4,23 +4,27 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
-from analysis.diagnosis.effect_words import estimate_text, noun_of
+from analysis.diagnosis.effect_words import estimate_text, noun_of, place_words
+from analysis.diagnosis.result.candidate_wording import candidate_numbers
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.retuned_numbers import all_numbers
-from analysis.diagnosis.result.wording import capital, ended, error_text
-from analysis.diagnosis.unit_wording import probability_text, share_text, value_text
+from analysis.diagnosis.result.wording import device_of
+from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table
-from analysis.wording import NONE, p_value, signed
+from analysis.wording import NONE, capital, ended, p_value, signed
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
-_SHARE = "Share: mismatch over signal there; where a state is named, of the mismatch's power that sits in it."
+_SHARE = (
+    "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
+    "is named, of the mismatch's power that sits in it."
+)
 _PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "held-out data"}
 
 
 def parameter_table(effect: NamedEffect) -> Table:
     rows = tuple(
-        (name.replace("_", " "), estimate_text(Estimate(one.value, one.unit)), _interval(one))
+        (name.replace("_", " "), estimate_text(one).partition(" [")[0], _interval(one))
         for name, one in effect.parameters.items()
     )
     return Table("Its numbers", ("Number", "Value", "95 % interval"), rows)
@@ -38,6 +42,30 @@ def rival_table(effect: NamedEffect) -> Table:
         for rival in sorted(effect.rivals, key=lambda one: (not one.inseparable, -one.probability))
     ]
     return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rows))
+
+
+def candidate_table(found: Findings) -> Table | None:
+    """What was not confirmed, the best first; None where there is nothing."""
+    device = device_of(found)
+    rows = tuple(
+        (
+            f"{capital(noun_of(one.effect))} {place_words(one.place, one.axis, device.single)}",
+            candidate_numbers(one, device) or NONE,
+            share_text(one.held_out_gain),
+            share_text(one.share_of_black_box),
+            ended(capital(one.why_not)),
+        )
+        for one in found.diagnosis.candidates
+    )
+    if not rows:
+        return None
+    header = ("Candidate", "Numbers", "Held-out gain", "Of what all laws take", "Why it is not named")
+    note = (
+        "Held-out gain: share of the error's power that goes on data that nothing was fitted to, beside the other laws "
+        "of the best sum. The next column: the same as a share of what all laws together take of the error of mass, "
+        "damping and stiffness alone."
+    )
+    return Table("The best candidates, not confirmed", header, rows, (note,))
 
 
 def error_table(found: Findings) -> Table:
@@ -75,8 +103,8 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
 
 
 def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
-    """The largest, folded."""
-    worst = sorted(places, key=lambda one: one.share, reverse=True)[:_MOST_PLACES]
+    """The first, folded."""
+    worst = places[:_MOST_PLACES]
     rows = tuple(
         (
             one.output,

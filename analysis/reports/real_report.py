@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.result.real_answer import OwnNumber, PairOutcome, RealAnswer
-from analysis.diagnosis.result.wording import error_text
-from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.figures.picture import Picture
 from analysis.figures.real_held_out import error_rows
 from analysis.proof.injected import InjectedOutcome
@@ -72,12 +71,16 @@ def _row(one: RealAnswer) -> tuple[str, ...]:
     )
     before, retuned, noise = shown[:3]
     after = error_text(errors.after) if errors is not None and one.effects else "-"
-    named = ", ".join(one.effects) or "-"
+    named = ", ".join(one.effects) or _first_candidate(one) or "-"
     box = "-" if one.black_box is None else error_text(one.black_box)
     return (
         _title(one), VERDICT_WORDS[one.verdict], named,
         before, retuned, after, box, noise, f"{one.seconds:.0f}",
     )  # fmt: skip
+
+
+def _first_candidate(one: RealAnswer) -> str:
+    return f"not confirmed: {one.candidates[0].effect}" if one.candidates and one.verdict == "unexplained" else ""
 
 
 def _banner(troubles: Sequence[Trouble]) -> str:
@@ -100,7 +103,7 @@ def _section(one: RealAnswer, picture: Picture | None) -> Section:
     return Section(
         _title(one),
         paragraphs=paragraphs,
-        points=(*points, *further, *one.remarks, *objections),
+        points=(*points, *one.not_confirmed, *further, *one.remarks, *objections),
         pictures=(picture,) if picture is not None and error_rows(one) else (),
         tables=_tables(one),
     )

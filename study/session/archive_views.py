@@ -109,3 +109,5 @@ class DiagnosisView:
     """Path of the report.html beside it; empty where there is none."""
     notes: tuple[str, ...] = ()
     """Such as how errors were measured, and what was re-tuned."""
+    candidates: tuple[str, ...] = ()
+    """What was not confirmed, the best first; without one that the verdict says."""

@@ -3,7 +3,8 @@
 from typing import Any
 
 from analysis.diagnosis.document import FORMAT, VERSION, Errors, diagnosis_to_json
-from analysis.diagnosis.result.wording import error_text, summary_lines
+from analysis.diagnosis.result.wording import summary_lines
+from analysis.diagnosis.unit_wording import error_text
 from study.workflows.diagnose_recordings import DiagnosedRecordings
 from study.workflows.write_diagnosis import MODEL_NAME, PAGE_NAME
 

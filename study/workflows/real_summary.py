@@ -1,7 +1,7 @@
 """What is said of a folder of real recordings at the end, in lines."""
 
 from analysis.diagnosis.result.real_answer import RealAnswer
-from analysis.diagnosis.result.wording import error_text
+from analysis.diagnosis.unit_wording import error_text
 from analysis.proof.injected import injected_figures
 from analysis.reports.injected_section import figure_text
 from analysis.reports.real_report import VERDICT_WORDS
@@ -19,6 +19,8 @@ def real_lines(done: WrittenReal) -> tuple[str, ...]:
 
 def _line(one: RealAnswer) -> str:
     named = f": {', '.join(one.effects)}" if one.effects else ""
+    if one.verdict == "unexplained" and one.candidates:
+        named = f", best candidate (not confirmed) {one.candidates[0].effect}"
     said = f"{one.folder}, {one.recording}: {VERDICT_WORDS[one.verdict]}{named}"
     if one.held_out is None:
         return f"{said}. {one.answer}"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.result.candidate_wording import Device, candidate_sentences
 from analysis.diagnosis.result.wording import (
     effect_sentence,
     inseparable_sentence,
@@ -12,9 +13,11 @@ from analysis.diagnosis.result.wording import (
     verdict_sentence,
 )
 from analysis.wording import NONE, listed, p_value
+from study.errors import StudyError
 from study.session.archive_views import DiagnosisView
 from study.session.printable import printable
 from study.store.diagnosis_file import read_diagnosis
+from study.store.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
 FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")
@@ -22,11 +25,11 @@ FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allo
 
 def diagnosis_view(path: Path) -> DiagnosisView:
     """Raises CannotReadError, UnusableFileError."""
-    diagnosis = read_diagnosis(path)
+    diagnosis, device = read_diagnosis(path), _device(path.parent / "improved.toml")
     report = path.parent / "report.html"
     view = DiagnosisView(
         path=str(path),
-        verdict=verdict_sentence(diagnosis),
+        verdict=verdict_sentence(diagnosis, device=device),
         sentences=tuple(sentence for effect in diagnosis.effects for sentence in _effect(effect)),
         rivals=tuple(sentence for effect in diagnosis.effects for sentence in rival_sentences(effect)),
         mismatch=_mismatches(diagnosis.mismatch),
@@ -35,8 +38,18 @@ def diagnosis_view(path: Path) -> DiagnosisView:
         next_experiment=_next(diagnosis),
         report=str(report) if report.is_file() else "",
         notes=_notes(diagnosis),
+        candidates=candidate_sentences(diagnosis, device),
     )
     return printable(view)
+
+
+def _device(path: Path) -> Device | None:
+    """Of the improved model beside the document, whose units candidates are in; None where there is none to read."""
+    try:
+        model = read_mechanical_model(path)
+    except StudyError:
+        return None
+    return Device(model.inputs == 1, model.rotational)
 
 
 def _effect(effect: NamedEffect) -> tuple[str, ...]:

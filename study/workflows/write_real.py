@@ -30,6 +30,8 @@ class RealRow:
     black_box: float | None
     noise: float | None
     seconds: float
+    candidates: str
+    """Not confirmed, the best first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +94,7 @@ def _row(one: RealAnswer) -> RealRow:
     return RealRow(
         one.folder, one.recording, one.verdict, effects, one.error,
         before, retuned, after, one.black_box, noise, one.seconds,
+        " ".join(each.effect for each in one.candidates),
     )  # fmt: skip
 
 

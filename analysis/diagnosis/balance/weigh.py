@@ -88,6 +88,10 @@ class Balance:
     def named(self) -> tuple[Weighed, ...]:
         return tuple(one for one in self.laws if one.named)
 
+    def left_by(self, laws: Sequence[int]) -> FloatArray:
+        """(blocks,): held-out error power beside mass, damping and stiffness. laws: by place in the regression."""
+        return _held_out(self.searched.regression, laws)
+
 
 def weigh(searched: Searched) -> Balance:
     regression = searched.regression

@@ -25,17 +25,30 @@ class StateMismatch:
 def mismatch_rows(
     cells: Sequence[MismatchCell], states: Sequence[StateMismatch] = (), most: int = MOST_ROWS
 ) -> tuple[Mismatch, ...]:
-    """Significant ones, largest share first; of the cells, the share of their signal (rms, at most 1), of the states,
-    the share of the mismatch's power that sits there. What states there are is kept before what cells there are."""
-    tied = [(state.region.share, _state_row(state)) for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
-    found = [(cell.share, _cell_row(cell)) for cell in cells if cell.significant]
-    best = sorted(tied, key=_by_share)[:most]
-    best += sorted(found, key=_by_share)[: most - len(best)]
-    return tuple(row for _, row in sorted(best, key=_by_share))
+    """Significant ones: states first, those that hold most of the mismatch's power at the top; then cells, by the share
+    of their channel's whole signal that is missing there. `share` of a cell's row is that of the signal within the
+    cell (rms, at most 1), which is large in bands without signal and says little by itself."""
+    tied = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
+    found = [cell for cell in cells if cell.significant]
+    whole = _whole_signals(cells)
+    tied.sort(key=lambda state: (-state.region.share, state.region.p_value))
+    found.sort(key=lambda cell: (-cell.rms / whole[_channel(cell)], cell.adjusted_p_value))
+    return (*map(_state_row, tied), *map(_cell_row, found))[:most]
 
 
-def _by_share(row: tuple[float, Mismatch]) -> tuple[float, float]:
-    return -row[0], row[1].p_value
+def _channel(cell: MismatchCell) -> tuple[str, str]:
+    """Response and position may share a name."""
+    return cell.output, cell.quantity
+
+
+def _whole_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
+    """Rms of each channel's response over all bands, where it was excited most."""
+    powers: dict[tuple[str, str], dict[tuple[str, float], float]] = {}
+    for cell in cells:
+        driven = powers.setdefault(_channel(cell), {})
+        by = (cell.input, cell.amplitude)
+        driven[by] = driven.get(by, 0.0) + cell.signal_rms**2
+    return {channel: max(max(driven.values()) ** 0.5, 1e-300) for channel, driven in powers.items()}
 
 
 def _cell_row(cell: MismatchCell) -> Mismatch:

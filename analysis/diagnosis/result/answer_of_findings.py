@@ -9,12 +9,20 @@ from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import Tuning, tuning_of
+from analysis.diagnosis.result.candidate_wording import candidate_sentences
 from analysis.diagnosis.result.findings import Course, Findings
 from analysis.diagnosis.result.localisation_words import localisation_sentences
 from analysis.diagnosis.result.real_answer import DrawnExcerpt, HeldOutStretch, OwnNumber, RealAnswer
-from analysis.diagnosis.result.wording import answer_of, capital, effect_title, inseparable_sentence, remainder_sentence
+from analysis.diagnosis.result.wording import (
+    answer_of,
+    device_of,
+    effect_title,
+    inseparable_sentence,
+    remainder_sentence,
+)
 from analysis.diagnosis.search.rivalry import Arena, sensitivity_at
 from analysis.diagnosis.types import Mapper
+from analysis.wording import capital
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -57,6 +65,8 @@ def answer_of_findings(
         pair=None,
         objections=(),
         seconds=0.0,
+        candidates=diagnosis.candidates,
+        not_confirmed=candidate_sentences(diagnosis, device_of(found)),
     )
 
 

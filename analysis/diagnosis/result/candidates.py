@@ -1,10 +1,13 @@
-"""What a force balance adds to the document: classes of laws that cannot be parted, and candidates."""
+"""What a force balance adds to the findings: classes of laws that cannot be parted, candidates, what all laws reach."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from analysis.diagnosis.balance.weigh import Balance, Weighed
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
+from analysis.diagnosis.result.findings import Reached
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
@@ -39,6 +42,20 @@ def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: t
     left = [one for one in found if (one.effect, one.axis) not in named]
     retuned = {**diagnosis.retuned, **constants}
     return replace(diagnosis, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
+
+
+def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]) -> tuple[Reached, ...]:
+    """Of the laws that the document names; see `with_balances`."""
+    found = []
+    for axis, balance in enumerate(balances):
+        letter = axis_letter(channels[axis], channels)
+        names = {one.effect for one in diagnosis.effects if one.axis in (letter, None, "")}
+        laws = [one.place for one in balance.laws if one.law.effect in names]
+        power = float(np.sum(balance.left_by(laws)))
+        linear = float(np.sum(balance.left_by(())))
+        rms = balance.linear * np.sqrt(power / linear) if linear > 0 else 0.0
+        found.append(Reached(letter, balance.linear, float(rms), balance.ceiling, bool(laws)))
+    return tuple(found)
 
 
 def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:

@@ -9,6 +9,7 @@ from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.result.proposed_experiment import Proposal
+from analysis.diagnosis.result.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.evidence import Evidence
@@ -65,6 +66,26 @@ class BlackBox:
     physics: float
 
 
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """What is left of one axis's force on held-out data, rms as a share of the signal."""
+
+    axis: str
+    linear: float
+    """By mass, damping and stiffness alone,"""
+    named: float
+    """with the named laws,"""
+    ceiling: float
+    """and with all laws together."""
+    any_named: bool
+
+    @property
+    def share(self) -> float:
+        """Of the error power that all laws together take, how much the named ones do."""
+        room = self.linear**2 - self.ceiling**2
+        return min(max((self.linear**2 - self.named**2) / room, 0.0), 1.0) if room > 0 else 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
     diagnosis: Diagnosis
@@ -98,5 +119,9 @@ class Findings:
     """The driven axes, as a reader calls them; empty = x, y, z."""
     proposal: Proposal | None = None
     """Of what to record next, where rivals are as good as what is named."""
+    reached: tuple[Reached, ...] = ()
+    """Per axis; empty where no force balance was weighed."""
+    state_maps: tuple[StateMaps, ...] = ()
+    """Per axis, the one to be drawn first."""
     split_s: Mapping[str, float] = field(default_factory=dict)
     """Seconds by "fit", "choose", "test"."""

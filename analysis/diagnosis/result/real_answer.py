@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from analysis.diagnosis.document import Errors
+from analysis.diagnosis.document import Candidate, Errors
 
 FORMAT, VERSION = "hapteq-real-answer", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -139,6 +139,10 @@ class RealAnswer:
     pair: PairOutcome | None
     objections: tuple[str, ...]
     seconds: float
+    candidates: tuple[Candidate, ...] = ()
+    """The best that were not confirmed, the first first;"""
+    not_confirmed: tuple[str, ...] = ()
+    """each as a sentence with its numbers, but for one that `answer` says."""
 
 
 def real_answer_to_json(answer: RealAnswer) -> dict[str, Any]:

@@ -4,13 +4,21 @@ from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
-from analysis.diagnosis.result.findings import BlackBox, Findings
+from analysis.diagnosis.result.candidate_wording import (
+    Device,
+    best_candidate_sentence,
+    candidate_sentences,
+    class_noun,
+    class_sentence,
+)
+from analysis.diagnosis.result.ceiling_wording import black_box_sentence, ceiling_sentences
+from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
 from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
-from analysis.diagnosis.unit_wording import probability_text, share_text
-from analysis.wording import listed, p_text
+from analysis.diagnosis.unit_wording import error_text, probability_text, share_text
+from analysis.wording import capital, ended, listed, p_text
 
 _PLACES_NAMED = 3
 
@@ -19,7 +27,7 @@ def effect_title(effect: NamedEffect, single: bool = False) -> str:
     """ "dry friction on the x drive". single: the device has one axis."""
     if effect.effect in OF_THE_WHOLE and effect.axis is None:
         return noun_of(effect.effect)
-    return f"{noun_of(effect.effect)} {place_words(effect.place, effect.axis, single)}"
+    return f"{class_noun(effect)} {place_words(effect.place, effect.axis, single)}"
 
 
 def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
@@ -28,8 +36,9 @@ def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = Fal
     return f"{capital(said)}: {signature}." if signature else f"{capital(said)}."
 
 
-def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), single: bool = False) -> str:
-    """The whole answer, first thing to be read."""
+def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), device: Device | None = None) -> str:
+    """The whole answer, first thing to be read; where nothing is named, with the best candidate."""
+    single = device is not None and device.single
     errors = diagnosis.fit.test
     named = listed([effect_title(effect, single) for effect in diagnosis.effects])
     if diagnosis.verdict == "no_mismatch":
@@ -51,28 +60,26 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), si
             f"Missing in the model: {named}, but that is not all. "
             f"{capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}, and a mismatch remains."
         )
-    return (
+    said = (
         "Model and device disagree, and no effect of the catalogue explains it. "
         f"{capital(_one_error('re-tuned', errors.retuned, errors))}."
     )
+    return " ".join(filter(None, (said, best_candidate_sentence(diagnosis, device))))
 
 
 def answer_of(found: Findings) -> str:
     """The verdict's sentence."""
-    diagnosis, single = found.diagnosis, found.given.inputs == 1
+    diagnosis, device = found.diagnosis, device_of(found)
     if found.explanation.statistic is not None:
-        return impact_sentence(diagnosis, listed([effect_title(effect, single) for effect in diagnosis.effects]))
-    return verdict_sentence(diagnosis, moved_of(found) if diagnosis.verdict == "parameters" else (), single)
+        return impact_sentence(diagnosis, listed([effect_title(effect, device.single) for effect in diagnosis.effects]))
+    return verdict_sentence(diagnosis, moved_of(found) if diagnosis.verdict == "parameters" else (), device)
+
+
+def device_of(found: Findings) -> Device:
+    return Device(found.given.inputs == 1, found.given.rotational)
 
 
 _AFTER = ("after", "with it")
-
-
-def error_text(error: float | None) -> str:
-    """ "14 %" of the signal."""
-    if error is None:
-        return "unknown"
-    return f"{100 * error:.3g} %" if 100 * error < 1000 else f"{error:.3g} times"
 
 
 def times_text(ratio: float) -> str:
@@ -91,6 +98,8 @@ def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
 
 def inseparable_sentence(effect: NamedEffect) -> str:
     """Empty where the data single one out."""
+    if effect.class_:
+        return class_sentence(effect)
     others = [rival for rival in effect.rivals if rival.inseparable]
     if not others:
         return ""
@@ -108,14 +117,13 @@ def inseparable_sentence(effect: NamedEffect) -> str:
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """What is still unexplained."""
+    """What is still unexplained, in the document's order: what misses most of the signal comes first."""
     left = diagnosis.remainder
     if not left:
         return "Nothing significant is left unexplained."
-    worst = sorted(left, key=lambda row: row.share, reverse=True)
     more = len(left) - _PLACES_NAMED
     rest = f"; and {more} smaller {'place' if more == 1 else 'places'}" if more > 0 else ""
-    return f"Still unexplained: {'; '.join(place_of(row) for row in worst[:_PLACES_NAMED])}{rest}."
+    return f"Still unexplained: {'; '.join(place_of(row) for row in left[:_PLACES_NAMED])}{rest}."
 
 
 def place_of(mismatch: Mismatch) -> str:
@@ -135,23 +143,6 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
         return "No further recording is foreseen to tell apart what these data cannot." if alike else ""
     splits = f"would tell {listed([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
     return f"The recording that {splits}: {wanted.command}. {capital(ended(wanted.why))}"
-
-
-def black_box_sentence(box: BlackBox | None, named: bool) -> str:
-    if box is None:
-        return ""
-    physics = "the physics" if named else "the re-tuned model"
-    fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
-    errors = f"{error_text(box.test)} of the signal on the held-out data; {physics} leaves {error_text(box.physics)}"
-    if black_box_beats(box):
-        return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
-    if box.physics * SAME_TO_READERS < box.test:
-        return f"{fitted} {errors}. {capital(physics)} predicts better."
-    return f"{fitted} {errors}: no better."
-
-
-def black_box_beats(box: BlackBox) -> bool:
-    return box.test * SAME_TO_READERS < box.physics
 
 
 def share_sentence(effect: NamedEffect) -> str:
@@ -194,7 +185,9 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
         lines += [
             retuned_sentence(moved),
             remainder_sentence(diagnosis),
+            *ceiling_sentences(found.reached),
             black_box_sentence(found.black_box, bool(diagnosis.effects)),
+            *candidate_sentences(diagnosis, device_of(found)),
         ]
     lines += [next_experiment_sentence(diagnosis), *doubtful_sentences(moved), *implausible_sentences(found)]
     lines += found.remarks
@@ -211,10 +204,6 @@ def moved_of(found: Findings) -> tuple[MovedNumber, ...]:
 def signature_texts(found: Findings) -> Mapping[str, str]:
     """By effect, as the catalogue has it."""
     return {placed.effect.name: placed.effect.signature for placed in found.named}
-
-
-def capital(sentence: str) -> str:
-    return sentence[:1].upper() + sentence[1:]
 
 
 def _fall(errors: Errors, *stages: tuple[str, str]) -> str:
@@ -239,7 +228,3 @@ def _noise(errors: Errors, error: float) -> str:
     if not errors.noise:
         return "; what noise alone would leave is not known"
     return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
-
-
-def ended(sentence: str) -> str:
-    return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."

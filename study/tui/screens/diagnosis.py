@@ -22,6 +22,7 @@ Where a model and the device disagree, and why.
 
 * **Verdict**: whether there is a mismatch, and whether it is explained.
 * **Effects**: physics that the model lacks, with its numbers and their 95 % intervals.
+* **Candidates**: physics that would explain some of it and is not confirmed, and why not.
 * **Rivals**: what else was considered, and why not.
 * **Fit**: errors of the given model, after re-tuning its own parameters, and with the effects. *repeats allow* is the
   smallest error that can be reached. *test* is the record that no fit has seen: that line counts.
@@ -66,6 +67,8 @@ class DiagnosisScreen(Screen[None]):
             with Container(id="halves"):
                 with Container(classes="half"):
                     yield from _said("Effects", view.sentences, "No effect is named.")
+                    if view.candidates:
+                        yield from _said("Candidates, not confirmed", view.candidates, "")
                     yield from _said("Rivals, and why not", view.rivals, "No other effect came near.")
                     yield from _said(
                         "Next", tuple(view.next_experiment.splitlines()), "No further recording is asked for."

@@ -31,7 +31,7 @@ def written(figure):
 
 def test_a_diagnosis_has_every_picture_and_each_is_told_in_words(friction_pictures):
     names = [picture.name for picture in friction_pictures]
-    assert names == ["mismatch-map-1", "signature-1", "rivals-1", "held-out", "remainder"]
+    assert names == ["mismatch-map-1", "state-map", "state-loops", "signature-1", "rivals-1", "held-out", "remainder"]
     assert all(picture.alternative and picture.caption for picture in friction_pictures)
     for picture in friction_pictures:
         root = ElementTree.fromstring(picture_svg(picture))
@@ -50,12 +50,20 @@ def around(axes):
 
 
 def test_the_map_has_a_row_of_panels_per_level_and_a_column_per_stage():
-    cells = tuple(cell(amplitude=level, low_hz=low) for level in (0.5, 1.5, 3.0) for low in (4.0, 8.0))
+    grid = [(level, low, output) for level in (0.5, 1.5, 3.0) for low in (4.0, 8.0) for output in ("ax", "ay", "az")]
+    cells = tuple(cell(output, amplitude=level, low_hz=low) for level, low, output in grid)
     axes = draw_mismatch_map({"before": cells, "retuned": cells, "after": cells}, "fx", "N").axes[0]
     panels = next(one for one in axes.collections if isinstance(one, PolyCollection))
     assert len(panels.get_paths()) == 9
     assert around(axes) == ["as given", "re-tuned", "with what was found", "at 0.5 N", "at 1.5 N", "at 3 N"]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8"] * 3
+
+
+def test_levels_stand_beside_the_channels_where_panels_are_too_low_for_them():
+    cells = tuple(cell(amplitude=level) for level in (0.0137, 0.0184))
+    axes = draw_mismatch_map({"before": cells}, "fx", "N").axes[0]
+    assert around(axes) == ["as given"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["ax at 0.0137", "ax at 0.0184"]
 
 
 def test_a_cell_of_the_map_has_its_colour_where_its_channel_octave_level_and_stage_are():

@@ -4,8 +4,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.diagnosis.document import Errors, Estimate, Fit, Mismatch, Rival
-from analysis.diagnosis.result.findings import BlackBox
+from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival
+from analysis.diagnosis.result.findings import BlackBox, Reached
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.wording import moved_of, summary_lines
 from analysis.reports.diagnosis_method import method_paragraphs
@@ -101,6 +101,27 @@ def test_without_effects_there_is_no_section_of_any(friction_found):
     assert "no effect of the catalogue explains it" in text
     assert "What the model lacks" not in headings.found
     assert "There is no map: the noise of this recording is not known." in text
+
+
+def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(friction_found, page):
+    (effect,) = friction_found.diagnosis.effects
+    alike = replace(effect, class_=("coulomb_friction", "stribeck_friction"), rivals=())
+    other = Candidate("gravity_torque", "mechanism", "x", {"torque": 0.5, "angle": 0.1}, 0.12, 0.34, "too little")
+    reached = (Reached("x", 0.5, 0.3, 0.1, True),)
+    text, headings = rendered(replace(told(friction_found, effects=(alike,), candidates=(other,)), reached=reached))
+    assert "What else may be missing" in headings.found
+    for piece in ("A weight on a lever (gravity torque)", "500 mN m, zero at", "34 %", "Too little.",
+                  "Friction whose law these data leave open", "that is 67 % of the way"):  # fmt: skip
+        assert piece in text
+        assert piece not in page[0]
+    assert "What else may be missing" not in page[1].found
+
+
+def test_the_best_candidate_stands_in_the_first_paragraph_where_nothing_is_named(friction_found):
+    other = Candidate("cogging", "mechanism", "x", {"amplitude": 0.5, "pitch": 0.01}, 0.12, 0.34, "too little")
+    bare = told(friction_found, verdict="unexplained", effects=(), mismatch=(PLACE,), candidates=(other,))
+    text, _ = rendered(bare)
+    assert "Best candidate, not confirmed: a force ripple along the travel (cogging)" in text[: text.index("<h2")]
 
 
 def test_wrong_parameters_are_said_with_their_numbers(friction_found):

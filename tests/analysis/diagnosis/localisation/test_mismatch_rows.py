@@ -1,3 +1,7 @@
+from dataclasses import replace
+
+import pytest
+
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import MOST_ROWS, StateMismatch, mismatch_rows
 from analysis.diagnosis.localisation.state_regions import StateRegion
@@ -13,11 +17,19 @@ def state(share, p_value):
     )
 
 
-def test_rows_come_by_share_and_only_where_significant():
+def test_rows_come_by_what_they_miss_of_the_signal_and_only_where_significant():
     rows = mismatch_rows([cell(0.1), cell(0.3), cell(0.9, p_value=0.02)])
     assert [row.share for row in rows] == [0.3, 0.1]
     assert rows[0].state is None
     assert rows[0].amplitude == 1.0
+
+
+def test_a_band_without_signal_comes_after_a_smaller_share_of_the_loud_one():
+    faint = replace(cell(0.9), band_hz=(256.0, 512.0), rms=0.009, signal_rms=0.01)
+    assert faint.share == pytest.approx(0.9)
+    assert [row.band_hz[0] for row in mismatch_rows([faint, cell(0.1)])] == [2.0, 256.0]
+    loud = replace(faint, rms=0.9, signal_rms=1.0)
+    assert [row.band_hz[0] for row in mismatch_rows([loud, cell(0.1)])] == [256.0, 2.0]
 
 
 def test_a_prediction_that_is_worse_than_none_is_a_share_of_one():
@@ -33,5 +45,5 @@ def test_states_are_rows_over_all_levels():
 def test_no_more_rows_are_kept_than_a_page_holds():
     rows = mismatch_rows([cell(0.1 + k / 1000) for k in range(100)], [state(0.01, 1e-4)])
     assert len(rows) == MOST_ROWS
-    assert rows[-1].state == "near v = 0"
+    assert rows[0].state == "near v = 0"
     assert mismatch_rows([]) == ()

@@ -4,10 +4,10 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
 from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text, place_words
+from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, retuned_sentence
 from analysis.diagnosis.result.wording import (
-    black_box_sentence,
     confirmation_sentence,
     effect_sentence,
     effect_title,
@@ -174,9 +174,9 @@ def test_share_and_probability_are_said():
     )
 
 
-def test_what_is_left_is_named_by_its_worst_places():
+def test_what_is_left_is_named_by_its_first_places():
     assert remainder_sentence(diagnosis("explained", (DRY,))) == "Nothing significant is left unexplained."
-    places = tuple(replace(PLACE, share=share) for share in (0.1, 0.8, 0.3, 0.2, 0.05))
+    places = tuple(replace(PLACE, share=share) for share in (0.8, 0.1, 0.3, 0.2, 0.05))
     said = remainder_sentence(diagnosis("partly_explained", (DRY,), remainder=places))
     assert said.startswith(
         "Still unexplained: ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001); "

@@ -1,0 +1,115 @@
+"""What is said of laws that the data cannot part, and of candidates that were not confirmed."""
+
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect
+from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words, si_unit
+from analysis.diagnosis.unit_wording import share_text
+from analysis.wording import capital, ended
+
+_FAMILIES = (
+    (
+        "friction",
+        "friction whose law these data leave open",
+        {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
+         "position_dependent_friction", "viscous_damping", "quadratic_damping", "drifting_friction"},
+    ),
+    (
+        "a stiffness that changes along the travel",
+        "a stiffness whose law these data leave open",
+        {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque", "loose_joint"},
+    ),
+    (
+        "a late command: lag or delay",
+        "a late command: lag or delay, which these data cannot tell apart",
+        {"amplifier_lag", "transport_delay"},
+    ),
+    (
+        "a late reading: lag or delay",
+        "a late reading: lag or delay, which these data cannot tell apart",
+        {"sensor_lag", "logger_offset", "clock_drift"},
+    ),
+)  # fmt: skip
+"""What laws that act alike are called together: short, in a sentence of its own, and which they are."""
+
+SENTENCES = 3
+"""Candidates that are said in sentences; the document and the page's table have them all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """What sentences must know of it."""
+
+    single: bool
+    """It has one axis, which then needs no name."""
+    rotational: bool
+
+
+def class_noun(effect: NamedEffect) -> str:
+    """What an effect is called together with what these data cannot part from it: "friction (dry friction or 2 laws
+    like it)"; its own noun where there is nothing like it."""
+    others = len(effect.class_) - 1
+    family = _family(effect)
+    if others < 1:
+        return noun_of(effect.effect)
+    if family is None or ":" in family[0]:
+        return noun_of(effect.effect) if family is None else family[0]
+    return f"{family[0]} ({noun_of(effect.effect)}, or {others} {'law' if others == 1 else 'laws'} like it)"
+
+
+def class_sentence(effect: NamedEffect) -> str:
+    """Empty where the data part it from all others."""
+    inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
+    names = tuple(dict.fromkeys((*effect.class_, *inseparable)))
+    if len(names) < 2:
+        return ""
+    family = _family(effect)
+    title = family[1] if family is not None else "one of several laws that these data cannot tell apart"
+    return (
+        f"{capital(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
+        f"well on held-out data. The numbers are those of {noun_of(effect.effect)}."
+    )
+
+
+def _family(effect: NamedEffect) -> tuple[str, str] | None:
+    names = set(effect.class_)
+    return next(((short, long) for short, long, members in _FAMILIES if names and names <= members), None)
+
+
+def candidate_title(candidate: Candidate, device: Device | None = None) -> str:
+    """With its numbers."""
+    place = place_words(candidate.place, candidate.axis, device is not None and device.single)
+    numbers = candidate_numbers(candidate, device)
+    return f"{noun_of(candidate.effect)} {place}{f', {numbers}' if numbers else ''}"
+
+
+def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str:
+    """device: None = not known, and so are the units: bare SI numbers."""
+    if device is None:
+        said = ", ".join(
+            f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
+        )
+        return f"{said} (SI)" if said else ""
+    units = {name: si_unit(candidate.effect, name, device.rotational) for name in candidate.parameters}
+    return numbers_text(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
+
+
+def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
+    """Of the best few; without the first, where the verdict says it."""
+    said = 1 if best_candidate_sentence(diagnosis, device) else 0
+    return tuple(f"Not confirmed: {_with_gain(one, device)}" for one in diagnosis.candidates[said:SENTENCES])
+
+
+def best_candidate_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:
+    """Empty where something is named, nothing is missing, or nothing helps."""
+    if diagnosis.verdict != "unexplained" or not diagnosis.candidates:
+        return ""
+    return f"Best candidate, not confirmed: {_with_gain(diagnosis.candidates[0], device)}"
+
+
+def _with_gain(candidate: Candidate, device: Device | None) -> str:
+    return (
+        f"{candidate_title(candidate, device)}. It would take {share_text(candidate.held_out_gain)} of the error's "
+        f"power on held-out data, {share_text(candidate.share_of_black_box)} of what all laws together take. Why it "
+        f"is not named: {ended(candidate.why_not)}"
+    )

@@ -1,0 +1,41 @@
+"""What is said of how much could be predicted at all: by all laws together, and by a model without physics."""
+
+from collections.abc import Sequence
+
+from analysis.diagnosis.result.findings import BlackBox, Reached
+from analysis.diagnosis.settings import SAME_TO_READERS
+from analysis.diagnosis.unit_wording import error_text, share_text
+from analysis.wording import capital
+
+
+def black_box_sentence(box: BlackBox | None, named: bool) -> str:
+    if box is None:
+        return ""
+    physics = "the physics" if named else "the re-tuned model"
+    fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
+    errors = f"{error_text(box.test)} of the signal on the held-out data; {physics} leaves {error_text(box.physics)}"
+    if black_box_beats(box):
+        return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."
+    if box.physics * SAME_TO_READERS < box.test:
+        return f"{fitted} {errors}. {capital(physics)} predicts better."
+    return f"{fitted} {errors}: no better."
+
+
+def black_box_beats(box: BlackBox) -> bool:
+    return box.test * SAME_TO_READERS < box.physics
+
+
+def ceiling_sentences(reached: Sequence[Reached]) -> tuple[str, ...]:
+    """One per axis whose force balance was weighed."""
+    return tuple(_ceiling(one, len(reached) == 1) for one in reached)
+
+
+def _ceiling(one: Reached, single: bool) -> str:
+    along = "" if single else f" along {one.axis}"
+    share = f"; that is {share_text(one.share)} of the way" if one.named < one.linear else ""
+    named = f"what is named leaves {error_text(one.named)}" if one.any_named else "no law is named"
+    return (
+        f"In the force balance{along}, on held-out data, mass, damping and stiffness alone leave "
+        f"{error_text(one.linear)} of the force, and all laws together {error_text(one.ceiling)}, which no sum of a "
+        f"few laws should be expected to beat: {named}{share}."
+    )

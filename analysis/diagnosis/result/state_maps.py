@@ -1,0 +1,220 @@
+"""The missing force along each axis against position, velocity, command and time, and the loops that it makes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.document import Diagnosis
+from analysis.diagnosis.result.signature_bins import binned
+from analysis.diagnosis.types import Mask
+from equalizer.effects.evidence import Evidence
+from equalizer.effects.placing import axis_letter
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+CLOUD = 600
+"""Samples that are drawn by themselves."""
+LOOP_SAMPLES = 2000
+"""Of a loop at most;"""
+LOOP_PERIODS = 1.1
+"""and of the motion's strongest period, so that a loop closes."""
+NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not confirmed"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateView:
+    along: str
+    """What the abscissa is: "position"."""
+    unit: str
+    """Of the abscissa, SI."""
+    cloud_at: FloatArray
+    cloud: FloatArray
+    """Single samples of the missing force;"""
+    at: FloatArray
+    mean: FloatArray
+    """its mean per bin,"""
+    error: FloatArray
+    """the mean's standard error,"""
+    left: FloatArray
+    """and the mean of what the completed law leaves there; empty where there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """Forces of a stretch of the recording, in the order of time."""
+
+    along: str
+    unit: str
+    at: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    """As the model without new physics needs it for this motion,"""
+    after: FloatArray
+    """and with the completed law; empty where there is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateMaps:
+    """One axis's."""
+
+    axis: str
+    unit: str
+    """Of the force, SI."""
+    model: str
+    """Whose missing force it is, in words;"""
+    completed: str
+    """and by what it was completed: NAMED, NOT_CONFIRMED; empty = by nothing."""
+    share: float
+    """Missing force over force, rms."""
+    views: tuple[StateView, ...]
+    loops: tuple[Loop, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Course:
+    """One axis's samples (n,), parts one after another."""
+
+    rate_hz: float
+    seconds: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    force: FloatArray
+    before: FloatArray
+    after: FloatArray | None
+    used: Mask
+    parts: tuple[slice, ...]
+
+
+def state_maps(
+    diagnosis: Diagnosis, balances: Sequence[Balance], evidence: Sequence[Evidence], recording: Recording
+) -> tuple[StateMaps, ...]:
+    """What is to be drawn first comes first: the axis of the first named effect, then those that miss most. From the
+    force balance where there is one; else evidence, of the re-tuned model, tells."""
+    channels = recording.command.channels
+    letters = tuple(axis_letter(channel, channels) for channel in channels)
+    units = recording.command.units
+    turning = any(unit.startswith("rad") for unit in recording.response.units) or units[0].startswith("N m")
+    found = []
+    for axis, letter in enumerate(letters):
+        if balances:
+            course, completed = _of_balance(balances[axis], diagnosis, letter)
+            model = "mass, damping and stiffness alone"
+        else:
+            course, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
+        if course is not None:
+            said = (letter, units[axis], model, completed)
+            found.append(_maps(course, said, "rad" if turning else "m"))
+    first = diagnosis.effects[0].axis if diagnosis.effects else None
+    return tuple(sorted(found, key=lambda one: (one.axis != first, -one.share)))
+
+
+def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_Course | None, str]:
+    regression = balance.searched.regression
+    names = {one.effect for one in diagnosis.effects if one.axis in (letter, None, "")}
+    named = [one.place for one in balance.laws if one.law.effect in names]
+    laws = named or [one.place for one in balance.laws]
+    linear, whole = (regression.remainder(regression.chosen(each)) for each in ((), laws))
+    axis = min(regression.axis, len(regression.motions[0].channels) - 1)
+    motions = regression.motions
+    course = _Course(
+        motions[0].rate_hz / motions[0].step,
+        _seconds(motions),
+        np.concatenate([one.position[:: one.step, axis] for one in motions]),
+        np.concatenate([one.velocity[:: one.step, axis] for one in motions]),
+        np.concatenate(regression.force),
+        np.concatenate(_less(regression, linear)),
+        np.concatenate(_less(regression, whole)) if laws else None,
+        np.concatenate([one.kept(one.fit | one.test) for one in motions]),
+        _slices([len(force) for force in regression.force]),
+    )
+    return (course if course.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
+
+
+def _less(regression: Regression, remainder: Sequence[FloatArray]) -> list[FloatArray]:
+    return [force - left for force, left in zip(regression.force, remainder, strict=True)]
+
+
+def _seconds(motions: Sequence[Motion]) -> FloatArray:
+    count = sum(len(one.force[:: one.step]) for one in motions)
+    return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
+
+
+def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
+    ends = np.cumsum([0, *counts]).tolist()
+    return tuple(slice(begin, end) for begin, end in pairwise(ends))
+
+
+def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _Course | None:
+    """None where no motion along it is known."""
+    if not evidence or any(axis >= one.axis_force.shape[1] for one in evidence):
+        return None
+    position, velocity, force, missing = (
+        np.concatenate([getattr(one, name)[:, axis] for one in evidence])
+        for name in ("axis_position", "axis_velocity", "command", "axis_force")
+    )
+    known = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(force) & np.isfinite(missing)
+    used = known & np.concatenate([one.used > 0 for one in evidence])
+    rate_hz = evidence[0].sample_rate_hz
+    if not used.any() or not np.ptp(velocity[used]) > 0:
+        return None
+    seconds = np.arange(len(force)) / rate_hz
+    parts = _slices([len(one.command) for one in evidence])
+    return _Course(rate_hz, seconds, position, velocity, force, force + missing, None, used, parts)
+
+
+def _maps(course: _Course, said: tuple[str, str, str, str], length: str) -> StateMaps:
+    axis, unit, model, completed = said
+    # As a force on the device that the model lacks: what friction does points against the motion.
+    missing = course.before - course.force
+    left = None if course.after is None else course.after - course.force
+    views = tuple(
+        _view(course, (along, its_unit), at, (missing, left))
+        for along, its_unit, at in (
+            ("position", length, course.position),
+            ("velocity", f"{length}/s", course.velocity),
+            ("command", unit, course.force),
+            ("time", "s", course.seconds),
+        )
+    )
+    signal = course.force[course.used] - course.force[course.used].mean()
+    size = max(float(np.sqrt(np.mean(signal**2))), 1e-300)
+    share = float(np.sqrt(np.mean(missing[course.used] ** 2))) / size
+    return StateMaps(axis, unit, model, completed, share, views, _loops(course, length))
+
+
+def _view(
+    course: _Course, said: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
+) -> StateView:
+    before, after = missing
+    places = np.flatnonzero(course.used)
+    shown = places[:: max(len(places) // CLOUD, 1)]
+    where, mean, error = binned(at, before, course.used, course.rate_hz)
+    left = np.zeros(0) if after is None else binned(at, after, course.used, course.rate_hz)[1]
+    return StateView(*said, at[shown], before[shown], where, mean, error, left)
+
+
+def _loops(course: _Course, length: str) -> tuple[Loop, ...]:
+    part = _stretch(course)
+    after = np.zeros(0) if course.after is None else course.after[part]
+    forces = course.force[part], course.before[part], after
+    return tuple(
+        Loop(along, unit, at[part], *forces)
+        for along, unit, at in (("position", length, course.position), ("velocity", f"{length}/s", course.velocity))
+    )
+
+
+def _stretch(course: _Course) -> slice:
+    """About a period of the motion where it travels furthest."""
+    part = max(course.parts, key=lambda one: float(np.ptp(course.position[one])) if one.stop > one.start else 0.0)
+    position = course.position[part]
+    power = np.abs(np.fft.rfft(position - position.mean()))
+    line = int(np.argmax(power[1:])) + 1 if len(power) > 1 else 1
+    count = int(np.clip(LOOP_PERIODS * len(position) / line, min(40, len(position)), LOOP_SAMPLES))
+    starts = range(0, max(len(position) - count, 0) + 1, max(count // 4, 1))
+    best = max(starts, key=lambda begin: float(np.ptp(position[begin : begin + count])))
+    return slice(part.start + best, part.start + min(best + count, len(position)))

@@ -1,0 +1,140 @@
+"""The missing force over the states of motion, and the force's loops: seen without any name."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.diagnosis.result.state_maps import Loop, StateMaps, StateView
+from analysis.diagnosis.unit_wording import scale_of, share_text
+from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED
+from analysis.figures.picture import Picture
+from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes
+from analysis.wording import listed
+from equalizer.signals.signal import FloatArray
+
+_SEEN = 0.998
+"""Share of the single samples that a panel is wide enough for: outliers must not make the rest flat."""
+
+
+def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
+    """Of the first axis: the states, then the loops."""
+    if not maps:
+        return ()
+    first = maps[0]
+    along = f" along {first.axis}" if len(maps) > 1 else ""
+    others = [f"{share_text(one.share)} along {one.axis}" for one in maps[1:]]
+    beside = f" Not drawn: {listed(others)}." if others else ""
+    left = f" Blue: mean of what is left {first.completed}." if first.completed else ""
+    states = Picture(
+        name="state-map",
+        title=f"The force that is missing{along}, over the states of motion",
+        caption=f"What {first.model} {'lack' if ' and ' in first.model else 'lacks'} as a force on the device; grey: "
+        f"single samples; black: mean per bin, with two standard errors.{left} A flat line at zero says that nothing "
+        f"depends on that state. Rms: {share_text(first.share)} of the force.{beside}",
+        figure=_states(first),
+        alternative=" ".join(_in_words(view, first.unit) for view in first.views),
+    )
+    said = f", and {first.completed}" if first.completed else ""
+    loops = Picture(
+        name="state-loops",
+        title=f"The force{along} over a stretch of the motion",
+        caption=f"About one period, where the travel is widest: the force as it was, as {first.model} would need it"
+        f"{said}. The area inside a loop over the position is work that is lost.",
+        figure=_loops(first),
+        alternative=_loop_in_words(first),
+    )
+    return states, loops
+
+
+def _states(maps: StateMaps) -> Figure:
+    figure = new_figure(8.8, 5.6)
+    scale = scale_of(maps.unit, max(float(np.abs(view.mean).max(initial=0.0)) for view in maps.views))
+    limits = _limits([np.concatenate([view.cloud, view.mean]) for view in maps.views], scale.factor)
+    for axes, view in zip(figure.subplots(2, 2, sharey=True).ravel(), maps.views, strict=True):
+        plain_axes(axes)
+        _draw_view(axes, view, scale.factor)
+        axes.set_ylim(*limits)
+    figure.supylabel(f"Missing force ({scale.unit})", fontsize=9.5)
+    handles = [
+        Line2D([], [], color=GREY, marker=".", linestyle="", alpha=0.6, label="samples"),
+        Line2D([], [], color=BLACK, marker="o", linestyle="", markersize=3.5, label="missing, mean"),
+    ]
+    if maps.completed:
+        handles.append(Line2D([], [], color=BLUE, linewidth=1.8, label=f"left {maps.completed}"))
+    figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
+    return figure
+
+
+def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
+    along = scale_of(view.unit, float(np.abs(view.cloud_at).max(initial=0.0)))
+    axes.plot(along.factor * view.cloud_at, factor * view.cloud, ".", color=GREY, markersize=2.2, alpha=0.35, zorder=1)
+    axes.axhline(0, color=GREY, linewidth=0.8, zorder=2)
+    axes.errorbar(
+        along.factor * view.at, factor * view.mean, yerr=2 * factor * view.error, fmt="o", color=BLACK, markersize=3.2,
+        elinewidth=0.9, capsize=1.5, zorder=4,
+    )  # fmt: skip
+    if len(view.left):
+        axes.plot(along.factor * view.at, factor * view.left, color=BLUE, linewidth=1.8, zorder=3)
+    axes.set_xlabel(f"{view.along.capitalize()} ({along.unit})", fontsize=9)
+    axes.locator_params(axis="x", nbins=6)
+
+
+def _loops(maps: StateMaps) -> Figure:
+    figure = new_figure(8.8, 3.9)
+    every = [each for loop in maps.loops for each in (loop.measured, loop.before, loop.after)]
+    scale = scale_of(maps.unit, float(np.abs(np.concatenate(every)).max(initial=0.0)))
+    for axes, loop in zip(figure.subplots(1, 2, sharey=True), maps.loops, strict=True):
+        plain_axes(axes)
+        _draw_loop(axes, loop, scale.factor)
+    figure.supylabel(f"Force ({scale.unit})", fontsize=9.5)
+    before = BEFORE.handle
+    before.set_label(maps.model)
+    handles = [MEASURED, before]
+    if maps.completed:
+        handles.append(AFTER.handle)
+        handles[-1].set_label(maps.completed)
+    figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
+    return figure
+
+
+def _draw_loop(axes: Axes, loop: Loop, factor: float) -> None:
+    along = scale_of(loop.unit, float(np.abs(loop.at).max(initial=0.0)))
+    at = along.factor * loop.at
+    axes.plot(at, factor * loop.measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    for stage, values in ((BEFORE, loop.before), (AFTER, loop.after)):
+        if len(values):
+            axes.plot(at, factor * values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    axes.set_xlabel(f"{loop.along.capitalize()} ({along.unit})", fontsize=9)
+    axes.locator_params(axis="x", nbins=6)
+
+
+def _limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
+    whole = factor * np.concatenate(values)
+    low, high = np.quantile(whole, [(1 - _SEEN) / 2, (1 + _SEEN) / 2])
+    room = 0.06 * max(float(high - low), 1e-300)
+    return float(min(low, 0.0)) - room, float(max(high, 0.0)) + room
+
+
+def _in_words(view: StateView, unit: str) -> str:
+    if not len(view.mean):
+        return f"Against {view.along}: too few samples."
+    low, high = int(np.argmin(view.mean)), int(np.argmax(view.mean))
+    return (
+        f"Against {view.along}: mean missing force from {view.mean[low]:.3g} {unit} at {view.at[low]:.3g} {view.unit} "
+        f"to {view.mean[high]:.3g} {unit} at {view.at[high]:.3g} {view.unit}."
+    )
+
+
+def _loop_in_words(maps: StateMaps) -> str:
+    loop = maps.loops[0]
+    size = max(float(np.std(loop.measured)), 1e-300)
+    kinds = ((maps.model, loop.before), (maps.completed, loop.after))
+    left = [
+        f"{words}: {share_text(float(np.sqrt(np.mean((values - loop.measured) ** 2))) / size)}"
+        for words, values in kinds
+        if len(values)
+    ]
+    return f"Distance from the measured force in this stretch, rms over the force's own: {'; '.join(left)}."

@@ -1,0 +1,110 @@
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
+from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, noun_of, si_unit
+from analysis.diagnosis.result.candidate_wording import (
+    SENTENCES,
+    Device,
+    best_candidate_sentence,
+    candidate_sentences,
+    candidate_title,
+    class_sentence,
+)
+from analysis.diagnosis.result.ceiling_wording import ceiling_sentences
+from analysis.diagnosis.result.findings import Reached
+from analysis.diagnosis.result.wording import effect_title, inseparable_sentence, verdict_sentence
+
+ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
+DEVICE = Device(single=True, rotational=False)
+DRY = Candidate("coulomb_friction", "mechanism", "x", {"level": 0.211}, 0.4, 0.62, "the main part is another")
+STICKY = Candidate(
+    "viscoelastic_relaxation", "mechanism", "x", {"stiffness": 120.0, "time_constant": 0.02}, 0.2, 0.3,
+    "no simulation of ours plays it yet",
+)  # fmt: skip
+NAMED = NamedEffect("coulomb_friction", "mechanism", "x", 0.9, 0.68, {"level": Estimate(0.211, "N", (0.20, 0.22))})
+
+
+def diagnosis(verdict, candidates, effects=()):
+    place = Mismatch("ax", "fx", (8.0, 16.0), 0.5, None, 0.8, 1e-9)
+    left = (place,) if verdict == "partly_explained" else ()
+    fit = Fit(ERRORS, ERRORS)
+    return Diagnosis(verdict, (place,), effects, {}, left, fit, "free simulation", None, candidates)
+
+
+def of_class(effect, *others, **changes):
+    return replace(NAMED, effect=effect, class_=(effect, *others), **changes)
+
+
+def test_where_nothing_is_named_the_verdict_says_the_best_candidate_with_its_numbers_and_why_not():
+    said = verdict_sentence(diagnosis("unexplained", (DRY, STICKY)), device=DEVICE)
+    assert said.endswith(
+        "Best candidate, not confirmed: dry friction on the x drive, 0.211 N. It would take 40 % of the error's power "
+        "on held-out data, 62 % of what all laws together take. Why it is not named: the main part is another."
+    )
+
+
+def test_no_candidate_is_said_to_be_best_where_something_is_named_or_nothing_is_there():
+    assert "candidate" not in verdict_sentence(diagnosis("unexplained", ()), device=DEVICE)
+    assert best_candidate_sentence(diagnosis("partly_explained", (DRY,), (NAMED,)), DEVICE) == ""
+
+
+def test_each_candidate_is_said_once():
+    nothing, something = diagnosis("unexplained", (DRY, STICKY)), diagnosis("partly_explained", (STICKY,), (NAMED,))
+    (other,) = candidate_sentences(nothing, DEVICE)
+    assert other.startswith("Not confirmed: a spring that gives way in time (viscoelastic relaxation) on the x drive, ")
+    assert "120 N/m, time constant 20.0 ms." in other
+    assert candidate_sentences(something, DEVICE) == (other,)
+
+
+def test_sentences_are_few_however_many_candidates_there_are():
+    many = tuple(replace(STICKY, effect=name) for name in ("cogging", "backlash", "end_stop", "constant_force"))
+    assert len(candidate_sentences(diagnosis("partly_explained", many, (NAMED,)), DEVICE)) == SENTENCES
+
+
+def test_numbers_have_units_only_where_the_device_is_known():
+    assert candidate_title(DRY, Device(False, True)) == "dry friction on the x drive, 211 mN m"
+    assert candidate_title(DRY) == "dry friction on the x drive, level 0.211 (SI)"
+
+
+@pytest.mark.parametrize("effect", LAW_WORDS)
+def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
+    assert "_" not in noun_of(effect)
+    assert effect not in EFFECT_WORDS
+    assert set(LAW_WORDS[effect].words.numbers) == set(LAW_WORDS[effect].units)
+    assert {si_unit(effect, name, turning) for name in LAW_WORDS[effect].units for turning in (False, True)} != {"1"}
+
+
+def test_a_class_is_called_by_what_its_laws_have_in_common():
+    friction = of_class("coulomb_friction", "stribeck_friction", "presliding_hysteresis")
+    assert effect_title(friction, True) == "friction (dry friction, or 2 laws like it) on the x drive"
+    assert inseparable_sentence(friction) == (
+        "Friction whose law these data leave open: dry friction, friction that is larger at rest (Stribeck) or dry "
+        "friction with elastic presliding would each explain it as well on held-out data. The numbers are those of "
+        "dry friction."
+    )
+    late = of_class(
+        "amplifier_lag", "transport_delay", place="actuator", parameters={"time_constant": Estimate(1e-3, "s")}
+    )
+    assert effect_title(late) == "a late command: lag or delay in the x actuator"
+
+
+def test_a_class_of_different_kinds_and_rivals_as_good_are_listed():
+    mixed = of_class("coulomb_friction", "backlash", rivals=(Rival("stribeck_friction", 0.3, True, ""),))
+    assert effect_title(mixed, True) == "dry friction on the x drive"
+    assert "play (backlash) or friction that is larger at rest (Stribeck) would" in class_sentence(mixed)
+
+
+def test_an_effect_without_a_class_is_called_by_its_own_name():
+    assert class_sentence(NAMED) == inseparable_sentence(NAMED) == ""
+    assert effect_title(NAMED) == "dry friction on the x drive"
+
+
+def test_the_share_of_the_ceiling_is_one_of_powers():
+    (said,) = ceiling_sentences((Reached("x", 0.5, 0.3, 0.1, True),))
+    assert "alone leave 50 % of the force, and all laws together 10 %" in said
+    assert said.endswith("what is named leaves 30 %; that is 67 % of the way.")
+    (nothing,) = ceiling_sentences((Reached("x", 0.5, 0.5, 0.1, False),))
+    assert nothing.endswith("no law is named.")
+    assert ceiling_sentences((Reached("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith("In the force balance along x,")

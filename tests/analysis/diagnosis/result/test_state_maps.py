@@ -1,0 +1,105 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.motion import motions_of
+from analysis.diagnosis.balance.structures import search_structures
+from analysis.diagnosis.balance.weigh import weigh
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.document import Diagnosis, Errors, Fit, Mismatch
+from analysis.diagnosis.result.candidates import reached_of
+from analysis.diagnosis.result.state_maps import NOT_CONFIRMED, state_maps
+from analysis.diagnosis.search.patience import always
+from analysis.figures.diagnosis_state_maps import state_map_pictures
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ, MASS, DAMPING, LEVEL = 200.0, 2.0, 5.0, 3.0
+PLACE = Mismatch("x", "force", (1.0, 2.0), 1.0, None, 0.8, 1e-9)
+ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
+NOTHING = Diagnosis("unexplained", (PLACE,), (), {}, (), Fit(ERRORS, ERRORS), "predicted force", None)
+
+
+def rubbing(level):
+    """A mass with damping and dry friction, moved along three sines; the force is what that takes."""
+    seconds = np.arange(8000) / RATE_HZ
+    lines = [(0.05, 2 * np.pi * 0.31), (0.02, 2 * np.pi * 0.83), (0.008, 2 * np.pi * 1.7)]
+    x = sum(size * np.sin(w * seconds) for size, w in lines)
+    v = sum(size * w * np.cos(w * seconds) for size, w in lines)
+    a = sum(-size * w**2 * np.sin(w * seconds) for size, w in lines)
+    noise = np.random.default_rng(3).normal(0, [1e-6, 0.01], (len(x), 2))
+    force = MASS * a + DAMPING * v + level * np.tanh(v / 1e-3)
+    return Recording(
+        "slide",
+        Signal((force + noise[:, 1])[:, None], RATE_HZ, "force", "N", ("force",)),
+        Signal((x + noise[:, 0])[:, None], RATE_HZ, "position", "m", ("x",)),
+    )
+
+
+def seen(level, without=frozenset()):
+    recording = rubbing(level)
+    motions = motions_of(observed_parts((recording,), 1))
+    balance = weigh(search_structures(motions, 0, False, without, always))
+    return balance, state_maps(NOTHING, (balance,), (), recording), recording
+
+
+@pytest.fixture(scope="module")
+def with_friction():
+    return seen(LEVEL)
+
+
+def view_of(maps, along):
+    return next(view for view in maps.views if view.along == along)
+
+
+def test_friction_shows_as_a_missing_force_that_turns_with_the_velocity(with_friction):
+    (maps,) = with_friction[1]
+    view = view_of(maps, "velocity")
+    slow = np.abs(view.at) < 0.05
+    assert view.mean[slow & (view.at < -0.005)].mean() > 0.3 * LEVEL
+    assert view.mean[slow & (view.at > 0.005)].mean() < -0.3 * LEVEL
+    assert np.sqrt(np.mean(view.left**2)) < 0.2 * np.sqrt(np.mean(view.mean**2))
+    assert (maps.axis, maps.unit, view.unit, maps.completed) == ("force", "N", "m/s", NOT_CONFIRMED)
+
+
+def test_without_friction_nothing_stands_out():
+    (maps,) = seen(0.0)[1]
+    assert maps.share < 0.05
+    assert np.abs(view_of(maps, "velocity").mean).max() < 0.1 * LEVEL
+
+
+def test_a_loop_follows_the_measured_force_with_the_completed_law(with_friction):
+    (maps,) = with_friction[1]
+    loop = maps.loops[0]
+    far, near = (np.sqrt(np.mean((each - loop.measured) ** 2)) for each in (loop.before, loop.after))
+    assert near < 0.4 * far
+    assert np.ptp(loop.at) > 0.09
+
+
+def test_what_nothing_completes_has_no_second_course():
+    catalogue = frozenset({"coulomb_friction"})
+    balance, _, recording = seen(LEVEL, catalogue)
+    bare = replace(balance, laws=(), others=())
+    (maps,) = state_maps(NOTHING, (bare,), (), recording)
+    assert maps.completed == ""
+    assert all(not len(view.left) for view in maps.views)
+    assert not len(maps.loops[0].after)
+    assert "Blue" not in state_map_pictures((maps,))[0].caption
+
+
+def test_how_far_names_reach_is_measured_on_held_out_blocks(with_friction):
+    balance, _, recording = with_friction
+    (reached,) = reached_of(NOTHING, (balance,), recording.command.channels)
+    assert reached.named == pytest.approx(reached.linear)
+    assert reached.share == pytest.approx(0.0, abs=1e-6)
+    assert reached.ceiling < 0.3 * reached.linear
+
+
+def test_states_and_loops_are_drawn_with_plain_units(with_friction):
+    states, loops = state_map_pictures(with_friction[1])
+    labels = [axes.get_xlabel() for axes in states.figure.axes]
+    assert labels == ["Position (mm)", "Velocity (mm/s)", "Command (N)", "Time (s)"]
+    assert "Against velocity: mean missing force from −" in states.alternative.replace("-", "−")
+    assert [axes.get_xlabel() for axes in loops.figure.axes] == ["Position (mm)", "Velocity (mm/s)"]
+    assert state_map_pictures(()) == ()
