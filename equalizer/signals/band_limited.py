@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.fft import irfft, rfft, rfftfreq
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
@@ -25,11 +25,20 @@ def through(
     Continued beyond both ends as an odd function, after the straight line between them was taken off: neither steps
     nor kinks arise there. The line itself is not put back.
     """
-    bent = samples - straight(samples)
-    whole = np.concatenate([bent, -bent[-2:0:-1]])
+    whole = odd_continued(samples - straight(samples))
     spectrum = rfft(whole, axis=0)
     by = gain(rfftfreq(len(whole), 1 / sample_rate_hz))
     return np.asarray(irfft(np.einsum("lrk,lk->lr", by, spectrum), len(whole), axis=0)[: len(samples)])
+
+
+def odd_continued(samples: FloatArray) -> FloatArray:
+    """One period, (> n, k), of samples (n, k) continued beyond both ends as an odd function about them. Zeros half way
+    round, as far from both ends as can be, bring it to a length of small factors: a transform of a length with a large
+    prime factor takes twenty times as long."""
+    mirrored = -samples[-2:0:-1]
+    exact, middle = len(samples) + len(mirrored), len(mirrored) // 2
+    zeros = np.zeros((next_fast_len(exact, real=True) - exact, samples.shape[1]))
+    return np.concatenate([samples, mirrored[:middle], zeros, mirrored[middle:]])
 
 
 def straight(samples: FloatArray) -> FloatArray:

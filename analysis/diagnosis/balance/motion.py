@@ -15,7 +15,7 @@ from scipy.signal import welch
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.band_limited import low_pass
+from equalizer.signals.band_limited import low_pass, odd_continued
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -172,8 +172,7 @@ def _derivative(
 def _filtered(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
     """Continued beyond both ends as an odd function about them."""
     line = _straight(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
-    bent = samples - line
-    whole = np.concatenate([bent, -bent[-2:0:-1]])
+    whole = odd_continued(samples - line)
     spectrum = rfft(whole, axis=0)
     lines = rfftfreq(len(whole), 1 / rate_hz)
     return np.asarray(irfft(gain(lines)[:, None] * spectrum, len(whole), axis=0)[: len(samples)] + line)  # type: ignore[operator]
