@@ -25,6 +25,7 @@ from study.cli import (
     import_recording,
     kit,
     look,
+    model,
     noise,
     note,
     protocol,
@@ -63,6 +64,7 @@ app.command("analyze")(analyze.analyze)
 app.command("record")(record.record)
 app.command("import")(import_recording.import_recording)
 app.command("look")(look.look)
+app.command("model")(model.model)
 app.command("identify")(identify.identify)
 app.command("equalize")(equalize.equalize)
 app.command("twin")(twin.twin)

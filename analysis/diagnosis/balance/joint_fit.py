@@ -1,0 +1,159 @@
+"""Mass, damping and stiffness of all axes at once by least squares on forces, with matrices that are symmetric.
+
+Axes count alike: each axis's error is divided by the power of its force. Standard errors are sandwich estimates over
+blocks, because residuals are correlated (White, Econometrica 48:817, 1980).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import t as student
+
+from analysis.diagnosis.balance.blocks import Block, error_of, part_of_block
+from analysis.diagnosis.balance.motion import NOISE_SHARE, Motion
+from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
+from equalizer.signals.signal import FloatArray
+
+Part = Literal["mass", "damping", "stiffness"]
+PARTS: tuple[Part, ...] = ("mass", "damping", "stiffness")
+LEAST_BLOCKS = 3
+"""Of test samples, below which folds of those to fit tell the held-out error."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointFit:
+    matrices: dict[Part, FloatArray]
+    """(d, d) each; zero where a part was not asked for."""
+    halves: dict[Part, FloatArray]
+    """Half widths of the 95 % intervals, which hold the bias that the noise of the motion may make."""
+    deviations: dict[Part, float]
+    """The largest standard error on the diagonal."""
+    folds: FloatArray
+    """(blocks,): squares of each block with numbers fitted to the others, over the power of all;"""
+    folds_error: float
+    """their root."""
+    held_out: FloatArray
+    """(d,): rms of each axis's held-out error over that of its force."""
+    remainders: tuple[FloatArray, ...]
+    """Per motion, (kept samples, d): the force that is not explained."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shape:
+    """Which numbers are fitted, and where each stands in each axis's row of weights."""
+
+    columns: list[int]
+    rows: tuple[FloatArray, ...]
+    """Per axis (columns, numbers)"""
+    entries: tuple[tuple[Part, int, int], ...]
+
+
+def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
+    return tuple(regression_of(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
+
+
+def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
+    """parts: what the model has; a constant force is always fitted beside. Raises numpy.linalg.LinAlgError where the
+    motion does not tell them apart."""
+    shape = _shape(regressions[0], parts)
+    powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
+    own = _products([regression.fit for regression in regressions], shape, powers)
+    whole = np.sum([one[0] for one in own], axis=0), np.sum([one[1] for one in own], axis=0)
+    found, spread = _solved(whole), _spread(own, whole)
+    fit = [regression.fit for regression in regressions]
+    crossed = [_solved((whole[0] - gram, whole[1] - pull)) for gram, pull in own]
+    folds = _errors(fit, shape, crossed)
+    test = [regression.test for regression in regressions]
+    tested = len(test[0]) >= LEAST_BLOCKS
+    held = _errors(test, shape, [found] * len(test[0])) if tested else folds
+    sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if tested else fit)])
+    folded = (folds / np.array(powers)).mean(axis=1)
+    matrices, deviations = (_matrices(regressions[0], shape, values) for values in (found, spread))
+    reach = float(student.ppf(0.975, max(len(own) - 1, 1)))
+    halves = {part: np.hypot(reach * deviations[part], NOISE_SHARE * np.abs(matrices[part])) for part in PARTS}
+    return JointFit(
+        matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, folded,
+        float(np.sqrt(folded.sum())), np.sqrt(held.sum(axis=0) / sizes), _remainders(regressions, shape, found),
+    )  # fmt: skip
+
+
+def _shape(regression: Regression, parts: Sequence[Part]) -> _Shape:
+    axes = len(regression.motions[0].channels)
+    columns = [PARTS.index(part) * axes + k for part in parts for k in range(axes)] + [regression.base - 1]
+    entries = tuple((part, i, k) for part in parts for i in range(axes) for k in range(i, axes))
+    rows = []
+    for axis in range(axes):
+        row = np.zeros((len(columns), len(entries) + axes))
+        for number, (part, i, k) in enumerate(entries):
+            begin = list(parts).index(part) * axes
+            if axis in (i, k):
+                row[begin + (k if axis == i else i), number] = 1.0
+        row[-1, len(entries) + axis] = 1.0
+        rows.append(regression.scale[columns][:, None] * row)
+    return _Shape(columns, tuple(rows), entries)
+
+
+def _products(
+    blocks: Sequence[Sequence[Block]], shape: _Shape, powers: Sequence[float]
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Per block, of the joint numbers."""
+    found = []
+    for each in zip(*blocks, strict=True):
+        count = shape.rows[0].shape[1]
+        gram, pull = np.zeros((count, count)), np.zeros(count)
+        for block, row, power in zip(each, shape.rows, powers, strict=True):
+            own = part_of_block(block, shape.columns)
+            gram, pull = gram + row.T @ own[0] @ row / power, pull + row.T @ own[1] / power
+        found.append((gram, pull))
+    return found
+
+
+def _solved(products: tuple[FloatArray, FloatArray]) -> FloatArray:
+    size = np.sqrt(np.maximum(np.diagonal(products[0]), 1e-300))
+    return np.asarray(np.linalg.solve(products[0] / np.outer(size, size), products[1] / size) / size)
+
+
+def _spread(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Standard errors of the numbers."""
+    found = _solved(whole)
+    size = np.sqrt(np.maximum(np.diagonal(whole[0]), 1e-300))
+    inverse = np.linalg.inv(whole[0] / np.outer(size, size)) / np.outer(size, size)
+    scores = np.array([pull - gram @ found for gram, pull in own])
+    wide = len(own) / max(len(own) - 1, 1)
+    return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ (wide * scores.T @ scores) @ inverse), 0.0)))
+
+
+def _errors(blocks: Sequence[Sequence[Block]], shape: _Shape, numbers: Sequence[FloatArray]) -> FloatArray:
+    """(blocks, axes): sums of squares."""
+    return np.array(
+        [
+            [
+                error_of(part_of_block(block, shape.columns), row @ weights, block.power)
+                for block, row in zip(each, shape.rows, strict=True)
+            ]
+            for each, weights in zip(zip(*blocks, strict=True), numbers, strict=True)
+        ]
+    )
+
+
+def _matrices(regression: Regression, shape: _Shape, values: FloatArray) -> dict[Part, FloatArray]:
+    axes = len(regression.motions[0].channels)
+    found = {part: np.zeros((axes, axes)) for part in PARTS}
+    for (part, i, k), value in zip(shape.entries, values, strict=False):
+        found[part][i, k] = found[part][k, i] = value
+    return found
+
+
+def _remainders(regressions: Sequence[Regression], shape: _Shape, found: FloatArray) -> tuple[FloatArray, ...]:
+    weights = [row @ found / regressions[0].scale[shape.columns] for row in shape.rows]
+    return tuple(
+        np.column_stack(
+            [
+                regression.force[number] - regression.columns[number][:, shape.columns] @ own
+                for regression, own in zip(regressions, weights, strict=True)
+            ]
+        )
+        for number in range(len(regressions[0].motions))
+    )

@@ -1,0 +1,30 @@
+"""`hapteq model`: a first mechanical model, without a file written by hand."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def model(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings of one device.", metavar="REC.h5...")],
+    out: Annotated[Path, typer.Option(help="The mechanical model to write, MODEL.toml.")],
+    structure: Annotated[str, typer.Option(help="auto, mass-spring, two-mode, gravity, massless or motor.")] = "auto",
+    as_json: JsonOption = False,
+) -> None:
+    """Fit masses, dampers and springs to recordings, and write them with tolerances.
+
+    `auto` compares structures by their error on held-out data, and says why it took which.
+    """
+    from study.cli.progress import late_bar
+    from study.workflows.fit_first_model import FirstModelPlan, first_model_lines, first_model_summary, fit_first_model
+
+    plan = FirstModelPlan(tuple(recordings), out, structure)
+    with late_bar("Model (%)", total=100) as show:
+        done = fit_first_model(plan, lambda share: show(round(100 * share)))
+    typer.echo(json.dumps(first_model_summary(done), indent=2) if as_json else "\n".join(first_model_lines(done)))
+    for remark in done.remarks:
+        typer.echo(f"Note: {remark}", err=True)
