@@ -146,14 +146,15 @@ def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names
 def _derivative(
     samples: FloatArray, rate_hz: float, band: tuple[float, float], times: int, early_s: float
 ) -> FloatArray:
-    """times: below zero, integrals; of an acceleration without what lies below the band's beginning."""
+    """times: below zero, integrals; those of an acceleration without what lies below the band's beginning, which the
+    force holds and the acceleration itself keeps."""
     band_hz, lowest_hz = band
     line, slope = _straight(samples, rate_hz)
 
     def gain(frequency_hz: FloatArray) -> FloatArray:
         turn = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
         shaped = low_pass(frequency_hz, band_hz) * np.exp(turn * early_s)
-        if lowest_hz > 0:
+        if lowest_hz > 0 and times < 0:
             shaped = shaped * (1 - low_pass(frequency_hz, lowest_hz))
         return np.asarray(shaped * turn**times)
 

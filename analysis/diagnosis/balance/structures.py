@@ -18,7 +18,7 @@ BEAM = 5
 NOTICED = 0.02
 """Share of the error power that a further law must take, over the folds; and in more folds than it adds to, by:"""
 SURE = 2.0
-"""standard errors of its mean gain over the folds."""
+"""standard errors of the folds' mean gain, or of their mean logarithmic gain."""
 REFINED = (0.8, 0.93, 1.075, 1.25)
 """Factors by which nonlinear numbers are moved, as long as that helps."""
 ROUNDS = 6
@@ -82,10 +82,17 @@ def search_structures(
 
 
 def better(plain: Structure, richer: Structure) -> bool:
-    """Whether the folds agree that more laws are worth it."""
-    gains = plain.errors - richer.errors
+    """Whether the folds agree that more laws are worth it: by what each gains, or by the share of its own error, for
+    a stop that is met in one fold only, or one swing that is larger than all others, makes the gains unlike."""
+    floor = 1e-12 * plain.error / len(plain.errors)
+    shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
+    agreed = any(_sure(gains) for gains in (plain.errors - richer.errors, shares))
+    return richer.error < (1 - NOTICED) * plain.error and agreed
+
+
+def _sure(gains: FloatArray) -> bool:
     spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-    return richer.error < (1 - NOTICED) * plain.error and float(gains.sum()) > SURE * spread
+    return float(gains.sum()) > SURE * spread
 
 
 def _linear(regression: Regression) -> Structure:

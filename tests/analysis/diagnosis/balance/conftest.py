@@ -1,0 +1,43 @@
+"""Axes with physics of their own, and what the balance of forces says of them."""
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from equalizer.signals.recording import Hold, Recording
+from equalizer.signals.signal import Signal
+
+
+@pytest.fixture(scope="session")
+def axes(module_at) -> ModuleType:
+    """`invented_axis.py`. Imported late: it compiles."""
+    return module_at(Path(__file__).parent / "invented_axis.py")
+
+
+@pytest.fixture(scope="session")
+def balance_of():
+    """Of a recording, one per axis."""
+    from analysis.diagnosis.search.by_balance import balances_of
+    from analysis.diagnosis.search.patience import always
+
+    return lambda recording, without=(): balances_of([recording], frozenset(without), always)
+
+
+@pytest.fixture
+def recording_of():
+    """force (n, m) and response (n, p) of one quantity, without an axis behind them."""
+
+    def recording(force, response, rate_hz, quantity="position", hold=Hold.BAND_LIMITED, **beside):
+        unit = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}[quantity]
+        channels = tuple("xyz"[: np.shape(response)[1]])
+        return Recording(
+            "invented",
+            Signal(force, rate_hz, "force", "N", tuple(f"f{k}" for k in "xyz"[: np.shape(force)[1]])),
+            Signal(response, rate_hz, quantity, unit, channels),
+            hold=hold,
+            **beside,
+        )
+
+    return recording

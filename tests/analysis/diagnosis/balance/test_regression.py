@@ -1,0 +1,132 @@
+"""Blocks' products against plain least squares on all samples."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.blocks import FOLDS
+from analysis.diagnosis.balance.law import Law, named
+from analysis.diagnosis.balance.motion import motions_of
+from analysis.diagnosis.balance.regression import of_everything, of_laws, regression_of, with_law
+from analysis.diagnosis.balance.structures import Structure, better
+from analysis.diagnosis.data.observed_parts import observed_parts
+
+RATE_HZ, COUNT = 500.0, 6000
+SCALE = Law("scale", 0, (1.0,), lambda m, n: np.tanh(m.velocity[:, :1] / n[0]), named("level"))
+CUBE = Law("cube", 0, (), lambda m, _: m.position[:, :1] ** 3, named("k3"))
+PAIR = Law("pair", 0, (), lambda m, _: np.hstack([np.sin(9 * m.position), np.cos(9 * m.position)]), named("a", "b"))
+
+
+@pytest.fixture
+def regression(recording_of):
+    """Of a force that the laws make in part, with noise; two records."""
+    records = []
+    for seed in (1, 2):
+        random = np.random.default_rng(seed)
+        t = np.arange(COUNT) / RATE_HZ
+        q = sum(a * np.sin(2 * np.pi * f * t + random.uniform(0, 6)) for f, a in ((0.7, 0.5), (2.3, 0.2), (5.1, 0.05)))
+        force = 0.4 * np.gradient(np.gradient(q)) * RATE_HZ**2 + 3.0 * np.gradient(q) * RATE_HZ + 40 * q + 30 * q**3
+        force += 5 * np.tanh(np.gradient(q) * RATE_HZ) + random.standard_normal(COUNT)
+        records.append(recording_of(force[:, None], q[:, None], RATE_HZ))
+    motions = motions_of(observed_parts(records, 1))
+    return regression_of(motions, 0, (SCALE, CUBE, PAIR), turns=False)
+
+
+def stacked(regression, columns, blocks):
+    rows = [regression.columns[b.motion][b.rows][:, columns] for b in blocks]
+    return np.vstack(rows), np.concatenate([regression.force[b.motion][b.rows] for b in blocks])
+
+
+def lstsq(regression, columns, blocks):
+    x, y = stacked(regression, columns, blocks)
+    size = np.linalg.norm(x, axis=0)
+    return np.linalg.lstsq(x / size, y, rcond=None)[0] / size
+
+
+def left(regression, columns, weights, block):
+    x, y = stacked(regression, columns, [block])
+    return float(np.sum((y - x @ weights) ** 2))
+
+
+def test_weights_are_those_of_least_squares(regression):
+    columns = regression.chosen((0, 1))
+    assert regression.weights(columns) == pytest.approx(lstsq(regression, columns, regression.fit), rel=1e-4)
+    assert regression.weights(columns)[-1] == pytest.approx(30, rel=0.2)
+
+
+def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
+    columns = regression.chosen((1,))
+    found = regression.crossed(columns)
+    for number, block in enumerate(regression.fit):
+        others = [other for other in regression.fit if other is not block]
+        assert found[number] == pytest.approx(left(regression, columns, lstsq(regression, columns, others), block))
+    own = [left(regression, columns, lstsq(regression, columns, regression.fit), block) for block in regression.fit]
+    assert found.sum() > sum(own)
+
+
+def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
+    columns = regression.chosen((0, 2))
+    truth = [left(regression, columns, lstsq(regression, columns, regression.fit), b) for b in regression.test]
+    assert regression.held_out(columns) == pytest.approx(truth, rel=1e-4)
+    rows = {(b.motion, k) for b in regression.fit for k in b.rows.tolist()}
+    assert not rows & {(b.motion, k) for b in regression.test for k in b.rows.tolist()}
+    assert len(regression.fit) >= FOLDS
+
+
+def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):
+    wider = replace(SCALE, numbers=(0.2,))
+    changed = with_law(regression, 0, wider)
+    anew = regression_of(regression.motions, 0, (wider, CUBE, PAIR), turns=False)
+    for laws in ((0,), (0, 1, 2)):
+        columns = anew.chosen(laws)
+        assert changed.crossed(columns) == pytest.approx(anew.crossed(columns))
+        assert changed.held_out(columns) == pytest.approx(anew.held_out(columns))
+        assert changed.weights(columns) == pytest.approx(anew.weights(columns))
+    assert changed.crossed(changed.chosen((0,))).sum() != pytest.approx(regression.crossed(anew.chosen((0,))).sum())
+    assert with_law(regression, 0, PAIR) is None
+    assert with_law(regression, 0, replace(SCALE, columns=lambda m, n: 0 * m.velocity[:, :1])) is None
+
+
+def test_some_laws_alone_leave_what_they_leave_among_the_others(regression):
+    alone = of_laws(regression, (2, 0))
+    assert [law.effect for law in alone.laws] == ["pair", "scale"]
+    assert alone.crossed(alone.chosen((0, 1))) == pytest.approx(regression.crossed(regression.chosen((2, 0))))
+    assert alone.held_out(alone.chosen((1,))) == pytest.approx(regression.held_out(regression.chosen((0,))))
+
+
+def test_all_laws_together_leave_no_more_than_the_truth_and_noise_alone_stays(regression):
+    everything = range(regression.columns[0].shape[1])
+    crossed, tested = of_everything(regression, everything)
+    truth = regression.crossed(regression.chosen((0, 1))).sum()
+    assert crossed == pytest.approx(truth, rel=0.05)
+    assert crossed < 0.7 * regression.crossed(regression.chosen(())).sum()
+    assert tested.shape == (len(regression.test),)
+
+
+def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):
+    turned = replace(
+        regression, force=tuple(-f for f in regression.force),
+        fit=tuple(replace(b, pull=-b.pull) for b in regression.fit),
+    )  # fmt: skip
+    columns = turned.chosen(())
+    assert lstsq(turned, columns, turned.fit)[1] < 0
+    assert (turned.weights(columns)[:2] >= 0).all()
+
+
+def test_columns_that_are_nothing_in_all_blocks_but_one_give_finite_errors(regression):
+    """The rest of the sum is then the rounding of a difference."""
+    last = Law("late", 0, (), lambda m, _: (np.arange(len(m.force))[:, None] > 4300) * 1e6 * m.position, named("k"))
+    late = regression_of(regression.motions[:1], 0, (last,), turns=False)
+    found = late.crossed(late.chosen((0,)))
+    assert np.isfinite(found).all()
+    assert found.sum() < 3 * late.crossed(late.chosen(())).sum()
+
+
+def test_laws_are_worth_it_where_the_folds_agree():
+    plain = np.array([0.6, 0.05, 0.04, 0.1, 0.03, 0.02, 0.08, 0.08])
+    swing = Structure((0,), plain / 20)
+    luck = Structure((0,), plain * np.array([0.5, 1.1, 1.2, 1.1, 1.05, 1.3, 1.1, 1.2]))
+    assert better(Structure((), plain), swing)
+    assert not better(Structure((), plain), luck)
+    assert not better(Structure((), plain), Structure((0,), 0.99 * plain))
