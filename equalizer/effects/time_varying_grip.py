@@ -74,7 +74,8 @@ def _rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:
     """How often the damping comes and goes: the missing force against the drag, times a wave, at every rate."""
     n = len(force)
     size = _FINER * n
-    last = int(FASTEST_HZ / rate * size)
+    # Its square is needed at twice as high a line, which a slow clock does not hold.
+    last = min(int(FASTEST_HZ / rate * size), size // 4)
     against = np.conj(np.fft.rfft(np.sum(force * drag, axis=1), size))[: last + 1]
     square = np.conj(np.fft.rfft(np.sum(drag**2, axis=1), size))[: 2 * last + 1]
     twice, whole = square[: 2 * last + 1 : 2], float(square[0].real)

@@ -15,6 +15,8 @@ from equalizer.signals.signal import FloatArray
 
 _SMALL = 1e-9
 """Of a pole times the step: below it the pole integrates."""
+_FASTEST_GROWTH = 200.0
+"""Of a pole's real part times the step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,6 +103,8 @@ def pole_answers(
 ) -> tuple[ComplexArray, ComplexArray]:
     """(lines, poles), (lines,): what a pole, and what goes straight through, makes of a command."""
     step, column = 1 / rate_hz, z[:, None]
+    # A fit may try a model that is unstable: beyond this growth per sample, its answer is huge all the same.
+    poles = np.minimum(poles.real, _FASTEST_GROWTH * rate_hz) + 1j * poles.imag
     if hold is Hold.ZERO_ORDER:
         whole = np.floor(delay_s * rate_hz + 1e-9)
         late = max(delay_s - whole * step, 0.0)

@@ -41,7 +41,8 @@ def scatter_over_lines(response: ComplexArray) -> FloatArray:
 def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
     smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
-    return smooth
+    # A running sum that strong lines have left keeps their rounding, which may be below zero.
+    return np.asarray(np.maximum(smooth, 0.0))
 
 
 def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:

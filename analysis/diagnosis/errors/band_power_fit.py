@@ -57,7 +57,7 @@ class View:
     @property
     def weights(self) -> FloatArray:
         """(stretches, bands, c): none for what is sealed or drowned."""
-        fit = np.array([stretch.part != "test" for stretch in self.power.stretches])
+        fit = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
         known = np.isfinite(self.power.measured) & fit[:, None, None]
         return np.asarray(np.where(known, 1 / np.hypot(self.spread, FLOOR), 0.0))
 

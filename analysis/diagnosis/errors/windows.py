@@ -91,7 +91,8 @@ class Windows:
             Seen(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length, states),
         )
-        left = (record.measured - channels(played, record.measured.shape[1])) / self.unit
+        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+            left = (record.measured - channels(played, record.measured.shape[1])) / self.unit
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
@@ -102,9 +103,12 @@ class Windows:
     ) -> FloatArray:
         """(n, c) less what other states at the windows' beginnings would make of it."""
         n, c = left.shape
-        if not np.isfinite(left).all():
+        # A fit may try a model that is unstable.
+        with np.errstate(over="ignore", invalid="ignore"):
+            free = _free(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
+            told = np.isfinite(left).all() and np.isfinite(np.sum(free**2))
+        if not told:
             return left
-        free = _free(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
         whole = n // length * length
         found = left.copy()
         if whole:

@@ -19,6 +19,8 @@ _CONCENTRATED = 1.5
 _LEAST_SHARE = 0.05
 """Of the power that means over bins must explain."""
 _TINY = np.finfo(np.float64).tiny
+_TOLD = 1e-9
+"""Of a bin's mean: where less is expected, nothing is told."""
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
@@ -134,7 +136,8 @@ def _region(state: State, values: FloatArray, bins: IntArray, asked: _Asked) -> 
     """Share, occupied, words of the stretch of bins around the largest that stand out; None where none does."""
     power = asked.values**2
     one_stratum = bool((asked.strata == asked.strata[0]).all())
-    ratio = _sums(bins, power) / np.maximum(_sums(bins, asked.expected), _TINY)
+    expected = _sums(bins, asked.expected)
+    ratio = _sums(bins, power) / np.maximum(expected, max(_TOLD * float(expected.mean()), _TINY))
     top = int(np.argmax(ratio))
     if ratio[top] < _CONCENTRATED:
         return None
@@ -151,7 +154,10 @@ def _region(state: State, values: FloatArray, bins: IntArray, asked: _Asked) -> 
 
 
 def _unevenness(seen: FloatArray, expected: FloatArray) -> float:
-    return float(np.sum((seen - expected) ** 2 / np.maximum(expected, _TINY)) / max(float(expected.sum()), _TINY))
+    """Where next to nothing is expected, as at rest, nothing is told."""
+    whole = float(expected.sum())
+    told = expected > _TOLD * whole / len(expected)
+    return float(np.sum((seen - expected)[told] ** 2 / expected[told])) / whole if whole > _TINY else 0.0
 
 
 def _within_stratum(strata: IntArray) -> FloatArray:
