@@ -16,6 +16,8 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 LEFT_OUT_EVERY = 4
+_RUN_AWAY = 1e120
+"""Of what states at both ends make of a line: the square of more is no number."""
 _STEP = 1e-6
 
 
@@ -149,6 +151,8 @@ def _folded(one: LineGroup, other: LineGroup) -> LineGroup:
 
 def _without_transient(group: LineGroup, model: MechanicalModel, misfit: ComplexArray) -> ComplexArray:
     basis = transient_basis(group, model)
+    if not np.abs(basis).max(initial=0.0) < _RUN_AWAY:
+        return misfit  # A fit may try a model that is unstable.
     kept = ~group.left_out
     columns, wanted = basis[kept].reshape(-1, basis.shape[2]), misfit[kept].reshape(-1)
     real = np.concatenate([columns.real, columns.imag])

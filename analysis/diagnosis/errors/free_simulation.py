@@ -43,14 +43,15 @@ class FreeSimulation:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        return tuple(
-            (
-                record.measured
-                - channels(self._played(model, effects, record, simulate_response), record.measured.shape[1])
+        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+            return tuple(
+                (
+                    record.measured
+                    - channels(self._played(model, effects, record, simulate_response), record.measured.shape[1])
+                )
+                / self.unit
+                for record in self.records
             )
-            / self.unit
-            for record in self.records
-        )
 
     def _played(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, simulate: Callable[..., Played]

@@ -1,0 +1,139 @@
+"""One physics at a time in an axis, and what the balance of forces says of it; and axes in which nothing is missing."""
+
+import numpy as np
+import pytest
+
+TRUTHS = {
+    "coulomb_friction": {"coulomb": 1.0},
+    "stribeck_friction": {"coulomb": 0.5, "stiction": 1.5, "stribeck_speed": 0.15},
+    "presliding_hysteresis": {"dahl": 1.5, "dahl_stiffness": 300.0},
+    "quadratic_damping": {"quadratic": 10.0},
+    "hardening_stiffness": {"cubic": 3e4},
+    "asymmetric_stiffness": {"square": 350.0},
+    "cogging": {"cogging": 1.0, "pitch": 0.012, "phase": 0.7},
+    "end_stop": {"stop_at": 0.04, "stop_stiffness": 800.0},
+    "pose_dependent_inertia": {"inertia_per_m": 4.0},
+    "position_dependent_friction": {"coulomb": 1.0, "rubbing_per_m": 8.0, "rubbing_per_m2": 50.0},
+}
+NUMBERS = {
+    "coulomb_friction": {"level": (1.0, 0.05)},
+    "stribeck_friction": {"coulomb": (0.5, 0.2), "static": (2.0, 0.1), "speed": (0.15, 0.15)},
+    "presliding_hysteresis": {"level": (1.5, 0.05), "stiffness": (300.0, 0.05)},
+    "quadratic_damping": {"coefficient": (10.0, 0.03)},
+    "hardening_stiffness": {"k3": (3e4, 0.03)},
+    "asymmetric_stiffness": {"k2": (350.0, 0.03)},
+    "cogging": {"amplitude": (1.0, 0.05), "pitch": (0.012, 0.01)},
+    # The place of a stop is taken from a grid over the travel.
+    "end_stop": {"position": (0.04, 0.2), "stiffness": (800.0, 0.4)},
+    "pose_dependent_inertia": {"per_m": (4.0, 0.03)},
+    "position_dependent_friction": {"level": (1.0, 0.05), "slope_per_m": (8.0, 0.1)},
+}
+PD = (600.0, 10.0)
+BY_FEW_GRIPS = ("stribeck_friction", "position_dependent_friction")
+"""In an open loop the axis sticks at each turn: they are then told from dry friction as a class alone."""
+OPEN = ("coulomb_friction", "presliding_hysteresis", "quadratic_damping", "cogging", "pose_dependent_inertia")
+CLOSED = ("hardening_stiffness", "end_stop")
+IMPOSED = ("stribeck_friction", "position_dependent_friction")
+
+
+def check(balance, effect, axis=0):
+    found = {law.law.effect: law for law in balance.named}
+    assert effect in found or any(effect in law.alike for law in balance.named)
+    if effect in found:
+        for name, (truth, within) in NUMBERS[effect].items():
+            assert found[effect].values[name] == pytest.approx(truth, rel=within), name
+    assert all(law.law.channel == axis for law in balance.named)
+    assert balance.error < balance.linear
+
+
+def open_loop(axes, balance_of, effect):
+    (balance,) = balance_of(axes.recorded(axes.Physics(**TRUTHS[effect])))
+    check(balance, effect)
+    if effect not in BY_FEW_GRIPS:
+        assert [law.law.effect for law in balance.named] == [effect]
+
+
+def closed(axes, balance_of, effect):
+    (balance,) = balance_of(axes.recorded(axes.Physics(**TRUTHS[effect]), gains=PD))
+    check(balance, effect)
+
+
+def imposed(axes, balance_of, effect):
+    (balance,) = balance_of(axes.imposed(axes.Physics(**TRUTHS[effect])))
+    check(balance, effect)
+    if effect in IMPOSED:
+        assert [law.law.effect for law in balance.named] == [effect]
+
+
+@pytest.mark.parametrize("effect", OPEN)
+def test_in_an_open_loop(axes, balance_of, effect):
+    open_loop(axes, balance_of, effect)
+
+
+@pytest.mark.parametrize("effect", CLOSED)
+def test_in_a_closed_loop(axes, balance_of, effect):
+    closed(axes, balance_of, effect)
+
+
+@pytest.mark.parametrize("effect", IMPOSED)
+def test_where_the_motion_is_imposed_and_the_force_is_read(axes, balance_of, effect):
+    imposed(axes, balance_of, effect)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", [effect for effect in TRUTHS if effect not in OPEN])
+def test_every_law_in_an_open_loop(axes, balance_of, effect):
+    open_loop(axes, balance_of, effect)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", [effect for effect in TRUTHS if effect not in CLOSED])
+def test_every_law_in_a_closed_loop(axes, balance_of, effect):
+    closed(axes, balance_of, effect)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effect", [effect for effect in TRUTHS if effect not in (*IMPOSED, "presliding_hysteresis", "end_stop")]
+)
+def test_every_law_along_an_imposed_motion(axes, balance_of, effect):
+    imposed(axes, balance_of, effect)
+
+
+def test_of_two_axes_each_has_its_own(axes, balance_of):
+    rubbing = axes.recorded(axes.Physics(coulomb=1.0), seed=1)
+    stiff = axes.recorded(axes.Physics(cubic=3e4), seed=2)
+    both = [np.hstack([getattr(one, side).samples for one in (rubbing, stiff)]) for side in ("command", "response")]
+    first, second = balance_of(axes.recording(*both, rubbing.sample_rate_hz))
+    check(first, "coulomb_friction")
+    check(second, "hardening_stiffness", axis=1)
+
+
+def healthy(axes, balance_of, seed, **beside):
+    random = np.random.default_rng([seed, 11])
+    physics = axes.Physics(random.uniform(0.1, 1.0), random.uniform(0.5, 5.0), random.uniform(30.0, 300.0), **beside)
+    loop = PD if seed % 2 else None
+    colour = (0.0, 0.9, 0.99)[seed % 3]
+    recording = axes.recorded(physics, seed, gains=loop, force_noise=(0.0, 0.01, 0.1)[seed // 2 % 3], colour=colour)
+    (balance,) = balance_of(recording)
+    return [law.law.effect for law in balance.named]
+
+
+@pytest.mark.parametrize("seed", [21, 22])
+def test_where_nothing_is_missing_nothing_is_named(axes, balance_of, seed):
+    assert healthy(axes, balance_of, seed) == []
+
+
+@pytest.mark.parametrize("seed", [24])
+def test_a_second_linear_mode_gets_no_nonlinear_name(axes, balance_of, seed):
+    assert healthy(axes, balance_of, seed, second_mass=0.1, second_hz=12.0) == []
+
+
+@pytest.mark.slow
+def test_nothing_is_named_in_thirty_healthy_axes(axes, balance_of):
+    assert [seed for seed in range(30) if healthy(axes, balance_of, seed)] == []
+
+
+@pytest.mark.slow
+def test_nothing_is_named_in_thirty_axes_of_two_modes(axes, balance_of):
+    assert [seed for seed in range(30) if healthy(axes, balance_of, seed, second_mass=0.1, second_hz=12.0)] == []
