@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.first_model import first_model
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.observed_parts import names_of_parts
-from analysis.diagnosis.errors.choose_measure import Chosen, measure_by_force, measure_of
+from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.assemble_findings import assembled
@@ -41,6 +41,8 @@ class DiagnosisSettings:
     """Of the device when it was in order: what it differed by then from its model, re-tuned, is no mismatch."""
     fitted: bool = False
     """The model was fitted to these recordings by the program: evidence is then weighed in the force balance."""
+    compared: Compared = "auto"
+    """What is compared: motion, force, or what suits."""
     patient: Patience = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
 
@@ -58,7 +60,7 @@ def diagnose(
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
         balances = balances_of(recordings, frozenset(settings.without), settings.patient)
-        for number, look in enumerate(_looks(recordings, model, balances)):
+        for number, look in enumerate(_looks(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             arena = _arena(look, settings, map_)
             repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
@@ -66,7 +68,7 @@ def diagnose(
             if found is not None:
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
-    look = _Look(model, measure_of(recordings, model, settings.clean))
+    look = _Look(model, measure_of(recordings, model, settings.clean, settings.compared))
     seen = _by_search(recordings, look, settings, map_, progress, bool(balances))
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
@@ -86,14 +88,18 @@ class _Seen:
     floor: CleanFloor
 
 
-def _looks(recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance]) -> Iterator[_Look]:
+def _looks(
+    recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
+) -> Iterator[_Look]:
     """In a free simulation, the strictest, where the fitted model bears one; else along the measured motion, with the
     balance's own linear numbers."""
     if not any(balance.named for balance in balances):
         return
     chosen = measure_of(recordings, model)
-    if chosen.measure.name == "free simulation":
+    if chosen.measure.name == "free simulation" and compared != "force":
         yield _Look(model, chosen)
+    if compared == "motion":
+        return
     try:
         rigid = first_model(balances, recordings[0], model.name)
         if rigid is not None:

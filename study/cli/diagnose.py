@@ -2,11 +2,38 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from study.cli.results import JsonOption
+
+CompareOption = Annotated[
+    Literal["auto", "motion", "force"],
+    typer.Option(help="What is compared: the motion, the force along the measured motion, or what suits."),
+]
+
+SecondsOption = Annotated[
+    float | None,
+    typer.Option(min=1.0, help="Processor time for the search; what was found by then is kept. [default: no limit]"),
+]
+
+NoDiscoveryOption = Annotated[
+    bool, typer.Option("--no-discovery", help="Name laws of the catalogue only; no others are looked for yet.")
+]
+
+CleanOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="CLEAN.h5",
+        help="A recording of the device when it was in order: what it differed by then is no mismatch; may be "
+        "repeated.",
+    ),
+]
+
+WithoutOption = Annotated[
+    list[str] | None, typer.Option(metavar="EFFECT", help="An effect not to be considered; may be repeated.")
+]
 
 
 def diagnose(
@@ -19,20 +46,14 @@ def diagnose(
         Path | None,
         typer.Option(help="Mechanical model MODEL.toml [default: fitted to the recordings; for a session, the twin]."),
     ] = None,
-    without: Annotated[
-        list[str] | None, typer.Option(metavar="EFFECT", help="An effect not to be considered; may be repeated.")
-    ] = None,
-    clean: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="CLEAN.h5",
-            help="A recording of the device when it was in order: what it differed by then is no mismatch; may be "
-            "repeated.",
-        ),
-    ] = None,
+    without: WithoutOption = None,
+    clean: CleanOption = None,
     seed: Annotated[
         int, typer.Option(min=0, help="Draws which trials of a session are used, and which are kept for the test.")
     ] = 1,
+    compare: CompareOption = "auto",
+    seconds: SecondsOption = None,
+    no_discovery: NoDiscoveryOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Locate the mismatch, name what is missing, and test it on held-out data.
@@ -43,7 +64,9 @@ def diagnose(
     from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
     from study.workflows.diagnosed_summary import diagnosed_lines, summary
 
-    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed)
+    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare, seconds)
     with steps("Diagnosing") as show:
         done = diagnose_recordings(plan, show)
+    if no_discovery:
+        typer.echo("Note: no law outside the catalogue is looked for yet; --no-discovery changes nothing.", err=True)
     typer.echo(json.dumps(summary(done), indent=2) if as_json else "\n".join(diagnosed_lines(done)))

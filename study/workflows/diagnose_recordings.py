@@ -4,11 +4,14 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import process_time
 from typing import Protocol
 
 import numpy as np
 
+from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from analysis.diagnosis.types import Mapper, Progress
@@ -47,6 +50,9 @@ class DiagnosePlan:
     """Recordings of the device when it was in order, or one session's folder."""
     seed: int = 1
     """Of what is drawn: which trials of a session are taken, and which are kept for the test."""
+    compare: Compared = "auto"
+    seconds: float | None = None
+    """Of processor time, after which the search ends with what it has."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,9 +88,8 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
     held = with_spring(model, spring)
     begun = FITTED if plan.model is None else READ
-    known = () if clean is None else clean.recordings
-    fitted = plan.model is None and not found.simulated
-    settings = DiagnosisSettings(without=plan.without, names=found.names, clean=known, fitted=fitted)
+    _check_compared(plan, found, held)
+    settings = _settings(plan, found, clean)
     try:
         with worker_threads() as threads:
             findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
@@ -107,6 +112,31 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     _write(plan, findings, parents)
     on_progress("done", 1.0)
     return DiagnosedRecordings(findings, plan.out)
+
+
+def _settings(plan: DiagnosePlan, found: DiagnosisInput, clean: DiagnosisInput | None) -> DiagnosisSettings:
+    worked = process_time()
+    return DiagnosisSettings(
+        without=plan.without,
+        names=found.names,
+        clean=() if clean is None else clean.recordings,
+        fitted=plan.model is None and not found.simulated,
+        compared=plan.compare,
+        patient=lambda: plan.seconds is None or process_time() - worked < plan.seconds,
+    )
+
+
+def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: MechanicalModel) -> None:
+    """Raises WrongUseError."""
+    if plan.compare == "force" and plan.clean:
+        happened = "Beside clean recordings errors are measured by the rule, so that both are measured alike."
+    elif plan.compare == "force" and not all(has_motion(one, model) for one in found.recordings):
+        happened = "Neither positions nor velocities of every driven axis were measured, so no force can be told."
+    else:
+        return
+    raise WrongUseError(
+        "Forces cannot be compared", happened, "Leave --compare out, or ask for motion.", saved="Nothing was written."
+    )
 
 
 def _write(plan: DiagnosePlan, findings: Findings, parents: Sequence[Path]) -> None:

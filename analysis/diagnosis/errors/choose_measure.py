@@ -44,6 +44,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Measure = Literal["free simulation", "windows", "predicted force"]
+Compared = Literal["auto", "motion", "force"]
+"""What a user asks to be compared; auto: by the rule."""
 
 DITHER = 0.02
 """Steps of a converter: with less noise than that before it, repeats do not show it."""
@@ -64,9 +66,16 @@ class Chosen:
     remarks: tuple[str, ...]
 
 
-def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: Sequence[Recording] = ()) -> Chosen:
+def measure_of(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    beside: Sequence[Recording] = (),
+    compared: Compared = "auto",
+) -> Chosen:
     """The error measure that the rule chooses, of every part of the recordings. beside: others that must be measured
     alike, and are not part of it."""
+    if compared == "force":
+        return measure_by_force(recordings, model, None)
     records, others = (
         tuple(_settled(record, model) for record in observed_parts(these, model.outputs)) if these else ()
         for these in (recordings, beside)
@@ -75,6 +84,8 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: 
     noise = _noise(floors, records)
     unit = noise_in_units(np.vstack([record.measured for record in records]), noise)
     choice = choose_measure((*records, *others), model)
+    if compared == "motion" and choice.measure == "predicted force":
+        choice = Choice("windows", ASKED_MOTION)
     known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
     remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
     if choice.measure == "free simulation":
@@ -84,12 +95,12 @@ def measure_of(recordings: Sequence[Recording], model: MechanicalModel, beside: 
             windows = replace(windows_of(records, model, (unit, noise)), known=known)
             return Chosen(windows, floors, remarks)
         except np.linalg.LinAlgError:
-            if not all(has_motion(record.recording, model) for record in records):
+            if compared == "motion" or not all(has_motion(record.recording, model) for record in records):
                 return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
     return _by_force(records, model, floors, remarks)
 
 
-def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> Chosen:
+def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> Chosen:
     """The force that the model needs along the measured motion, up to a frequency, whatever the rule says; see
     `has_motion`."""
     records = observed_parts(recordings, model.outputs)
@@ -176,6 +187,10 @@ IMPOSED = (
 BY_FORCE = (
     "The force that the model needs along the measured motion is compared with the one that entered: the motion was "
     "measured, and small errors of a model that was fitted to it would grow in a simulation."
+)
+ASKED_MOTION = (
+    "The motion is compared, as was asked, in windows of 1 s, each from a state estimated from the measured motion; by "
+    "itself the rule would have compared forces."
 )
 CLOSED_LOOP = (
     "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "

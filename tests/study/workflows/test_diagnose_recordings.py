@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.errors import LeftError, StudyError, WrongUseError
@@ -327,3 +328,25 @@ def test_results_of_the_screen_lie_in_a_session_or_beside_a_recording(tmp_path):
     (tmp_path / "rec-diagnosis").mkdir()
     assert free_out(tmp_path / "rec.h5") == tmp_path / "rec-diagnosis-2"
     assert free_out(tmp_path) == tmp_path / "diagnosis"
+
+
+def test_compare_and_seconds_reach_the_engine(files, findings, tmp_path):
+    engine = asked_of_engine(plan(files, tmp_path / "out", compare="force", seconds=1e-9), findings)
+    assert engine.settings.compared == "force"
+    assert not engine.settings.patient()
+    assert asked_of_engine(plan(files, tmp_path / "out"), findings).settings.patient()
+
+
+def test_forces_without_a_measured_motion_are_refused(files, recording, tmp_path):
+    write_recording(tmp_path / "rec.h5", replace(recording, position=None))
+    with pytest.raises(WrongUseError, match="Neither positions nor velocities"):
+        diagnose_recordings(plan(files, tmp_path / "out", sources=(tmp_path / "rec.h5",), compare="force"), quiet)
+
+
+def test_what_is_compared_is_what_was_asked_for(made, recording):
+    model = made.device(1)
+    assert measure_of([recording], model).measure.name == "free simulation"
+    assert measure_of([recording], model, compared="force").measure.name == "predicted force"
+    imposed = replace(recording, meta={**recording.meta, "imposed": "position"})
+    assert measure_of([imposed], model).measure.name == "predicted force"
+    assert measure_of([imposed], model, compared="motion").measure.name != "predicted force"
