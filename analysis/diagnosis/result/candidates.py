@@ -33,7 +33,7 @@ def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: t
         for one in diagnosis.effects
         if f"{one.effect.replace('_', ' ')} {one.axis}" not in constants
     )
-    named = {(one.effect, one.axis) for one in effects}
+    named = {(name, one.axis) for one in effects for name in (one.effect, *one.class_)}
     found = [
         _candidate(one, axis_letter(channels[axis], channels))
         for axis, balance in enumerate(balances)

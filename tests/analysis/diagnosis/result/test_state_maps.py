@@ -7,8 +7,8 @@ from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.balance.weigh import weigh
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.document import Diagnosis, Errors, Fit, Mismatch
-from analysis.diagnosis.result.candidates import reached_of
+from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
+from analysis.diagnosis.result.candidates import reached_of, with_balances
 from analysis.diagnosis.result.state_maps import NOT_CONFIRMED, state_maps
 from analysis.diagnosis.search.patience import always
 from analysis.figures.diagnosis_state_maps import state_map_pictures
@@ -103,3 +103,23 @@ def test_states_and_loops_are_drawn_with_plain_units(with_friction):
     assert "Against velocity: mean missing force from −" in states.alternative.replace("-", "−")
     assert [axes.get_xlabel() for axes in loops.figure.axes] == ["Position (mm)", "Velocity (mm/s)"]
     assert state_map_pictures(()) == ()
+
+
+def test_what_stands_in_a_class_is_no_candidate_beside_it(with_friction):
+    balance, _, recording = with_friction
+    (weighed, *_) = balance.laws
+    level = {name: Estimate(value, "N") for name, value in weighed.values.items()}
+    effect = NamedEffect(weighed.law.effect, "mechanism", "force", 0.9, 0.9, level)
+    named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
+    alike = replace(balance, laws=(replace(weighed, alike=("stribeck_friction",)),), others=(weighed, _rival(weighed)))
+    found = with_balances(named, (alike,), recording.command.channels)
+    assert found.effects[0].class_ == (weighed.law.effect, "stribeck_friction")
+    assert found.candidates == ()
+    apart = replace(balance, laws=(replace(weighed, alike=()),), others=(_rival(weighed),))
+    assert [one.effect for one in with_balances(named, (apart,), recording.command.channels).candidates] == [
+        "stribeck_friction"
+    ]
+
+
+def _rival(weighed):
+    return replace(weighed, law=replace(weighed.law, effect="stribeck_friction"), why_not="too little")
