@@ -74,6 +74,7 @@ WORTH_FITTING = 0.2  # share of the best one's foreseen gain that another must f
 MOST_REFINED = 3  # fits that are taken to the end
 WORTH_REFINING = 0.5  # share of the best one's gain that such a fit must have gained
 NO_SECOND_START = 1.08  # error up to which a fit needs no second start
+REACHES_NOISE = 2.0  # error after three steps up to which a fit is taken on where the best is noise alone already
 RICHER_LAW_SQUARES = 4.0  # squares of the noise, in sum, that more numbers must gain over a law that does the same
 CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS = 6, 120  # of the response's middle frequency, at the recording's end
 CLOCK_LEAST_SHARE = 1e-3  # of the misfit that a trial of clock drift must take

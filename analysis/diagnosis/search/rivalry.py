@@ -17,6 +17,7 @@ from analysis.diagnosis.settings import (
     MOST_FITTED,
     MOST_REFINED,
     NO_SECOND_START,
+    REACHES_NOISE,
     RICHER_LAW_SQUARES,
     WORTH_FITTING,
     WORTH_REFINING,
@@ -100,8 +101,11 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
     fits.sort(key=lambda found: found.cost)
     gained = [base.cost - found.cost for found in fits]
     worth = [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
-    refined = [refine(arena, candidate) for candidate in worth[:MOST_REFINED]]
-    rest = fits[len(refined) :]
+    refined, others = [refine(arena, candidate) for candidate in worth[:1]], worth[1:MOST_REFINED]
+    if refined and arena.contender(refined[0]).standing.seen <= NO_SECOND_START:
+        others = [law for law in others if arena.contender(law).standing.seen <= REACHES_NOISE]
+    refined += [refine(arena, candidate) for candidate in others]
+    rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
     plain = [plain_law for plain_law in rest if any(_holds(richer, plain_law) for richer in refined[:1])][:1]
     refined += [refine(arena, law) for law in plain]
     contenders = [arena.contender(law) for law in [*refined, *(law for law in rest if law not in plain)]]
