@@ -27,8 +27,11 @@ from analysis.diagnosis.search.seen_directly import seen_directly
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.effects.catalogue import CATALOGUE
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
+
+HUM, LOWEST_MAINS_HZ = "mains_hum", 45.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,9 @@ def diagnose(
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
     look = _Look(model, measure_of(recordings, model, settings.clean, settings.compared))
-    seen = _by_search(recordings, look, settings, map_, progress, bool(balances))
+    told = any(balance.named for balance in balances)
+    without = tuple(EFFECTS_BY_NAME) if told else settings.without
+    seen = _by_search(recordings, look, replace(settings, without=without), map_, progress, bool(balances))
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 
@@ -131,8 +136,9 @@ def _by_search(
     refined = {name for effect in catalogue for name in effect.simpler}
     catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
     may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
-    if weighed and chosen.measure.name != "free simulation":
-        return _Seen(searched(arena, [], progress, settings.patient), CleanFloor())
+    if weighed:
+        catalogue = [effect for effect in catalogue if _beside_motion(effect.name)]
+        may_be_named = []
     if settings.clean:
         learned = learned_from(settings.clean, look.model, recordings, map_, progress)
         told = [effect for effect in may_be_named if chosen.measure.tells(effect)]
@@ -140,6 +146,9 @@ def _by_search(
         found = _Seen(searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor)
     else:
         found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
+        if weighed and _hums_low(found.searched):
+            catalogue = [effect for effect in catalogue if effect.name != HUM]
+            found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
     seen = found.searched
     if seen.judged.verdict in ("unexplained", "partly_explained") and not arena.certain and settings.patient():
         progress("looking for play that rattles", 0.9)
@@ -147,6 +156,17 @@ def _by_search(
         if rattled is not None:
             return replace(found, searched=Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
+
+
+def _hums_low(seen: Searched) -> bool:
+    """A line far below any mains is a harmonic of what drives the device."""
+    placed = seen.found.after.fitted.hypothesis.placed()
+    return any(one.effect.name == HUM and one.values["frequency"] < LOWEST_MAINS_HZ for one in placed)
+
+
+def _beside_motion(name: str) -> bool:
+    """An effect of the actuator or sensor, of which a force balance tells nothing."""
+    return EFFECTS_BY_NAME[name].place in ("actuator", "sensor") and name != "body_on_actuator"
 
 
 def _assembled(

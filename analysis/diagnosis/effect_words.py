@@ -41,6 +41,9 @@ EFFECT_WORDS: Mapping[str, EffectWords] = {
     "hardening_stiffness": EffectWords("a spring that hardens with displacement"),
     "asymmetric_stiffness": EffectWords("a spring that is stiffer to one side"),
     "constant_force": EffectWords("a constant force"),
+    "gravity_torque": EffectWords(
+        "the weight of a body off its axis (a pendulum)", {"torque": _BARE, "angle": "hanging {} from zero"}
+    ),
     "cogging": EffectWords(
         "a force ripple along the travel (cogging)", {"amplitude": _BARE, "pitch": "repeating every {}"}
     ),

@@ -17,6 +17,7 @@ from equalizer.effects import (
     force_deadband,
     force_gain,
     force_saturation,
+    gravity_torque,
     hand_impedance,
     hardening_stiffness,
     logger_offset,
@@ -47,7 +48,8 @@ CATALOGUE: tuple[Effect, ...] = tuple(
     module.EFFECT
     for module in (
         coulomb_friction, asymmetric_friction, stribeck_friction, position_dependent_friction, presliding_hysteresis,
-        viscous_damping, quadratic_damping, hardening_stiffness, asymmetric_stiffness, constant_force, cogging,
+        viscous_damping, quadratic_damping, hardening_stiffness, asymmetric_stiffness, constant_force,
+        gravity_torque, cogging,
         backlash, loose_joint, end_stop, pose_dependent_inertia, extra_mode, added_mass,
         hand_impedance, time_varying_grip,
         body_on_actuator, force_saturation, force_deadband, slew_limit, amplifier_lag, transport_delay, force_gain,

@@ -86,6 +86,7 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("hardening_stiffness", "mechanism", (_number("k3", "N/m^3", "N m/rad^3"),)),
     EffectName("asymmetric_stiffness", "mechanism", (_number("k2", "N/m^2", "N m/rad^2"),)),
     EffectName("constant_force", "mechanism", (_level("force"),)),
+    EffectName("gravity_torque", "mechanism", (_number("torque", "N m"), _number("angle", "rad"))),
     EffectName("cogging", "mechanism", (_level("amplitude"), _number("pitch", "m", "rad"), _optional("phase", "rad"))),
     EffectName(
         "backlash",

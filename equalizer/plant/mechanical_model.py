@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 
 DERIVATIVE_OF_QUANTITY = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
-    "voltage": 0,
+    "angular velocity": 1, "angular speed": 1, "angular acceleration": 2, "voltage": 0,
 }  # fmt: skip
 """What a model's response may be, as the order of the coordinates' time derivative."""
 

@@ -14,6 +14,7 @@ LEFT_ALONE = {
     "extra_mode": IN_MODEL,
     "hand_impedance": IN_MODEL,
     "constant_force": "the spring carries it before anything is played, and a constant has nothing in the band",
+    "gravity_torque": "over a small motion it is a spring, which the identified model has",
     "cogging": "amplitude and pitch do not say where along the way it pulls which way",
     "backlash": "no force jumps a gap",
     "loose_joint": "no force jumps a gap",

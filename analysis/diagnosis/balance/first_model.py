@@ -33,8 +33,8 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
     floor = floor / np.maximum(_rms(np.vstack(moved)), 1e-300)
     mass = mass + np.diag(np.maximum(floor - np.diagonal(mass), 0.0))
     spread = [
-        float(np.max(np.abs(one - other)) / 2 + OPEN * np.abs(one).max())
-        for one, other in zip(matrices, beside, strict=True)
+        float(np.max(np.abs(given - full)) / 2 + OPEN * np.abs(given).max())
+        for given, full in zip((mass, damping, stiffness), beside, strict=True)
     ]
     turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
     return MechanicalModel(

@@ -21,8 +21,7 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         scales = scales_of(motions, channel, rotational)
         yield from friction_laws(channel, scales)
         yield from damping_laws(channel, scales)
-        if not scales.turns:
-            yield from stiffness_laws(channel, scales)
+        yield from stiffness_laws(channel, scales)
         if np.isfinite(scales.band_hz):
             yield from dynamic_laws(channel, scales)
         yield from condition_laws(motions, channel)
@@ -30,9 +29,14 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), named("rate_per_s"))
 
 
+def _longest_pitch(of: Scales) -> float:
+    """Twice over the travel, and twice per turn: once per turn is a weight off the axis, or an axis off its centre."""
+    return min(0.5 * of.travel, np.pi) if of.rotational else 0.5 * of.travel
+
+
 def pitched(channel: int, pitch: float, of: Scales) -> Law:
     """A force that repeats along the way."""
-    longest = 2 * np.pi if of.turns else 0.5 * of.travel
+    longest = _longest_pitch(of)
     return Law(
         "cogging", channel, (pitch,),
         lambda m, n: np.hstack(
@@ -52,12 +56,12 @@ def likely_pitches(
     """Of what is left of the force (kept samples each), the strongest lines over the position, the strongest first."""
     q = np.concatenate([one.position[:: one.step, channel][one.kept(one.fit)] for one in motions])
     left = np.concatenate([r[one.kept(one.fit)] for one, r in zip(motions, remainders, strict=True)])
-    longest = 2 * np.pi if of.turns else 0.5 * of.travel
+    longest = _longest_pitch(of)
     # Shorter ones pass faster than the band's end at the usual speed.
     shortest = max(of.speed / of.band_hz, longest / 400)
     if shortest >= longest or not len(left):
         return []
-    finest = 1 / of.travel if not of.turns else 1 / (2 * np.pi)
+    finest = 1 / (2 * np.pi) if of.turns else 1 / of.travel
     lines = np.arange(1 / longest, 1 / shortest, finest * (1.0 if of.turns else 0.35))[:600]
     every = max(len(q) // 6000, 1)
     power = np.array([abs(np.mean(left[::every] * np.exp(-2j * np.pi * line * q[::every]))) for line in lines])

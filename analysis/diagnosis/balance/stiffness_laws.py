@@ -6,10 +6,18 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import Columns, Law, Numbers, Scales, named, through_lines
 from analysis.diagnosis.balance.motion import Motion
+from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
 from equalizer.signals.signal import FloatArray
 
 
 def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
+    if of.rotational and of.travel > LEAST_TRAVEL_RAD:
+        yield Law(
+            "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
+            lambda w, n, mass: {"torque": float(np.hypot(*w)), "angle": float(np.arctan2(w[1], w[0]))},
+        )  # fmt: skip
+    if of.turns:
+        return
     yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, named("k3"))
     yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, named("k2"))
     for share in (0.02, 0.05, 0.1, 0.2):
@@ -24,11 +32,6 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
             "backlash", c, (float(half),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
             bounded=((1e-3 * of.travel, 0.45 * of.travel),),
-        )  # fmt: skip
-    if of.rotational and of.travel > 0.5:
-        yield Law(
-            "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
-            lambda w, n, mass: {"torque": float(np.hypot(*w)), "angle": float(np.arctan2(w[1], w[0]))},
         )  # fmt: skip
 
 

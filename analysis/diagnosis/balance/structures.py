@@ -16,7 +16,7 @@ MOST_LAWS = 3
 BEAM = 5
 """Structures of each size that are taken further."""
 NOTICED = 0.02
-"""Share of the error power that a further law must take, over the folds; and in more folds than it adds to, by:"""
+"""Share of the error power that a further law must take, over the folds; and by the folds' agreement in it:"""
 SURE = 2.0
 """standard errors of the folds' mean gain, or of their mean logarithmic gain."""
 REFINED = (0.8, 0.93, 1.075, 1.25)

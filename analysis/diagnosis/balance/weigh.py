@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.balance.blocks import Block
+from analysis.diagnosis.balance.plainest_structure import NOTABLE, plainest_structure
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, of_everything
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
@@ -20,8 +21,6 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
-PLAIN = 0.1
-"""Share of what the best structure takes of the linear model's error that a plainer one may leave to be preferred."""
 CEILING = 0.5
 """Share of what all laws together take of it that the named ones must reach, so that a name tells the main story;"""
 SMALL = 0.05
@@ -95,7 +94,7 @@ class Balance:
 
 def weigh(searched: Searched) -> Balance:
     regression = searched.regression
-    chosen = _plainest(searched)
+    chosen = plainest_structure(searched)
     held = _held_out(regression, chosen.laws)
     linear = _held_out(regression, ())
     ceiling = _ceiling(regression, held)
@@ -107,22 +106,6 @@ def weigh(searched: Searched) -> Balance:
     rms = [float(np.sqrt(error / size)) for error in (linear.sum(), held.sum(), ceiling)]
     ordered = tuple(sorted(laws, key=lambda each: -each.gain))
     return Balance(searched, chosen, ordered, others, rms[0], rms[1], rms[2], searched.complete)
-
-
-def _plainest(searched: Searched) -> Structure:
-    """The structure of fewest numbers that leaves hardly more than the best."""
-    allowed = searched.best.error + PLAIN * (searched.linear.error - searched.best.error)
-    enough = [one for one in searched.ranked if one.error <= allowed]
-    return min(enough, key=lambda one: (_numbers(searched.regression, one), one.error), default=searched.linear)
-
-
-def _numbers(regression: Regression, structure: Structure) -> int:
-    """The width within which a dry friction turns round counts for none."""
-    count = 0
-    for number in structure.laws:
-        law, place = regression.laws[number], regression.places[number]
-        count += place.stop - place.start + (0 if law.effect == "coulomb_friction" else len(law.numbers))
-    return count
 
 
 def _judging(regression: Regression) -> tuple[Block, ...]:
@@ -205,14 +188,14 @@ def _why_not(
     law: Law, values: dict[str, float] | None, numbers: tuple[float, float, float, float], alike: tuple[str, ...]
 ) -> str:
     """A sentence; empty where it is to be named."""
-    _, low, share, told = numbers
+    gain, low, share, told = numbers
     if law.linear:
         return "a linear model of a higher order: part of the first model, no missing physics"
     if values is None:
         return "its numbers have signs that such physics cannot have"
     if low <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
-    if share < SMALL:
+    if share < SMALL and gain < NOTABLE:
         return f"it takes {100 * share:.1f} % of what all laws together take"
     if told < CEILING:
         return f"with it, {100 * (1 - told):.0f} % of what all laws together take are left: the main part is another"

@@ -32,6 +32,7 @@ ALONG: Mapping[str, Along] = {
     "hardening_stiffness": "position",
     "asymmetric_stiffness": "position",
     "constant_force": "position",
+    "gravity_torque": "position",
     "cogging": "position",
     "end_stop": "position",
     "force_saturation": "command",

@@ -15,17 +15,20 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.determined import number_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.rivalry import Arena, Contender, refine
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise
-from analysis.diagnosis.settings import HELD_OUT_ERROR
+from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
 from analysis.diagnosis.types import Patience
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT = "constant_force"
+VAGUE = 1.96 * INTERVAL_FACTOR
+"""Standard errors of a logarithm from which an interval reaches a number that is none."""
 HELD_BY_SIMULATION = 0.9
 """Times the re-tuned model's held-out error that the completed one may leave at most, in the measure that suits."""
 
@@ -53,24 +56,46 @@ def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool
     ]
     if not named:
         return None
-    constant, start = _constants(balances), _zeros(arena)
-    given = evaluated(arena.measure, arena.tuning, start, constant)
-    before = arena.confirmed(arena.contender(given))
-    retuned = arena.contender(refine(arena, given))
-    steps: list[Contender] = [retuned for _ in constant.claims]
-    whole, deviations = retuned.fitted.hypothesis, _released(arena.tuning, balances)
+    constant = _constants(balances)
+    given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), constant)
+    before, retuned = arena.confirmed(arena.contender(given)), arena.contender(refine(arena, given))
+    confirmed = arena.confirmed(retuned)
+    while named:
+        steps = _steps(arena, retuned, named, _released(arena.tuning, balances, [law.place for _, law in named]))
+        ends = (before, confirmed, arena.confirmed(steps[-1]))
+        explained = Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
+        vague = _vague(arena, explained, len(constant.claims)) if _borne_out(confirmed, ends[2]) else len(named) - 1
+        if vague is None:
+            sealed = float(np.nanmax(ends[2].standing.test, initial=0.0))
+            whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
+            return Searched(arena, explained, Judgement("explained" if whole else "partly_explained", True))
+        named = [law for number, law in enumerate(named) if number != vague]
+    return None
+
+
+def _steps(
+    arena: Arena, retuned: Contender, named: Sequence[tuple[int, Weighed]], deviations: FloatArray
+) -> list[Contender]:
+    """The laws one after the other beside the constants, each fitted with those before it."""
+    whole = retuned.fitted.hypothesis
+    steps = [retuned for _ in whole.claims]
     for axis, law in named:
-        whole = together(whole, _claimed(axis, law))
-        found = refine(arena, evaluated(arena.measure, arena.tuning, deviations, whole))
+        start = evaluated(arena.measure, arena.tuning, deviations, together(whole, _claimed(axis, law)))
+        found = refine(arena, start)
         steps.append(arena.contender(found))
         whole, deviations = found.hypothesis, found.deviations
-    ends = (before, arena.confirmed(retuned), arena.confirmed(steps[-1]))
-    if not _borne_out(arena, ends[1], ends[2]):
-        return None
-    explained = Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
-    whole_story = repeats and as_good_as_noise(explained)
-    whole_story = whole_story and not np.nanmax(ends[2].standing.test, initial=0.0) > HELD_OUT_ERROR
-    return Searched(arena, explained, Judgement("explained" if whole_story else "partly_explained", True))
+    return steps
+
+
+def _vague(arena: Arena, explained: Explanation, constants: int) -> int | None:
+    """The place among the named laws of one whose main number's interval holds zero; None where none does."""
+    errors, begin = number_errors(arena, explained), 0
+    for place, claim in enumerate(explained.steps[-1].fitted.hypothesis.claims):
+        free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
+        if place >= constants and free[0].scale == "log" and VAGUE * errors[begin] >= 1:
+            return place - constants
+        begin += len(free)
+    return None
 
 
 def _constants(balances: Sequence[Balance]) -> Hypothesis:
@@ -97,18 +122,14 @@ def _claimed(axis: int, weighed: Weighed) -> Hypothesis:
     return claimed(Claim(EFFECTS[weighed.law.effect], "one", (axis,)), [weighed.values])
 
 
-def _zeros(arena: Arena) -> FloatArray:
-    return np.zeros(len(arena.tuning.names))
-
-
-def _released(tuning: Tuning, balances: Sequence[Balance]) -> FloatArray:
-    """Mass, damping and stiffness as they are beside the laws, not as they were fitted without them."""
+def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+    """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
     start = np.zeros(len(tuning.names))
     model = tuning.model
     if len(balances) != 1 or model.coordinates != 1:
         return start
     regression = balances[0].searched.regression
-    weights = regression.weights(regression.chosen([law.place for law in balances[0].named]))[: regression.base - 1]
+    weights = regression.weights(regression.chosen(laws))[: regression.base - 1]
     given = (model.mass, model.damping, model.stiffness)
     for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
         if place == 0:
@@ -117,6 +138,6 @@ def _released(tuning: Tuning, balances: Sequence[Balance]) -> FloatArray:
     return start
 
 
-def _borne_out(arena: Arena, retuned: Contender, after: Contender) -> bool:
+def _borne_out(retuned: Contender, after: Contender) -> bool:
     left, right = (float(np.mean(np.log(each.standing.test))) for each in (retuned, after))
     return not np.isfinite(left) or right <= left + np.log(HELD_BY_SIMULATION)
