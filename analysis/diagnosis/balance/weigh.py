@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.balance.blocks import Block
-from analysis.diagnosis.balance.plainest_structure import NOTABLE, plainest_structure
 from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.plainest_structure import NOTABLE, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, of_everything
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
 from equalizer.effects.catalogue import EFFECTS

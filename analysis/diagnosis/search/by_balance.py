@@ -5,11 +5,12 @@ evidence is the gain on held-out data instead of a remainder in units of noise.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
-from analysis.diagnosis.balance.structures import search_structures
+from analysis.diagnosis.balance.structures import search_structures, values_of
 from analysis.diagnosis.balance.weigh import Balance, Weighed, weigh
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
@@ -69,8 +70,19 @@ def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool
             sealed = float(np.nanmax(ends[2].standing.test, initial=0.0))
             whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
             return Searched(arena, explained, Judgement("explained" if whole else "partly_explained", True))
-        named = [law for number, law in enumerate(named) if number != vague]
+        named = _refitted(balances, [law for number, law in enumerate(named) if number != vague])
     return None
+
+
+def _refitted(balances: Sequence[Balance], named: Sequence[tuple[int, Weighed]]) -> list[tuple[int, Weighed]]:
+    """With the numbers that the balances give these laws alone."""
+    found = []
+    for axis, law in named:
+        regression = balances[axis].searched.regression
+        places = [other.place for of, other in named if of == axis]
+        values = values_of(regression, places)[places.index(law.place)]
+        found.append((axis, law if values is None else replace(law, values=values)))
+    return found
 
 
 def _steps(
