@@ -123,7 +123,7 @@ LAW_WORDS: Mapping[str, LawWords] = {
         EffectWords("damping that changes during the recording", {"change": _CHANGE}), {"change": _DAMPING}
     ),
     "drifting_force": LawWords(
-        EffectWords("a force that drifts during the recording", {"rate_per_s": _CHANGE}), {"rate_per_s": _FORCE}
+        EffectWords("a force that drifts during the recording", {"change": _CHANGE}), {"change": _FORCE}
     ),
     "condition_dependent_friction": LawWords(
         EffectWords("dry friction that depends on the recorded condition", {"change": _PER_CONDITION}),

@@ -26,7 +26,7 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
             yield from dynamic_laws(channel, scales)
         yield from condition_laws(motions, channel)
     if np.isfinite(motions[0].band_hz):
-        yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), named("rate_per_s"))
+        yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), named("change"))
 
 
 def _longest_pitch(of: Scales) -> float:

@@ -7,7 +7,7 @@ all laws together could (a ceiling). Laws that cannot be told apart on these blo
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,9 @@ SMALL = 0.05
 """and of which each must take so much."""
 ALMOST = 0.15
 """Share of a law's gain by which a rival in its place must stay behind to be told from it."""
+SECOND = 2 / 3
+"""Share of what is left that a second law of one family must take."""
+MENDS = "it acts like a named law, and may only mend its shape"
 DRAWS, SEED, LEVEL = 2000, 1, 0.025
 MOST_ALIKE = 4
 """Effects of a class; more of them tell nothing."""
@@ -104,8 +107,22 @@ def weigh(searched: Searched) -> Balance:
     others = _others(regression, searched, chosen, (held, room))
     size = max(sum(block.signal for block in _judging(regression)), 1e-300)
     rms = [float(np.sqrt(error / size)) for error in (linear.sum(), held.sum(), ceiling)]
-    ordered = tuple(sorted(laws, key=lambda each: -each.gain))
+    ordered = _once_per_family(sorted(laws, key=lambda each: -each.gain))
     return Balance(searched, chosen, ordered, others, rms[0], rms[1], rms[2], searched.complete)
+
+
+def _once_per_family(laws: Sequence[Weighed]) -> tuple[Weighed, ...]:
+    """laws: the largest gain first. Beside a named law of its family, another needs most of what is left: what acts
+    alike mends the shape of the first."""
+    found: list[Weighed] = []
+    for law in laws:
+        mates = [other for other in found if other.named and _family(other.law.effect) & {law.law.effect}]
+        found.append(replace(law, why_not=MENDS) if law.named and mates and law.gain < SECOND else law)
+    return tuple(found)
+
+
+def _family(effect: str) -> set[str]:
+    return next((family for family in FAMILIES if effect in family), {effect})
 
 
 def _judging(regression: Regression) -> tuple[Block, ...]:
@@ -199,7 +216,7 @@ def _why_not(
         return f"it takes {100 * share:.1f} % of what all laws together take"
     if told < CEILING:
         return f"with it, {100 * (1 - told):.0f} % of what all laws together take are left: the main part is another"
-    family = next((one for one in FAMILIES if law.effect in one), {law.effect})
+    family = _family(law.effect)
     strange = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in _plainer(effect)]
     if strange or len(others) >= MOST_ALIKE:

@@ -61,6 +61,7 @@ def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool
     given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), constant)
     before, retuned = arena.confirmed(arena.contender(given)), arena.contender(refine(arena, given))
     confirmed = arena.confirmed(retuned)
+    named = _refitted(balances, named)
     while named:
         steps = _steps(arena, retuned, named, _released(arena.tuning, balances, [law.place for _, law in named]))
         ends = (before, confirmed, arena.confirmed(steps[-1]))
