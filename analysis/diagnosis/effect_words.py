@@ -105,10 +105,6 @@ _FORCE, _DAMPING, _STIFFNESS = ("N", "N m"), ("N s/m", "N m s/rad"), ("N/m", "N 
 _CHANGE = "± {} from beginning to end"
 _PER_CONDITION = "{} per standard deviation of the condition"
 LAW_WORDS: Mapping[str, LawWords] = {
-    "gravity_torque": LawWords(
-        EffectWords("a weight on a lever (gravity torque)", {"torque": _BARE, "angle": "zero at an angle of {}"}),
-        {"torque": ("N m", "N m"), "angle": ("rad", "rad")},
-    ),
     "viscoelastic_relaxation": LawWords(
         EffectWords(
             "a spring that gives way in time (viscoelastic relaxation)",

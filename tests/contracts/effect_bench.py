@@ -132,6 +132,7 @@ EXAMPLES: dict[str, dict[str, float]] = {
     "hardening_stiffness": {"k3": 1e6},
     "asymmetric_stiffness": {"k2": 6000.0},
     "constant_force": {"force": 0.1},
+    "gravity_torque": {"torque": 0.1, "angle": 0.5},
     "cogging": {"amplitude": 0.1, "pitch": 0.002, "phase": 0.7},
     "backlash": {"gap": 5e-5, "motor_mass": 0.09, "contact_stiffness": 3e5, "contact_damping": 9.0},
     "loose_joint": {"gap": 1e-5, "stiffness": 4000.0, "slip": 0.02},

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Columns, Law, Numbers, Scales, named, through_lines
+from analysis.diagnosis.balance.law import Columns, Law, Numbers, Scales, Values, named, through_lines
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
 from equalizer.signals.signal import FloatArray
@@ -24,8 +24,7 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
         for end, side in ((of.high - share * of.travel, 1.0), (of.low + share * of.travel, -1.0)):
             yield Law(
                 "end_stop", c, (float(end),),
-                _beyond(c, side),
-                lambda w, n, mass: {"position": n[0], "stiffness": float(w[0])} if w[0] > 0 else None,
+                _beyond(c, side), _stop_values(side), bounded=((of.low, of.high),),
             )  # fmt: skip
     for half in of.travel * np.geomspace(0.01, 0.3, 6):
         yield Law(
@@ -33,6 +32,16 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
             bounded=((1e-3 * of.travel, 0.45 * of.travel),),
         )  # fmt: skip
+
+
+def _stop_values(side: float) -> Values:
+    """The catalogue's stop stands on its own side of zero; elsewhere, its number for that is left out."""
+
+    def values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+        own = {"opposite": 0.0} if side * n[0] > 0 else {}
+        return {"position": n[0], "stiffness": float(w[0]), **own} if w[0] > 0 else None
+
+    return values
 
 
 def _beyond(c: int, side: float) -> Columns:
@@ -44,7 +53,7 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
         yield Law(
             "pose_dependent_inertia", c, (),
             lambda m, _: m.position[:, [c]] * m.acceleration[:, [c]] + 0.5 * m.velocity[:, [c]] ** 2,
-            lambda w, n, mass: {"per_m": float(w[0] / mass)} if mass > 0 else None,
+            lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5} if mass > 0 else None,
         )  # fmt: skip
     for ratio in (0.02, 0.1, 0.4):
         for f in of.band_hz * np.geomspace(0.02, 1.2, 12):

@@ -128,7 +128,10 @@ def _plays(axis: int, weighed: Weighed) -> bool:
     effect = EFFECTS.get(weighed.law.effect)
     if effect is None or weighed.law.channel != axis:
         return False
-    return {parameter.name for parameter in effect.parameters} <= set(weighed.values)
+    return all(
+        parameter.name in weighed.values and parameter.lower <= weighed.values[parameter.name] <= parameter.upper
+        for parameter in effect.parameters
+    )
 
 
 def _claimed(axis: int, weighed: Weighed) -> Hypothesis:

@@ -29,8 +29,8 @@ def balance_of():
 def recording_of():
     """force (n, m) and response (n, p) of one quantity, without an axis behind them."""
 
-    def recording(force, response, rate_hz, quantity="position", hold=Hold.BAND_LIMITED, **beside):
-        unit = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}[quantity]
+    def recording(force, response, rate_hz, quantity="position", hold=Hold.BAND_LIMITED, unit=None, **beside):
+        unit = unit or {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}[quantity]
         channels = tuple("xyz"[: np.shape(response)[1]])
         return Recording(
             "invented",

@@ -1,0 +1,43 @@
+"""A weight on a lever: named as such, and not as cogging that repeats once per turn."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, filtfilt
+
+RATE_HZ, TURN, RUBBING, SEED = 200.0, 0.25, 0.02, 5
+INERTIA, DAMPING = 0.01, 0.002
+
+
+def lever(weight, rubbing, seed=SEED):
+    """Torque and angle, (n,) each, in steps of a tenth of a sample; dry friction with a narrow ramp about rest."""
+    rng = np.random.default_rng(seed)
+    torque = filtfilt(*butter(3, 2 / (RATE_HZ / 2)), rng.standard_normal(6000))
+    torque *= 0.15 / torque.std()
+    angle, q, v, step_s = np.zeros(len(torque)), 0.0, 0.0, 0.1 / RATE_HZ
+    for k, push in enumerate(torque):
+        angle[k] = q
+        for _ in range(10):
+            v += step_s * (push - DAMPING * v - rubbing * np.tanh(v / 0.02) - weight * np.sin(q)) / INERTIA
+            q += step_s * v
+    return torque, angle + 1e-4 * rng.standard_normal(len(angle))
+
+
+@pytest.fixture
+def balance(recording_of, balance_of):
+    def found(weight, rubbing):
+        torque, angle = lever(weight, rubbing)
+        recording = recording_of(torque[:, None], angle[:, None], RATE_HZ, unit="rad")
+        return balance_of(recording)[0]
+
+    return found
+
+
+def test_the_weight_of_a_lever_is_recovered(balance):
+    named = {law.law.effect: law.values for law in balance(TURN, RUBBING).named}
+    assert named["gravity_torque"]["torque"] == pytest.approx(TURN, rel=0.02)
+    assert named["gravity_torque"]["angle"] == pytest.approx(0.0, abs=0.02)
+    assert "cogging" not in named
+
+
+def test_a_balanced_lever_has_no_weight(balance):
+    assert "gravity_torque" not in {law.law.effect for law in balance(0.0, RUBBING).named}
