@@ -12,7 +12,7 @@ from analysis.diagnosis.unit_wording import scale_of, share_text
 from analysis.figures.diagnosis_style import AFTER, BEFORE, MEASURED
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes
-from analysis.wording import listed
+from analysis.wording import listed, typeset
 from equalizer.signals.signal import FloatArray
 
 _SEEN = 0.998
@@ -122,10 +122,10 @@ def _in_words(view: StateView, unit: str) -> str:
     if not len(view.mean):
         return f"Against {view.along}: too few samples."
     low, high = int(np.argmin(view.mean)), int(np.argmax(view.mean))
-    return (
-        f"Against {view.along}: mean missing force from {view.mean[low]:.3g} {unit} at {view.at[low]:.3g} {view.unit} "
-        f"to {view.mean[high]:.3g} {unit} at {view.at[high]:.3g} {view.unit}."
-    )
+    ends = [
+        f"{typeset(f'{view.mean[k]:.3g}')} {unit} at {typeset(f'{view.at[k]:.3g}')} {view.unit}" for k in (low, high)
+    ]
+    return f"Against {view.along}: mean missing force from {ends[0]} to {ends[1]}."
 
 
 def _loop_in_words(maps: StateMaps) -> str:

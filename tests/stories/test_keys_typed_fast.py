@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from terminal import Terminal
+from terminal import ESCAPE_SEQUENCE, Terminal
 
 pytestmark = pytest.mark.real_time
 
@@ -41,6 +41,15 @@ def shown(terminal: Terminal, words: str) -> None:
     terminal.drain(0.3)
 
 
+def shown_since(terminal: Terminal, words: str, since: int) -> None:
+    """The same, also where it was printed while something else was waited for."""
+    give_up_s = time.monotonic() + 60.0
+    while words not in " ".join(ESCAPE_SEQUENCE.sub("", terminal.screen[since:]).split()):
+        assert time.monotonic() < give_up_s, f"'{words}' did not appear in:\n{terminal.screen[-2000:]}"
+        terminal.drain(0.1)
+    terminal.drain(0.3)
+
+
 def filled(log: Path, form: str, terminal: Terminal) -> dict:
     """The event of a form, when it is in the log."""
     give_up_s = time.monotonic() + 60.0
@@ -66,9 +75,10 @@ def test_a_yes_typed_fast_into_the_exclusions_is_not_lost(sitting):
 def test_answers_typed_fast_reach_the_log_question_by_question(sitting):
     terminal, log = sitting
     shown(terminal, "Is it too late today")
-    # What follows for the next form was typed before anybody could read it, and answers nothing there.
+    # What follows for the next form was typed before it could be read, and answers nothing there.
+    since = len(terminal.screen)
     terminal.type("2\r2\r2\r2\r\r" + "1\r" * 7)
     assert filled(log, "exclusion", terminal)["passed"] is True
-    shown(terminal, "How you sit: 5 of 5 still open")
+    shown_since(terminal, "How you sit: 5 of 5 still open", since)
     terminal.type("2\r1\r2\r3\r2\r\r")
     assert filled(log, "setup", terminal)["answers"] == SETUP

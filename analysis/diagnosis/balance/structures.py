@@ -105,7 +105,7 @@ def _grown(regression: Regression, beam: Sequence[Structure]) -> list[Structure]
     for structure in beam:
         held = {regression.laws[k].key for k in structure.laws}
         for number, law in enumerate(regression.laws):
-            if law.key in held:
+            if law.key in held or any(_overlap(law.key, other) for other in held):
                 continue
             laws = tuple(sorted((*structure.laws, number)))
             grown = Structure(laws, regression.crossed(regression.chosen(laws)))
@@ -113,6 +113,14 @@ def _grown(regression: Regression, beam: Sequence[Structure]) -> list[Structure]
             if (name not in found or grown.error < found[name].error) and _possible(regression, laws):
                 found[name] = grown
     return sorted(found.values(), key=lambda one: one.error)
+
+
+SLIDING = ("coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction")
+"""Laws that share the column of dry friction: two of them on one motion would divide its level by chance."""
+
+
+def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
+    return one[1] == other[1] and one[0] in SLIDING and other[0] in SLIDING
 
 
 def _possible(regression: Regression, laws: Sequence[int]) -> bool:
