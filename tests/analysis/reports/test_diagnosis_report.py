@@ -110,7 +110,7 @@ def test_candidates_and_classes_are_on_the_page_and_only_where_there_are_some(fr
     reached = (Reached("x", 0.5, 0.3, 0.1, True),)
     text, headings = rendered(replace(told(friction_found, effects=(alike,), candidates=(other,)), reached=reached))
     assert "What else may be missing" in headings.found
-    for piece in ("The weight of a body off its axis (a pendulum)", "500 mN m, zero at", "34 %", "Too little.",
+    for piece in ("The weight of a body off its axis (a pendulum)", "500 mN m, hanging", "34 %", "Too little.",
                   "Friction whose law these data leave open", "that is 67 % of the way"):  # fmt: skip
         assert piece in text
         assert piece not in page[0]
