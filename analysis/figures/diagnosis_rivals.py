@@ -48,16 +48,18 @@ def tried_explanations(round_: Sequence[Contender], axes: Sequence[str]) -> tupl
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
-    """One per effect that was looked for."""
+    """One per effect for which several were tried."""
     retuned = _tried("re-tuned, no physics", explanation.retuned.standing)
     pictures = []
-    for number, round_ in enumerate(explanation.rounds, start=1):
+    several = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
+    for number in several[: len(_ORDINALS)]:
+        round_ = explanation.rounds[number - 1]
         tried, held = tried_explanations(round_, axes), number <= len(explanation.steps)
         if tried:
             pictures.append(
                 Picture(
                     name=f"rivals-{number}",
-                    title=f"What was tried for the {_ORDINALS[number - 1]} effect"
+                    title=f"What was tried for the {_ORDINALS[several.index(number)]} effect"
                     + ("" if held else "; none earned its place"),
                     caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
                     "together with what had been found before. "
