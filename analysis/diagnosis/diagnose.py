@@ -19,7 +19,7 @@ from analysis.diagnosis.result.state_maps import state_maps
 from analysis.diagnosis.search.by_balance import balances_of, searched_by_balance
 from analysis.diagnosis.search.impacts import rattling
 from analysis.diagnosis.search.learn_clean_floor import learned_from
-from analysis.diagnosis.search.patience import always
+from analysis.diagnosis.search.patience import OUT_OF_TIME, always
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.search import Searched, searched
 from analysis.diagnosis.search.search_beside_sound import searched_beside_sound
@@ -72,9 +72,7 @@ def diagnose(
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
     look = _Look(model, measure_of(recordings, model, settings.clean, settings.compared))
-    told = any(balance.named for balance in balances)
-    without = tuple(EFFECTS_BY_NAME) if told else settings.without
-    seen = _by_search(recordings, look, replace(settings, without=without), map_, progress, bool(balances))
+    seen = _by_search(recordings, look, settings, map_, progress, balances)
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 
@@ -128,16 +126,18 @@ def _by_search(
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
-    weighed: bool,
+    balances: Sequence[Balance],
 ) -> _Seen:
-    """weighed: in a force balance, which tells of all laws along a motion that is not simulated freely."""
+    """balances: where they name a law of the motion, nothing else is looked for; where they were weighed and name none,
+    effects of actuator and sensor are."""
     chosen, arena = look.chosen, _arena(look, settings, map_)
     catalogue = [effect for effect in CATALOGUE if effect.name not in settings.without]
     refined = {name for effect in catalogue for name in effect.simpler}
     catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
     may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
-    if weighed:
-        catalogue = [effect for effect in catalogue if _beside_motion(effect.name)]
+    if balances:
+        named = any(balance.named for balance in balances)
+        catalogue = [] if named else [effect for effect in catalogue if _beside_motion(effect.name)]
         may_be_named = []
     if settings.clean:
         learned = learned_from(settings.clean, look.model, recordings, map_, progress)
@@ -146,7 +146,7 @@ def _by_search(
         found = _Seen(searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor)
     else:
         found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
-        if weighed and _hums_low(found.searched):
+        if balances and _hums_low(found.searched):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
             found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
     seen = found.searched
@@ -180,7 +180,8 @@ def _assembled(
     found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
     whole = assembled(searched.arena, found, searched.judged, look.chosen.floors, names, seen.floor)
     diagnosis = with_balances(whole.diagnosis, balances, recordings[0].command.channels)
-    remarks = (*look.chosen.remarks, *searched.remarks, *whole.remarks)
+    early = (OUT_OF_TIME,) if not all(balance.complete for balance in balances) else ()
+    remarks = tuple(dict.fromkeys((*look.chosen.remarks, *searched.remarks, *early, *whole.remarks)))
     reached = reached_of(diagnosis, balances, recordings[0].command.channels)
     maps = state_maps(diagnosis, balances, whole.evidence, recordings[0])
     return replace(whole, diagnosis=diagnosis, remarks=remarks, reached=reached, state_maps=maps)

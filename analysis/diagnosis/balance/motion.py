@@ -12,6 +12,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.signal import welch
 
+from analysis.diagnosis.data.measured_motion import filled_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -92,21 +93,20 @@ def moving_signal(recording: Recording) -> Signal | None:
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def motions_of(records: Sequence[Observed], late_s: float = 0.0) -> tuple[Motion, ...]:
-    """late_s: by which the motion is read, or the force acts, later than the clock says. records: alike in channels,
-    units and rate. Raises NoMotionError where there is none."""
+def motions_of(records: Sequence[Observed]) -> tuple[Motion, ...]:
+    """records: alike in channels, units and rate. Raises NoMotionError where there is none."""
     signals = [moving_signal(one.recording) for one in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a motion")
     moved = [signal for signal in signals if signal is not None]
     order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
-    filled = [_filled(signal.samples) for signal in moved]
+    filled = [filled_gaps(signal.samples) for signal in moved]
     untimed = any(one.recording.meta.get("time") == "unknown" for one in records)
     band_hz = np.inf if untimed else _band_hz(filled, rate_hz, order)
     conditions = _conditions(records)
     return tuple(
-        _motion(record, (samples, order), (band_hz, late_s), condition, moved[0].channels)
+        _motion(record, (samples, order), band_hz, condition, moved[0].channels)
         for record, samples, condition in zip(records, filled, conditions, strict=True)
     )
 
@@ -114,15 +114,14 @@ def motions_of(records: Sequence[Observed], late_s: float = 0.0) -> tuple[Motion
 def _motion(
     record: Observed,
     measured: tuple[FloatArray, int],
-    filter_: tuple[float, float],
+    band_hz: float,
     condition: FloatArray,
     names: tuple[str, ...],
 ) -> Motion:
-    (samples, order), (band_hz, late_s) = measured, filter_
+    samples, order = measured
     rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
     # A held command is, over its time, centred half a sample after the reading.
     early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
-    early_s += late_s
     lowest_hz = 2 * rate_hz / len(samples) if order == 2 else 0.0
     if not np.isfinite(band_hz):
         return _untimed(record, samples, condition, names)
@@ -131,7 +130,7 @@ def _motion(
     )
     return Motion(
         rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
-        acceleration, _filled(record.command), condition, record.fit | record.choose, record.test,
+        acceleration, filled_gaps(record.command), condition, record.fit | record.choose, record.test,
     )  # fmt: skip
 
 
@@ -139,7 +138,7 @@ def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names
     """Without a clock: positions, and which way each changes from sample to sample."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
-        np.zeros_like(samples), _filled(record.command), condition, record.fit | record.choose, record.test,
+        np.zeros_like(samples), filled_gaps(record.command), condition, record.fit | record.choose, record.test,
     )  # fmt: skip
 
 
@@ -207,7 +206,7 @@ def _conditions(records: Sequence[Observed]) -> list[FloatArray]:
     signals = [getattr(one.recording, "condition", None) for one in records]
     if any(signal is None for signal in signals):
         return [np.zeros((len(one.command), 0)) for one in records]
-    filled = [_filled(signal.samples) for signal in signals if signal is not None]
+    filled = [filled_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
     spread = whole.std(axis=0)
     told = spread > 0
@@ -219,15 +218,3 @@ def _channels(signal: Signal, places: Sequence[int]) -> Signal:
         signal.samples[:, list(places)], signal.sample_rate_hz, tuple(signal.quantities[k] for k in places),
         tuple(signal.units[k] for k in places), tuple(signal.channels[k] for k in places),
     )  # fmt: skip
-
-
-def _filled(samples: FloatArray) -> FloatArray:
-    """Straight across what is missing."""
-    whole, places = np.array(samples, dtype=np.float64), np.arange(len(samples))
-    for column in whole.T:
-        known = np.isfinite(column)
-        if known.any() and not known.all():
-            column[:] = np.interp(places, places[known], column[known])
-        elif not known.any():
-            column[:] = 0.0
-    return whole

@@ -33,8 +33,8 @@ def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFl
     if _has_position(recording, model):
         assert recording.position is not None
         noise = floor.position if floor.position is not None else floor.response
-        return MeasuredMotion(_filled(recording.position.samples[:, :m]), noise.density[:, :m])
-    samples = before_low_pass(_filled(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
+        return MeasuredMotion(filled_gaps(recording.position.samples[:, :m]), noise.density[:, :m])
+    samples = before_low_pass(filled_gaps(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
     density = floor.response.density[:, :m]
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
@@ -47,11 +47,13 @@ def _has_position(recording: Recording, model: MechanicalModel) -> bool:
     return recording.position is not None and recording.position.samples.shape[1] == model.outputs
 
 
-def _filled(samples: FloatArray) -> FloatArray:
-    """Straight across what is missing."""
-    whole, places = np.array(samples), np.arange(len(samples))
+def filled_gaps(samples: FloatArray) -> FloatArray:
+    """Samples (n, k), interpolated across what is missing; zero where a channel holds nothing."""
+    whole, places = np.array(samples, dtype=np.float64), np.arange(len(samples))
     for column in whole.T:
         known = np.isfinite(column)
         if known.any() and not known.all():
             column[:] = np.interp(places, places[known], column[known])
+        elif not known.any():
+            column[:] = 0.0
     return whole
