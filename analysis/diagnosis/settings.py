@@ -1,5 +1,6 @@
-"""The numbers that the diagnosis decides by, in one table, but for those of the force balance, which stand at the head of
-its files. Purely numerical tolerances stay where they are used.
+"""The numbers that the diagnosis decides by, in one table; those of the force balance stand at the head of its files.
+
+Purely numerical tolerances stay where they are used.
 
 Errors are rms errors over rms noise, 1 = noise alone; where one number stands for several channels, the worst counts.
 A gain is a difference of mean log error power, over the channels, between two fits (`Standing.chosen_by`).
