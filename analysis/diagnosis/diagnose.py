@@ -1,37 +1,48 @@
 """From recordings and a model to findings: the whole diagnosis, without files, clocks or screens."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.first_model import first_model
 from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.observed_parts import names_of_parts
-from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
+from analysis.diagnosis.errors.choose_measure import Compared, measure_of
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.assemble_findings import assembled
-from analysis.diagnosis.result.candidates import reached_of, with_balances
+from analysis.diagnosis.result.candidates import linear_remarks, reached_of, with_balances
+from analysis.diagnosis.result.contrast_findings import with_contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import state_maps
-from analysis.diagnosis.search.by_balance import balances_of, searched_by_balance
+from analysis.diagnosis.search.by_balance import balances_of, borne_out, leaves_open, searched_by_balance
+from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, known_to_repeat
+from analysis.diagnosis.search.determined import determined
+from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.impacts import rattling
-from analysis.diagnosis.search.learn_clean_floor import learned_from
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned, learned_from
+from analysis.diagnosis.search.looks import Look, looks_of
 from analysis.diagnosis.search.patience import OUT_OF_TIME, always
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.search import Searched, searched
 from analysis.diagnosis.search.search_beside_sound import searched_beside_sound
 from analysis.diagnosis.search.seen_directly import seen_directly
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import Judgement, judge
 from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-HUM, LOWEST_MAINS_HZ = "mains_hum", 45.0
+LOWEST_MAINS_HZ = 45.0
+WEIGHED = ("force_deadband", "force_saturation")
+"""Laws of the command that a balance has weighed: what it does not name is not there."""
+GAINS = ("force_gain", "sensor_gain")
+"""A model that was fitted to the recordings holds them: only against a calibrated one can a gain be wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +55,8 @@ class DiagnosisSettings:
     """Of the device when it was in order: what it differed by then from its model, re-tuned, is no mismatch."""
     fitted: bool = False
     """The model was fitted to these recordings by the program: evidence is then weighed in the force balance."""
+    balances: tuple[Balance, ...] | None = None
+    """Where they were weighed already: `balances_of` these recordings."""
     compared: Compared = "auto"
     """What is compared: motion, force, or what suits."""
     patient: Patience = always
@@ -62,27 +75,93 @@ def diagnose(
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
-        balances = balances_of(recordings, frozenset(settings.without), settings.patient)
-        for number, look in enumerate(_looks(recordings, model, balances, settings.compared)):
+        known = settings.balances
+        balances = balances_of(recordings, frozenset(settings.without), settings.patient) if known is None else known
+        for number, look in enumerate(looks_of(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             arena = _arena(look, settings, map_)
             repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
             found = searched_by_balance(arena, balances, repeats)
-            if found is not None:
+            if found is not None and not (look.narrow and leaves_open(found)):
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
-    look = _Look(model, measure_of(recordings, model, settings.clean, settings.compared))
+    if settings.clean and (beside := _beside_clean(recordings, model, settings, map_, progress)) is not None:
+        return beside
+    look = _look_of(recordings, model, settings)
     seen = _by_search(recordings, look, settings, map_, progress, balances)
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Look:
-    """A model, and how its errors are measured."""
+def _beside_clean(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    settings: DiagnosisSettings,
+    map_: Mapper,
+    progress: Progress,
+) -> Findings | None:
+    """None where a given model foresees the clean recordings so well that a fault is told by it, or where repeats say
+    that noise is small. What no fault of the comparison explains is looked for with the given model, among effects that
+    the comparison cannot undo."""
+    look = Look(model, measure_of(recordings, model))
+    if not settings.fitted and (known_to_repeat(look.chosen) or foresees(model, settings.clean)):
+        return None
+    progress("comparing with the clean recordings", 0.1)
+    contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.patient)
+    if not settings.fitted and contrast.left_open:
+        unweighed = _by_given_model(recordings, model, settings, contrast.weighed, map_, progress)
+        if unweighed is not None:
+            return unweighed
+    arena = _arena(look, settings, map_)
+    given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+    stands = arena.confirmed(arena.contender(given))
+    found = Searched(arena, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
+    progress("writing down what was found", 0.95)
+    floor = CleanFloor() if settings.fitted else _floor(recordings, model, settings.clean, map_, progress)
+    whole = _assembled(recordings, settings, look, _Seen(found, floor), ())
+    return with_contrast(whole, contrast, recordings[0], BEYOND)
 
-    model: MechanicalModel
-    chosen: Chosen
+
+def _by_given_model(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    settings: DiagnosisSettings,
+    weighed: frozenset[str],
+    map_: Mapper,
+    progress: Progress,
+) -> Findings | None:
+    """weighed: effects that a comparison weighed, and did not find. None where the search beside clean recordings names
+    nothing else, or cannot be done."""
+    look = _look_of(recordings, model, settings)
+    rest = replace(settings, without=(*settings.without, *weighed))
+    try:
+        seen = _by_search(recordings, look, rest, map_, progress, ())
+    except (NothingLearned, np.linalg.LinAlgError):
+        return None
+    arena = seen.searched.arena
+    found = determined(arena, seen.searched.found, settings.patient)
+    searched = borne_out(replace(seen.searched, found=found, errors=None), False)
+    if not (searched.judged.named and searched.found.steps):
+        return None
+    return _assembled(recordings, settings, look, replace(seen, searched=searched), ())
+
+
+def _look_of(recordings: Sequence[Recording], model: MechanicalModel, settings: DiagnosisSettings) -> Look:
+    return Look(model, measure_of(recordings, model, settings.clean, settings.compared))
+
+
+def _floor(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    clean: Sequence[Recording],
+    map_: Mapper,
+    progress: Progress,
+) -> CleanFloor:
+    """What a given model misses of the clean recordings, too, is no mismatch; of none, where they tell nothing."""
+    try:
+        return learned_from(clean, model, recordings, map_, progress).floor
+    except (NothingLearned, np.linalg.LinAlgError):
+        return CleanFloor()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,38 +170,15 @@ class _Seen:
     floor: CleanFloor
 
 
-def _looks(
-    recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
-) -> Iterator[_Look]:
-    """In a free simulation, the strictest, where the fitted model bears one; else along the measured motion, with the
-    balance's own linear numbers."""
-    if not any(balance.named for balance in balances):
-        return
-    chosen = measure_of(recordings, model)
-    if chosen.measure.name == "free simulation" and compared != "force":
-        yield _Look(model, chosen)
-    if compared == "motion":
-        return
-    try:
-        rigid = first_model(balances, recordings[0], model.name)
-        if rigid is not None:
-            band_hz = balances[0].searched.regression.motions[0].band_hz
-            yield _Look(rigid, measure_by_force(recordings, rigid, band_hz))
-    except (MechanicalModelError, np.linalg.LinAlgError):
-        return
-
-
-def _arena(look: _Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
-    measure, tuning = (
-        look.chosen.measure,
-        tuning_of(look.model, look.chosen.measure.records[0].recording.command.channels),
-    )
+def _arena(look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
+    measure = look.chosen.measure
+    tuning = tuning_of(look.model, measure.records[0].recording.command.channels)
     return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without))
 
 
 def _by_search(
     recordings: Sequence[Recording],
-    look: _Look,
+    look: Look,
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
@@ -131,13 +187,15 @@ def _by_search(
     """balances: where they name a law of the motion, nothing else is looked for; where they were weighed and name none,
     effects of actuator and sensor are."""
     chosen, arena = look.chosen, _arena(look, settings, map_)
-    catalogue = [effect for effect in CATALOGUE if effect.name not in settings.without]
+    left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
+    catalogue = [effect for effect in CATALOGUE if effect.name not in left_out]
     refined = {name for effect in catalogue for name in effect.simpler}
     catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
     may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
     if balances:
         named = any(balance.named for balance in balances)
-        catalogue = [] if named else [effect for effect in catalogue if _beside_motion(effect.name)]
+        imposed = bool(recordings[0].meta.get("imposed"))
+        catalogue = [] if named else [effect for effect in catalogue if _beside_motion(effect.name, imposed)]
         may_be_named = []
     if settings.clean:
         learned = learned_from(settings.clean, look.model, recordings, map_, progress)
@@ -146,9 +204,12 @@ def _by_search(
         found = _Seen(searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor)
     else:
         found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
-        if balances and _hums_low(found.searched):
+        if _hums_low(found.searched):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
             found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
+    if balances and found.searched.judged.named:
+        repeats = all(floor.how == "repeats" for floor in chosen.floors)
+        found = replace(found, searched=borne_out(found.searched, repeats))
     seen = found.searched
     if seen.judged.verdict in ("unexplained", "partly_explained") and not arena.certain and settings.patient():
         progress("looking for play that rattles", 0.9)
@@ -161,27 +222,29 @@ def _by_search(
 def _hums_low(seen: Searched) -> bool:
     """A line far below any mains is a harmonic of what drives the device."""
     placed = seen.found.after.fitted.hypothesis.placed()
-    return any(one.effect.name == HUM and one.values["frequency"] < LOWEST_MAINS_HZ for one in placed)
+    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
 
 
-def _beside_motion(name: str) -> bool:
+def _beside_motion(name: str, imposed: bool) -> bool:
     """An effect of the actuator or sensor, of which a force balance tells nothing."""
-    return EFFECTS_BY_NAME[name].place in ("actuator", "sensor") and name != "body_on_actuator"
+    told = name == "body_on_actuator" or (name in WEIGHED and not imposed)
+    return EFFECTS_BY_NAME[name].place in ("actuator", "sensor") and not told
 
 
 def _assembled(
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
-    look: _Look,
+    look: Look,
     seen: _Seen,
     balances: Sequence[Balance],
 ) -> Findings:
     searched, names = seen.searched, names_of_parts(recordings, settings.names)
     found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
-    whole = assembled(searched.arena, found, searched.judged, look.chosen.floors, names, seen.floor)
+    whole = assembled(replace(searched, found=found), look.chosen.floors, names, seen.floor)
     diagnosis = with_balances(whole.diagnosis, balances, recordings[0].command.channels)
     early = (OUT_OF_TIME,) if not all(balance.complete for balance in balances) else ()
-    remarks = tuple(dict.fromkeys((*look.chosen.remarks, *searched.remarks, *early, *whole.remarks)))
+    linear = linear_remarks(balances, recordings[0].command.channels)
+    remarks = tuple(dict.fromkeys((*look.chosen.remarks, *searched.remarks, *early, *linear, *whole.remarks)))
     reached = reached_of(diagnosis, balances, recordings[0].command.channels)
     maps = state_maps(diagnosis, balances, whole.evidence, recordings[0])
     return replace(whole, diagnosis=diagnosis, remarks=remarks, reached=reached, state_maps=maps)

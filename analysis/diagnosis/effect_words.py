@@ -99,6 +99,7 @@ class LawWords:
     words: EffectWords
     units: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     """By parameter: SI, of a translational and of a rotational model."""
+    place: Place = "mechanism"
 
 
 _FORCE, _DAMPING, _STIFFNESS = ("N", "N m"), ("N s/m", "N m s/rad"), ("N/m", "N m/rad")
@@ -113,7 +114,8 @@ LAW_WORDS: Mapping[str, LawWords] = {
         {"stiffness": _STIFFNESS, "time_constant": ("s", "s")},
     ),
     "drifting_friction": LawWords(
-        EffectWords("dry friction that changes during the recording", {"change": _CHANGE}), {"change": _FORCE}
+        EffectWords("dry friction that changes during the recording", {"level": _BARE, "change": _CHANGE}),
+        {"level": _FORCE, "change": _FORCE},
     ),
     "drifting_damping": LawWords(
         EffectWords("damping that changes during the recording", {"change": _CHANGE}), {"change": _DAMPING}
@@ -133,8 +135,23 @@ LAW_WORDS: Mapping[str, LawWords] = {
         EffectWords("stiffness that depends on the recorded condition", {"change": _PER_CONDITION}),
         {"change": _STIFFNESS},
     ),
+    "actuator_cubic": LawWords(
+        EffectWords("an actuator whose gain changes with the square of the command"), place="actuator"
+    ),
+    "actuator_square": LawWords(
+        EffectWords("an actuator whose gain changes with the size of the command"), place="actuator"
+    ),
+    "actuator_asymmetry": LawWords(
+        EffectWords("an actuator that pushes more to one side than to the other"), place="actuator"
+    ),
+    "added_stiffness": LawWords(EffectWords("a spring that came in", {"stiffness": "{}"}), {"stiffness": _STIFFNESS}),
+    "force_offset": LawWords(EffectWords("an offset of the force", {"offset": "{}"}), {"offset": _FORCE}),
+    "force_gain_drift": LawWords(
+        EffectWords("a force gain that drifts", {"change": "by {} from beginning to end"}, shares=("change",)), {}
+    ),
+    "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), {}),
 }
-"""Laws of the force balance that no simulation plays."""
+"""Laws of the force balance, and faults beside clean recordings, that no simulation plays."""
 
 OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
 """Faults of the whole sensor or logger, which need no place where all channels share them."""
@@ -144,6 +161,13 @@ def noun_of(effect: str) -> str:
     """What people call it; its own name with spaces where there is no word for it."""
     known = _words(effect)
     return known.noun if known else effect.replace("_", " ")
+
+
+def place_of(effect: str) -> Place:
+    """Of one of the vocabulary, or of a law that it lacks."""
+    known = EFFECTS_BY_NAME.get(effect)
+    law = LAW_WORDS.get(effect)
+    return known.place if known is not None else "mechanism" if law is None else law.place
 
 
 def _words(effect: str) -> EffectWords | None:

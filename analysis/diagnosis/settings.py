@@ -39,6 +39,7 @@ SETTLED_CONSTANTS = 5.0  # time constants after which a motion is gone; principl
 MOST_LEFT_OUT = 0.25  # share of a recording that may be left out until then
 REST_SHARE = 0.5  # of a channel's rms that it may start with, and of its usual changes that it may change by
 REST_S = 0.02  # within this time at the start; principle: an offset alone is no motion
+LAWS_WITHIN = 0.95  # of each named law's power that a band must hold for forces to be compared in it alone
 UNKNOWN_NOISE_SHARE = 1e-3  # of the signal, taken for noise where a recording cannot tell
 
 # How far the model's own numbers may move (`tuning`, `output_error`, `rigid_model`). By hand.
@@ -80,6 +81,10 @@ REACHES_NOISE = 2.0  # error after three steps up to which a fit is taken on whe
 RICHER_LAW_SQUARES = 4.0  # squares of the noise, in sum, that more numbers must gain over a law that does the same
 CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS = 6, 120  # of the response's middle frequency, at the recording's end
 CLOCK_LEAST_SHARE = 1e-3  # of the misfit that a trial of clock drift must take
+
+# What of a periodic recording laws are compared on first (`brief`).
+BRIEF_CONSTANTS = 7.0  # time constants of the model's run-in; principle: exp(-7) is below a thousandth
+BRIEF_SHARE = 0.7  # of the samples, above which the whole is simulated at once; by hand
 
 # Whether a further effect is looked for, and added (`explain`). By hand.
 MOST_EFFECTS = 3

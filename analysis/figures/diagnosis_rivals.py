@@ -40,11 +40,11 @@ def tried_explanations(round_: Sequence[Contender], axes: Sequence[str]) -> tupl
     """The best of each hypothesis: first the round's first, which need not have the least error where a simpler one is
     as good; then the others by their errors."""
     best: dict[object, Tried] = {}
-    for one in round_:
-        words = ", ".join(_claim_words(claim, axes) for claim in one.fitted.hypothesis.claims[-1:])
-        best.setdefault(one.fitted.hypothesis.key, _tried(words, one.standing))
+    for item in round_:
+        words = ", ".join(_claim_words(claim, axes) for claim in item.fitted.hypothesis.claims[-1:])
+        best.setdefault(item.fitted.hypothesis.key, _tried(words, item.standing))
     chosen, others = list(best.values())[:1], list(best.values())[1:]
-    return (*chosen, *sorted(others, key=lambda one: one.seen))[:MOST_RIVALS]
+    return (*chosen, *sorted(others, key=lambda each: each.seen))[:MOST_RIVALS]
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
@@ -63,11 +63,11 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                     + ("" if held else "; none earned its place"),
                     caption="Error in units of the noise, mean over the channels, of each explanation after its fit, "
                     "together with what had been found before. "
-                    + (_BOTH if any(np.isfinite(one.test) for one in tried) else _SEEN)
+                    + (_BOTH if any(np.isfinite(each.test) for each in tried) else _SEEN)
                     + " Dashed: the re-tuned model alone.",
                     figure=draw_rivals(tried, retuned, held),
                     folded=not held,
-                    alternative=" ".join(_in_words(one) for one in tried),
+                    alternative=" ".join(_in_words(each) for each in tried),
                 )
             )
     return tuple(pictures)
@@ -80,22 +80,22 @@ def draw_rivals(tried: Sequence[Tried], retuned: Tried, held: bool = True) -> Fi
     figure = new_figure(8.8, 1.05 + 0.3 * len(tried))
     axes = figure.add_subplot()
     plain_axes(axes)
-    for row, one in enumerate(tried):
+    for row, item in enumerate(tried):
         colour = AFTER.colour if row == 0 and held else GREY
-        axes.plot([one.seen, one.test], [row, row], color=colour, linewidth=1.2, zorder=2)
-        axes.plot(one.seen, row, "o", color=colour, markersize=6.5, zorder=3)
-        if np.isfinite(one.test):
-            axes.plot(one.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
+        axes.plot([item.seen, item.test], [row, row], color=colour, linewidth=1.2, zorder=2)
+        axes.plot(item.seen, row, "o", color=colour, markersize=6.5, zorder=3)
+        if np.isfinite(item.test):
+            axes.plot(item.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
     axes.axvline(retuned.seen, color=RETUNED.colour, linestyle=RETUNED.dash, linewidth=RETUNED.width, zorder=1)
     axes.axvline(1, color=BLACK, linewidth=1.0, zorder=1)
     _mark(axes, 1.0, "noise", "right")
     _mark(axes, retuned.seen, "re-tuned", "left")
-    axes.set_yticks(range(len(tried)), [one.words for one in tried])
+    axes.set_yticks(range(len(tried)), [each.words for each in tried])
     if held:
         axes.get_yticklabels()[0].set_fontweight("bold")
     axes.set_ylim(len(tried) - 0.5, -0.5)
     axes.grid(False, axis="y")
-    values = np.array([*(one.seen for one in tried), *(one.test for one in tried), retuned.seen])
+    values = np.array([*(each.seen for each in tried), *(each.test for each in tried), retuned.seen])
     _scale(axes, values[np.isfinite(values)])
     axes.set_xlabel("Error / noise", fontsize=9.5)
     return figure
@@ -108,9 +108,9 @@ def _mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> 
     )  # fmt: skip
 
 
-def _in_words(one: Tried) -> str:
-    held_out = f", held-out {one.test:.3g}" if np.isfinite(one.test) else ""
-    return f"{one.words}: {one.seen:.3g}{held_out}."
+def _in_words(rival: Tried) -> str:
+    held_out = f", held-out {rival.test:.3g}" if np.isfinite(rival.test) else ""
+    return f"{rival.words}: {rival.seen:.3g}{held_out}."
 
 
 def _scale(axes: Axes, values: FloatArray) -> None:

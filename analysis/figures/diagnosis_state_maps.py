@@ -25,7 +25,7 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
         return ()
     first = maps[0]
     along = f" along {first.axis}" if len(maps) > 1 else ""
-    others = [f"{share_text(one.share)} along {one.axis}" for one in maps[1:]]
+    others = [f"{share_text(each.share)} along {each.axis}" for each in maps[1:]]
     beside = f" Not drawn: {listed(others)}." if others else ""
     left = f" Blue: mean of what is left {first.completed}." if first.completed else ""
     states = Picture(

@@ -62,6 +62,8 @@ def _slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> t
     """By which the lateness grows with time, and its standard error."""
     rate = evidence.sample_rate_hz
     length = int(WINDOW_S * rate)
+    if LONGEST_S * rate < 1:
+        return None
     at, late = [], []
     for start in range(0, len(measured) - length + 1, length):
         inside = slice(start, start + length)
@@ -92,5 +94,6 @@ EFFECT = Effect(
     ),
     acts=OnResponse(_read, stage=4, shared=True, on_position=_read_position),
     starts=_starts,
+    of_time=True,
     sites=("all",),
 )

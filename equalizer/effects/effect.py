@@ -140,6 +140,8 @@ class Effect:
     """The vocabulary's numbers from the fitted ones, where these say more than a reader wants."""
     alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
     """Other numbers that do almost the same as given ones, so that a fit may have ended at the wrong of them."""
+    of_time: bool = False
+    """It hangs on when in a recording a sample was taken, or on rare events: no part of a recording stands for all."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,11 +36,11 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 EFFECT = Effect(
     name="hardening_stiffness",
-    equation="F = -k3 x^3",
+    equation="F = -k3 x^3, below zero softening",
     source="Duffing 1918, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz",
     signature="the missing force is an odd curve over the position; its odd harmonics rise with the level and the "
     "lowest resonance moves up",
-    parameters=(Parameter("k3", 1e-9, 1e15, none=0.0),),
+    parameters=(Parameter("k3", -1e15, 1e15, none=0.0, scale="signed"),),
     acts=AxisForce(_law, _pack),
     starts=_starts,
 )

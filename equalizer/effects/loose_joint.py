@@ -21,7 +21,7 @@ STEPS = 8
 """Per sample."""
 GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Tried: over the rms travel of the joint in the model; over its own stiffness; over the product of the two."""
-TRIED_S, SETTLING = 2.0, 4
+TRIED_S, SETTLING, FINER = 2.0, 4, 4
 """On how much of the record, of which one in so many is left out, because it did not begin at rest."""
 _FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
@@ -76,17 +76,25 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The best of a coarse net, by what it leaves of a part of the record."""
+    """The best of a coarse net, by what it leaves of a part of the record: first gaps and stiffnesses, then slips."""
     part, joint = _part(evidence, axis), joint_at(evidence.model, axis)
     travel = float(np.std(_played(evidence, axis, _FAST, part)[1]))
     held = max(abs(own(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
     measured = evidence.response[part]
-    tried: list[tuple[float, Values]] = []
-    for gap, stiffness, slip in product(GAPS, STIFFNESSES, SLIPS):
-        values = {"gap": gap * travel, "stiffness": stiffness * held, "slip": slip * held * travel}
+
+    def left(values: Values) -> float:
         off = (_played(evidence, axis, values, part)[0] - measured) / evidence.noise
-        tried.append((float(np.mean(off[len(off) // SETTLING :] ** 2)), values))
-    return tuple(values for _, values in sorted(tried, key=lambda item: item[0])[:2])
+        return float(np.mean(off[len(off) // SETTLING :] ** 2))
+
+    def at(gap: float, stiffness: float, slip: float) -> Values:
+        return {"gap": gap * travel, "stiffness": stiffness * held, "slip": slip * held * travel}
+
+    middle = SLIPS[len(SLIPS) // 2]
+    tried = {where: left(at(*where, middle)) for where in product(GAPS, STIFFNESSES)}
+    best = sorted(tried, key=tried.__getitem__)[:FINER]
+    found = [(tried[where], at(*where, middle)) for where in best]
+    found += [(left(at(*where, slip)), at(*where, slip)) for where in best for slip in SLIPS if slip != middle]
+    return tuple(values for _, values in sorted(found, key=lambda item: item[0])[:2])
 
 
 def _part(evidence: Evidence, axis: int) -> slice:

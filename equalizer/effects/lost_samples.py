@@ -101,5 +101,6 @@ EFFECT = Effect(
     parameters=(Parameter("fraction", 1e-6, LARGEST, none=0.0, fixed=True),),
     acts=OnResponse(_played, stage=5, given=_given, given_position=_given_position),
     starts=_starts,
+    of_time=True,
     sites=("all", "one"),
 )

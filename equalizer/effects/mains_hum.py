@@ -60,7 +60,7 @@ def _played(evidence: Evidence, frequency_hz: float) -> bool:
         np.abs(turn @ evidence.command) / len(turn) / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
     )
     steady = [_steadiness(command, evidence, frequency_hz) for command in evidence.command.T]
-    return any(one > PLAYED and two > STEADY for one, two in zip(share, steady, strict=True))
+    return any(each > PLAYED and two > STEADY for each, two in zip(share, steady, strict=True))
 
 
 def _loudest(residual: FloatArray, evidence: Evidence, line: int) -> int:
@@ -117,5 +117,6 @@ EFFECT = Effect(
     ),
     acts=OnResponse(_hummed, stage=2),
     starts=_starts,
+    of_time=True,
     sites=("each", "one"),
 )

@@ -55,5 +55,6 @@ EFFECT = Effect(
     ),
     acts=OnResponse(_drifted, stage=2, of_whole=True),
     starts=_starts,
+    of_time=True,
     sites=("one", "each"),
 )

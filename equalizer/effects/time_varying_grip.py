@@ -110,5 +110,6 @@ EFFECT = Effect(
     ),
     acts=AxisForce(_law, _pack),
     starts=_starts,
+    of_time=True,
     sites=("all", "one"),
 )

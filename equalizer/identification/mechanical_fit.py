@@ -27,8 +27,8 @@ from equalizer.identification.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-LINES_TO_CHOOSE_BY = 400
-"""Of each group; the chosen structure is then fitted to all."""
+LINES_TO_CHOOSE_BY, IN_ALL = 400, 1600
+"""Of each group at most, and of all; the chosen structure is then fitted to all."""
 _LOW_PARTS = (0.25, 0.5, 1.0)
 """Of the band in octaves, from its beginning: modes above would draw the start away from the rigid body."""
 
@@ -49,7 +49,7 @@ def fit_mechanical_model(
     fit, test = roles(recordings)
     lines = [one for each in fit if (one := segment_lines(*each)) is not None]
     segments = of_band(lines, settings.band_hz)
-    if sum(len(one.frequency_hz) for one in segments) < 8:
+    if sum(len(segment.frequency_hz) for segment in segments) < 8:
         raise MechanicalFitRefused(
             "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
             "record a sweep, noise or a multisine along every axis"
@@ -57,7 +57,7 @@ def fit_mechanical_model(
     band = _band(segments)
     groups = line_groups(segments, settings.floor)
     structure = _structure(recordings[0], settings, band)
-    fewer = [group.thinned(LINES_TO_CHOOSE_BY) for group in groups]
+    fewer = [group.thinned(min(LINES_TO_CHOOSE_BY, -(-IN_ALL // len(groups)))) for group in groups]
     starts = _rigid_fits(segments, fewer, structure, band, settings)
     chosen = choose(fewer, starts, band, settings, on_progress)
     every = [group.of(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
@@ -115,7 +115,7 @@ def _rigid_fits(
     for share in _LOW_PARTS:
         end = band[0] * (first / band[0]) ** share
         low = of_band(segments, (band[0], end))
-        if sum(len(one.frequency_hz) for one in low) < 8 * structure.inputs and (found or share != _LOW_PARTS[-1]):
+        if sum(len(each.frequency_hz) for each in low) < 8 * structure.inputs and (found or share != _LOW_PARTS[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
             begun, unknowns = rigid_start(low, replace(structure, delayed=delayed), settings.floor)
@@ -142,8 +142,8 @@ def _structure(recording: Recording, settings: MechanicalFitSettings, band: tupl
 
 def _band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
     return (
-        float(min(one.frequency_hz[0] for one in segments)),
-        float(max(one.frequency_hz[-1] for one in segments)),
+        float(min(segment.frequency_hz[0] for segment in segments)),
+        float(max(segment.frequency_hz[-1] for segment in segments)),
     )
 
 

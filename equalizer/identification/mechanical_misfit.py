@@ -7,7 +7,7 @@ import numpy as np
 
 from equalizer.identification.frequency_response import BoolArray
 from equalizer.identification.mechanical_lines import SegmentLines
-from equalizer.identification.mechanical_response import free_response, sampled_response
+from equalizer.identification.mechanical_response import PoleForm, free_response, pole_form, sampled_response
 from equalizer.identification.mechanical_scatter import with_scatter
 from equalizer.identification.noise_floor import over_neighbours
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -78,17 +78,19 @@ def line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGro
 
 def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[ComplexArray]:
     """Per group (lines, p, rows), with the transients that suit the lines which are not left out."""
-    found = []
+    form, found = pole_form(model), []
     for group in groups:
-        response = sampled_response(model, group.frequency_hz, group.rate_hz, group.hold)
+        response = sampled_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
         misfit = group.target - (group.root @ response[..., None])[..., 0]
-        found.append(_without_transient(group, model, misfit) if group.transient else misfit)
+        found.append(
+            _without_transient(group, transient_basis(group, model, form), misfit) if group.transient else misfit
+        )
     return found
 
 
-def transient_basis(group: LineGroup, model: MechanicalModel) -> ComplexArray:
-    """(lines, p, columns), weighted."""
-    free = free_response(model, group.frequency_hz, group.rate_hz)
+def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
+    """(lines, p, columns), weighted. form: the model's."""
+    free = free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command of before goes straight through
         straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, straight], axis=2)
@@ -128,29 +130,28 @@ def _turn_by_turn(lines: int) -> BoolArray:
     return np.asarray(np.arange(lines) % LEFT_OUT_EVERY == LEFT_OUT_EVERY // 2)
 
 
-def _same_lines(one: LineGroup, other: LineGroup) -> bool:
+def _same_lines(group: LineGroup, other: LineGroup) -> bool:
     return (
         not other.transient
-        and (one.rate_hz, one.hold) == (other.rate_hz, other.hold)
-        and len(one.frequency_hz) == len(other.frequency_hz)
-        and bool(np.allclose(one.frequency_hz, other.frequency_hz))
+        and (group.rate_hz, group.hold) == (other.rate_hz, other.hold)
+        and len(group.frequency_hz) == len(other.frequency_hz)
+        and bool(np.allclose(group.frequency_hz, other.frequency_hz))
     )
 
 
-def _folded(one: LineGroup, other: LineGroup) -> LineGroup:
-    root = np.concatenate([one.root, other.root], axis=2)
-    target = np.concatenate([one.target, other.target], axis=2)
+def _folded(group: LineGroup, other: LineGroup) -> LineGroup:
+    root = np.concatenate([group.root, other.root], axis=2)
+    target = np.concatenate([group.target, other.target], axis=2)
     if root.shape[2] > root.shape[3] + 1:  # m + 1 rows hold all that the least squares needs to know
         triangle = np.asarray(np.linalg.qr(np.concatenate([root, target[..., None]], axis=3), mode="r"))
         root, target = triangle[..., :-1], triangle[..., -1]
     return LineGroup(
-        one.frequency_hz, root, target, one.weight, one.left_out, one.count + other.count,
-        one.transient, one.rate_hz, one.hold,
+        group.frequency_hz, root, target, group.weight, group.left_out, group.count + other.count,
+        group.transient, group.rate_hz, group.hold,
     )  # fmt: skip
 
 
-def _without_transient(group: LineGroup, model: MechanicalModel, misfit: ComplexArray) -> ComplexArray:
-    basis = transient_basis(group, model)
+def _without_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexArray) -> ComplexArray:
     if not np.abs(basis).max(initial=0.0) < _RUN_AWAY:
         return misfit  # A fit may try a model that is unstable.
     kept = ~group.left_out

@@ -7,8 +7,8 @@ import numpy as np
 
 from equalizer.identification.mechanical_fit_result import MechanicalFitSettings, OrderTried
 from equalizer.identification.mechanical_misfit import LineGroup
+from equalizer.identification.mechanical_mode_start import mode_starts
 from equalizer.identification.mechanical_refinement import Refined, refined
-from equalizer.identification.mechanical_start import mode_starts
 from equalizer.identification.mechanical_structure import Structure, begun_joint, without_mode
 
 LEAST_GAIN = 0.08
@@ -128,7 +128,7 @@ def across_a_joint(
         fits.append(refined(groups, structure, begun, band_hz))
         on_progress(0.5 + 0.1 * (number + 1))
         found.append(_tried(f"with a joint begun at {times * band_hz[1]:.3g} Hz", fits[-1], structure, True))
-    joined = _needed(groups, min(fits, key=lambda one: one.left_out), band_hz, found)
+    joined = _needed(groups, min(fits, key=lambda each: each.left_out), band_hz, found)
     grown, reason = _grown(
         groups, joined, band_hz, _Limits(settings.most_modes, fit_delay=False, whole_band=False), found
     )
@@ -151,8 +151,8 @@ def _needed(
 def simplest(starts: Sequence[Refined[Structure]]) -> Refined[Structure]:
     """The best of those with the fewest unknowns, unless more of them earn their place."""
     fewest = min(each.structure.parameters for each in starts)
-    best = min((one for one in starts if one.structure.parameters == fewest), key=lambda one: one.left_out)
-    richer = min(starts, key=lambda one: one.left_out)
+    best = min((each for each in starts if each.structure.parameters == fewest), key=lambda each: each.left_out)
+    richer = min(starts, key=lambda each: each.left_out)
     return richer if CLEAR_DELAY * richer.left_out < best.left_out else best
 
 

@@ -53,23 +53,30 @@ def pole_form(model: MechanicalModel) -> PoleForm:
     return PoleForm(poles.astype(complex), C @ vectors, inverse @ B, direct, inverse.astype(complex))
 
 
-def sampled_response(model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold) -> ComplexArray:
-    """(lines, p, m), sensor and delay included; frequencies above zero."""
-    form = pole_form(model)
+def sampled_response(
+    model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold, form: PoleForm | None = None
+) -> ComplexArray:
+    """(lines, p, m), sensor and delay included; frequencies above zero. form: the model's, where it is known."""
+    form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
     answers, direct = pole_answers(form.poles, z, rate_hz, hold, model.actuator.delay_s)
     response = _through(answers, form.outputs, form.inputs) + direct[:, None, None] * form.direct
     return np.asarray(response * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
-def free_response(model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float) -> ComplexArray:
+def free_response(
+    model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, form: PoleForm | None = None
+) -> ComplexArray:
     """(lines, p, 2n): spectra of what each initial state alone would give, per state's wrap from end to beginning.
+    form: the model's, where it is known.
 
     A segment's spectrum is the response to its commands plus a real combination of these.
     """
-    form = pole_form(model)
+    form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
-    decays = z[:, None] / (z[:, None] - np.exp(form.poles / rate_hz))
+    # A fit may try a model that is unstable: beyond this growth per sample, it has run away all the same.
+    growth = np.minimum(form.poles.real / rate_hz, _FASTEST_GROWTH) + 1j * form.poles.imag / rate_hz
+    decays = z[:, None] / (z[:, None] - np.exp(growth))
     spectra = _through(decays, form.outputs, form.states)
     return np.asarray(spectra * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 

@@ -1,5 +1,6 @@
 """A signal: samples that know their rate, quantity, unit and channels. Immutable."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -60,6 +61,17 @@ class Signal:
     def part(self, start: int, stop: int) -> Self:
         """Samples start (included) to stop (excluded)."""
         return replace(self, samples=self.samples[start:stop])
+
+    def picked(self, places: Sequence[int]) -> Self:
+        """The channels at these places, in this order."""
+        kept = list(places)
+        return replace(
+            self,
+            samples=self.samples[:, kept],
+            quantity=tuple(self.quantities[k] for k in kept),
+            unit=tuple(self.units[k] for k in kept),
+            channels=tuple(self.channels[k] for k in kept),
+        )
 
     def rotated(self, rotation: FloatArray) -> Self:
         """Each sample v becomes rotation @ v. rotation: (channels, channels), orthogonal."""

@@ -1,4 +1,5 @@
-"""Faults of sensor, clock and line, put into a recording of a real device: real noise, known truth.
+"""Faults of sensor, clock and line, put into a recording of a real device: real noise, known truth. Those of mechanism
+and actuator are in `force_injections`.
 
 Written for the challenge alone: nothing of it is shared with the effects that a diagnosis compares.
 """
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from study.challenge.force_injections import FORCE_INJECTIONS, ForceInjection, moved_axis
 
 MAINS_HZ = (50.0, 60.0)
 FASTEST_PPM = 2e4
@@ -56,7 +58,7 @@ class Injected:
     values: dict[str, float]
     strength: float
     change: FloatArray
-    """(p,): rms of what it changed."""
+    """(p,): rms of what it changed, per response; per command where that was changed."""
 
 
 def _between(low: float, high: float, strength: float) -> float:
@@ -110,6 +112,23 @@ def _turn(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: 
     return np.asarray(Rotation.from_rotvec(np.radians(of["degrees"]) * about).apply(np.array(samples)))
 
 
+def _scale(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return of["gain"] * samples
+
+
+def _late(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    at = np.arange(len(samples), dtype=np.float64)
+    return np.column_stack([np.interp(at - of["offset"] * rate_hz, at, channel) for channel in samples.T])
+
+
+def _cubic(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(samples + of["cubic"] * samples**3)
+
+
+def _square(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(samples + of["square"] * samples**2)
+
+
 def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dict[str, float]:
     x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
     return {"degrees": _between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
@@ -142,6 +161,14 @@ INJECTIONS: tuple[Injection, ...] = (
         },
         _other_clock,
     ),
+    Injection(
+        "sensor_gain", lambda at, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _between(0.02, 0.8, s)}, _scale
+    ),
+    Injection("logger_offset", lambda at, s, r: {"offset": _between(0.005, 0.1, s) / at.middle_hz}, _late),
+    Injection(
+        "sensor_nonlinearity", lambda at, s, r: {"cubic": _either(r) * _between(0.02, 0.3, s) / at.peak**2}, _cubic
+    ),
+    Injection("sensor_asymmetry", lambda at, s, r: {"square": _either(r) * _between(0.02, 0.4, s) / at.peak}, _square),
     Injection("sensor_misalignment", _draw_turn, _turn, axes=3),
 )
 
@@ -151,13 +178,15 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
     a fault that needs more channels than there are."""
     if not effect:
         return Injected(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
-    wanted = next((one for one in INJECTIONS if one.effect == effect), None)
-    if wanted is None:
-        raise ValueError(
-            f"there is no way to inject '{effect}'; known are {', '.join(one.effect for one in INJECTIONS)}"
-        )
     if not 0.0 <= strength <= 1.0:
         raise ValueError(f"strength is {strength}; it must lie between 0 and 1")
+    forced = next((each for each in FORCE_INJECTIONS if each.effect == effect), None)
+    if forced is not None:
+        return _forced(recording, forced, strength, random)
+    wanted = next((each for each in INJECTIONS if each.effect == effect), None)
+    if wanted is None:
+        known = ", ".join([*(each.effect for each in INJECTIONS), *(each.effect for each in FORCE_INJECTIONS)])
+        raise ValueError(f"there is no way to inject '{effect}'; known are {known}")
     samples = recording.response.samples
     if samples.shape[1] < wanted.axes:
         raise ValueError(f"{effect} needs {wanted.axes} response channels, and there are {samples.shape[1]}")
@@ -168,13 +197,32 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
     return Injected(replace(recording, response=response), effect, values, strength, np.asarray(change))
 
 
+def _forced(recording: Recording, wanted: ForceInjection, strength: float, random: np.random.Generator) -> Injected:
+    """At an axis by chance."""
+    samples = recording.command.samples.copy()
+    axis = int(random.integers(samples.shape[1]))
+    moved = moved_axis(recording, axis)
+    if moved is None:
+        raise ValueError(f"{wanted.effect} needs a motion along command {axis + 1}")
+    values = wanted.draw(moved, strength, random)
+    samples[:, axis] = wanted.command(moved, values)
+    change = np.sqrt(np.mean((samples - recording.command.samples) ** 2, axis=0))
+    command = replace(recording.command, samples=samples)
+    return Injected(replace(recording, command=command), wanted.effect, values, strength, np.asarray(change))
+
+
 def fitting_injections(recording: Recording) -> tuple[str, ...]:
     """Names of the faults that the recording can carry: mains hum asks for a rate well above it, a tilt for one
-    sensor's three directions, which are called so: three sensors at three places are not turned together."""
+    sensor's three directions, which are called so: three sensors at three places are not turned together; a force asks
+    for a motion along each command, and an actuator for one that is not imposed."""
     rate_hz = recording.sample_rate_hz
     width = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
     hums = rate_hz > 4 * max(MAINS_HZ)
-    return tuple(one.effect for one in INJECTIONS if one.axes in (1, width) and (hums or one.effect != "mains_hum"))
+    sensed = [each.effect for each in INJECTIONS if each.axes in (1, width) and (hums or each.effect != "mains_hum")]
+    axes = range(recording.command.samples.shape[1])
+    forced = [each for each in FORCE_INJECTIONS if not (each.actuator and "imposed" in recording.meta)]
+    moves = all(moved_axis(recording, axis) is not None for axis in axes)
+    return (*sensed, *(each.effect for each in forced if moves))
 
 
 def reading_of(recording: Recording) -> Reading:

@@ -23,8 +23,8 @@ def import_recording(
 ) -> None:
     """Write one recording: units in SI, all channels on one rate, clocks aligned; what was done is said.
 
-    Without a map, a table whose header names units is understood (time [s], fx [N], ...), and so are recordings of
-    ours; for other files a map to be completed is printed.
+    Without a map, tables and arrays whose names say units are understood (time [s], fx [N], x_mm, ...), so are files
+    that one map of ours fits, and recordings of ours; for other files a map to be completed is printed.
     """
     from study.cli.progress import late_bar
     from study.importing.map_errors import MapNeededError

@@ -1,8 +1,9 @@
-"""A map out of a table's own header, where that names quantities and units: `time [s], force [N], displacement_mm`."""
+"""A map from a table's header, or from the names of a file's arrays of one length, where they name quantities and
+units: `time [s], force [N], displacement_mm`."""
 
 import re
 
-from study.importing.arrays import TABLES, Arrays
+from study.importing.arrays import Arrays
 from study.importing.import_map import ChannelMap, ClockMap, ImportMap
 from study.importing.signal_words import named, roles_of
 
@@ -11,7 +12,7 @@ _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 
 def header_map(arrays: Arrays) -> ImportMap | None:
     """None where the header does not say what every column is, or does not tell commands from responses."""
-    if arrays.path.suffix.lower() not in TABLES:
+    if len({array.shape for array in arrays.by_name.values()}) != 1 or next(iter(arrays.by_name.values())).ndim != 1:
         return None
     columns = [named(header) for header in arrays.by_name]
     times = [column for column in columns if column.unit and _TIME.fullmatch(column.name) and column.quantity == "time"]

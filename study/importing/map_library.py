@@ -81,6 +81,17 @@ def find_map(folder: Path) -> tuple[FoundMap, ...]:
     return tuple(found for source in shipped for found in _recordings(source, paths) if _fits(found))
 
 
+def map_of_files(paths: Sequence[Path]) -> MapFile | None:
+    """The one map of ours that makes one recording of just these files; None where there is none, or several."""
+    found = [
+        entry.source
+        for name in shipped_maps()
+        for entry in _recordings(read_map(name), paths)
+        if set(entry.files) == set(paths) and _fits(entry)
+    ]
+    return found[0] if len(found) == 1 else None
+
+
 def _is_map_file(path: Path) -> bool:
     try:
         return is_map(tomllib.loads(read_toml_text(path, KIND)))

@@ -97,10 +97,11 @@ def proposed_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
 
 def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
     words = [part.lower() for part in _WORD.findall(column.name)]
-    firsts = {one.name.split("_")[0].lower() for one in columns}
-    if {"u", "y"} <= firsts and "x" not in firsts and words and words[0] in _SHORT:
-        return _SHORT[words[0]]
-    return next((_SAID[word] for word in words if word in _SAID), "")
+    said: SignalRole | Literal[""] = next((_SAID[word] for word in words if word in _SAID), "")
+    firsts = {other.name.split("_")[0].lower() for other in columns}
+    if said or not {"u", "y"} <= firsts or "x" in firsts or not words:
+        return said
+    return _SHORT.get(words[0], "")
 
 
 def _by_quantity(columns: Sequence[Named]) -> dict[str, SignalRole]:

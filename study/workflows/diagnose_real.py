@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.diagnosis.balance.plain_form import plain_form
+from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of, require_something
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
@@ -21,7 +23,13 @@ from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
-from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, nothing_to_diagnose
+from study.workflows.diagnosis_input import (
+    DiagnosisInput,
+    FirstModel,
+    first_model_of,
+    fitted_model,
+    nothing_to_diagnose,
+)
 from study.workflows.real_folder import RealRecording
 from study.workflows.worker_threads import worker_threads
 
@@ -41,6 +49,7 @@ class RealDiagnosis:
 class _Read:
     recording: Recording
     model: MechanicalModel
+    balances: tuple[Balance, ...] | None
     remarks: tuple[str, ...]
     before: Recording | None
 
@@ -49,11 +58,12 @@ def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progres
     """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
     parents = wanted.parents
     try:
-        read = _read(wanted, on_progress)
+        read = _read(wanted, patient, on_progress)
         settings = DiagnosisSettings(
             names=(wanted.name,),
             clean=() if read.before is None else (read.before,),
             fitted=wanted.model() is None,
+            balances=read.balances,
             patient=patient,
         )
         with worker_threads() as threads:
@@ -61,14 +71,14 @@ def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progres
             found = replace(found, remarks=(*read.remarks, *found.remarks))
             diagnosis = wanted.found.source.map.diagnosis
             names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
-            answer = answer_of_findings(found, read.recording, names, diagnosis.nominal, threads.map)
+            answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
     except (StudyError, NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         return RealDiagnosis(_refused(wanted, refusal), None, parents)
-    further = tuple(_further(one, found) for one in wanted.tests)
+    further = tuple(_further(each, wanted, found) for each in wanted.tests)
     pair = None if read.before is None else _pair(wanted, read, found)
     objections = (
         *diagnosis.objections,
-        *(said for one in wanted.tests for said in one.source.map.diagnosis.objections),
+        *(said for each in wanted.tests for said in each.source.map.diagnosis.objections),
     )
     answer = replace(answer, further=further, pair=pair, objections=objections)
     return RealDiagnosis(answer if pair is None else _not_whole(answer, pair), found, parents)
@@ -93,12 +103,12 @@ def imported(found: FoundMap) -> Recording:
     return all_force_driven([recording])[0]
 
 
-def _read(wanted: RealRecording, on_progress: Progress) -> _Read:
+def _read(wanted: RealRecording, patient: Patience, on_progress: Progress) -> _Read:
     """Raises StudyError where there is nothing to diagnose."""
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
         raise nothing_to_diagnose((why,))
-    recording = imported(wanted.found)
+    (recording,), formed = _formed(wanted, imported(wanted.found))
     remarks: tuple[str, ...] = ()
     try:
         require_something((recording,), (wanted.name,))
@@ -107,22 +117,30 @@ def _read(wanted: RealRecording, on_progress: Progress) -> _Read:
             raise nothing_to_diagnose(refusal.problems) from refusal
         remarks = tuple(f"{problem}." for problem in refusal.problems)
     before = None if wanted.before is None else imported(wanted.before)
-    model, said = _model(wanted, recording, on_progress)
-    return _Read(recording, model, (*remarks, *said), before)
+    first = _model(wanted, recording, patient, on_progress)
+    return _Read(recording, first.model, first.balances, (*formed, *remarks, *first.remarks), before)
 
 
-def _model(
-    wanted: RealRecording, recording: Recording, on_progress: Progress
-) -> tuple[MechanicalModel, tuple[str, ...]]:
+def _formed(wanted: RealRecording, recording: Recording) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """In the form in which forces can be balanced, where no model says what its commands and responses are."""
+    if wanted.before is not None or wanted.model() is not None:
+        return (recording,), ()
+    formed, said = plain_form((recording,))
+    return all_force_driven(formed), said
+
+
+def _model(wanted: RealRecording, recording: Recording, patient: Patience, on_progress: Progress) -> FirstModel:
     given = wanted.model()
     if given is None:
-        fitted = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
-        return fitted_model(fitted, lambda share: on_progress("fitting a linear model", 0.1 * share))
+        alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
+        if wanted.before is not None:
+            return FirstModel(*fitted_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share)))
+        return first_model_of(alone, (), patient, lambda what, share: on_progress(what, 0.1 * share))
     try:
         require_model_of(given, (recording,))
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems) from refusal
-    return given, ()
+    return FirstModel(given, ())
 
 
 def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
@@ -156,16 +174,16 @@ def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
     )
 
 
-def _further(test: FoundMap, found: Findings) -> FurtherTest:
+def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
     """Nothing is fitted to it but, where the map says so, its volume."""
     title, free = test.source.map.title, test.source.map.diagnosis.volume_free
     try:
-        recording = imported(test)
+        (recording,), _ = _formed(wanted, imported(test))
         retuned, after = (played_error(recording, model, "all") for model in (retuned_model(found), found.improved))
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
         return FurtherTest(test.name, title, "", None, None, problem=said)
-    without, with_it = (one.with_gain if free else one.as_it_is for one in (retuned, after))
+    without, with_it = (each.with_gain if free else each.as_it_is for each in (retuned, after))
     said = after.error + (", one factor fitted" if free else "")
     stretches = () if free or after.error == "predicted force" else _whole(test.name, recording, retuned, after)
     return FurtherTest(test.name, title, said, without, with_it, stretches)
@@ -174,8 +192,8 @@ def _further(test: FoundMap, found: Findings) -> FurtherTest:
 def _whole(name: str, recording: Recording, retuned: PlayedError, after: PlayedError) -> tuple[HeldOutStretch, ...]:
     seconds = len(recording) / recording.sample_rate_hz
     return tuple(
-        HeldOutStretch(name, one.name, one.unit, 0.0, seconds, one.signal, one.left, two.left)
-        for one, two in zip(retuned.channels, after.channels, strict=False)
+        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.left, two.left)
+        for channel, two in zip(retuned.channels, after.channels, strict=False)
     )
 
 

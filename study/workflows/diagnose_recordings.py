@@ -9,12 +9,13 @@ from typing import Protocol
 
 import numpy as np
 
+from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.types import Mapper, Progress
+from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
@@ -22,7 +23,15 @@ from study.errors import WrongUseError
 from study.store.new_folder import new_folder, require_new_folder
 from study.store.written_elsewhere import note_written
 from study.workflows.clean_recordings import with_clean
-from study.workflows.diagnosis_input import DiagnosisInput, fitted_model, given_model, nothing_to_diagnose, read_input
+from study.workflows.diagnosis_input import (
+    DiagnosisInput,
+    FirstModel,
+    first_model_of,
+    fitted_model,
+    given_model,
+    nothing_to_diagnose,
+    read_input,
+)
 from study.workflows.spring_in_model import spring_words, with_spring
 from study.workflows.worker_threads import worker_threads
 from study.workflows.write_diagnosis import write_diagnosis_into
@@ -77,19 +86,20 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     check_names(plan.without)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
-    found = read_input(plan.sources, plan.seed)
+    found = read_input(plan.sources, plan.seed, plain=plan.model is None and not plan.clean)
     clean: DiagnosisInput | None = None
     if plan.clean:
         both = with_clean(found, plan.sources, plan.clean, plan.seed)
         found, clean = both.found, both.clean
     on_progress("reading", READ)
-    model, remarks = _model(plan, found, clean, on_progress)
+    patient = _patience(plan)
+    first = _model(plan, found, clean, patient, on_progress)
     # A model that was fitted to these recordings has the spring in it.
     spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
-    held = with_spring(model, spring)
+    held = with_spring(first.model, spring)
     begun = FITTED if plan.model is None else READ
     _check_compared(plan, found, held)
-    settings = _settings(plan, found, clean)
+    settings = _settings(plan, found, clean, patient, first.balances)
     try:
         with worker_threads() as threads:
             findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
@@ -105,7 +115,7 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     findings = replace(
         findings,
         improved=with_spring(findings.improved, -spring),
-        remarks=(*found.remarks, *spring_words(spring), *remarks, *findings.remarks),
+        remarks=(*found.remarks, *spring_words(spring), *first.remarks, *findings.remarks),
     )
     on_progress("writing the report", DIAGNOSED)
     parents = (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
@@ -114,15 +124,26 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
     return DiagnosedRecordings(findings, plan.out)
 
 
-def _settings(plan: DiagnosePlan, found: DiagnosisInput, clean: DiagnosisInput | None) -> DiagnosisSettings:
+def _patience(plan: DiagnosePlan) -> Patience:
     worked = process_time()
+    return lambda: plan.seconds is None or process_time() - worked < plan.seconds
+
+
+def _settings(
+    plan: DiagnosePlan,
+    found: DiagnosisInput,
+    clean: DiagnosisInput | None,
+    patient: Patience,
+    balances: tuple[Balance, ...] | None,
+) -> DiagnosisSettings:
     return DiagnosisSettings(
         without=plan.without,
         names=found.names,
         clean=() if clean is None else clean.recordings,
         fitted=plan.model is None and not found.simulated,
+        balances=balances,
         compared=plan.compare,
-        patient=lambda: plan.seconds is None or process_time() - worked < plan.seconds,
+        patient=patient,
     )
 
 
@@ -130,7 +151,7 @@ def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: Mechanical
     """Raises WrongUseError."""
     if plan.compare == "force" and plan.clean:
         happened = "Beside clean recordings errors are measured by the rule, so that both are measured alike."
-    elif plan.compare == "force" and not all(has_motion(one, model) for one in found.recordings):
+    elif plan.compare == "force" and not all(has_motion(each, model) for each in found.recordings):
         happened = "Neither positions nor velocities of every driven axis were measured, so no force can be told."
     else:
         return
@@ -159,19 +180,22 @@ def check_names(without: Sequence[str]) -> None:
 
 
 def _model(
-    plan: DiagnosePlan, found: DiagnosisInput, clean: DiagnosisInput | None, on_progress: Progress
-) -> tuple[MechanicalModel, tuple[str, ...]]:
-    if plan.model is not None:
-        return given_model(plan.model, found), ()
-    if found.simulated:
-        return _twin(_within(on_progress, READ, FITTED)), (TWIN_SAID,)
-    on_progress("fitting a linear model, as none was given", READ)
+    plan: DiagnosePlan,
+    found: DiagnosisInput,
+    clean: DiagnosisInput | None,
+    patient: Patience,
+    on_progress: Progress,
+) -> FirstModel:
     within = _within(on_progress, READ, FITTED)
-
-    def show(share: float) -> None:
-        within("fitting a linear model, as none was given", share)
-
-    return fitted_model(found, show) if clean is None else fitted_model(clean, show, "the clean recordings")
+    if plan.model is not None:
+        return FirstModel(given_model(plan.model, found), ())
+    if found.simulated:
+        return FirstModel(_twin(within), (TWIN_SAID,))
+    if clean is None:
+        return first_model_of(found, plan.without, patient, within)
+    what = "fitting a linear model, as none was given"
+    on_progress(what, READ)
+    return FirstModel(*fitted_model(clean, lambda share: within(what, share), "the clean recordings"))
 
 
 def _twin(on_progress: Progress) -> MechanicalModel:

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.diagnosis.balance.first_model import plain_model
+from analysis.diagnosis.balance.plain_form import plain_form
+from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.belonging import (
     NothingToDiagnose,
     require_alike,
@@ -16,6 +19,8 @@ from analysis.diagnosis.data.belonging import (
 from analysis.diagnosis.data.carried_weight import weighted
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.search.by_balance import balances_of
+from analysis.diagnosis.types import Patience, Progress
 from analysis.wording import listed
 from equalizer.identification.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
@@ -33,6 +38,10 @@ RIGID_SAID = (
     "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
     "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
 )
+BALANCE_SAID = (
+    "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
+    "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +57,9 @@ class DiagnosisInput:
     """Of the virtual spring that held the handle and is no part of the commands: a session's."""
 
 
-def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
-    """Recordings, or one session's folder. Raises StudyError."""
+def read_input(sources: Sequence[Path], seed: int, plain: bool = False) -> DiagnosisInput:
+    """Recordings, or one session's folder. plain: recordings in the form in which forces can be balanced, see
+    `plain_form`. Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
         raise nothing_to_diagnose(
@@ -62,8 +72,9 @@ def read_input(sources: Sequence[Path], seed: int) -> DiagnosisInput:
             session.spring_n_per_m,
         )  # fmt: skip
     else:
-        read = all_force_driven([read_recording(source) for source in sources])
-        found = DiagnosisInput(read, _names(sources), tuple(sources), ())
+        read = tuple(read_recording(source) for source in sources)
+        formed, said = plain_form(read) if plain else (read, ())
+        found = DiagnosisInput(all_force_driven(formed), _names(sources), tuple(sources), said)
     try:
         require_alike(found.recordings, found.names)
         require_something(found.recordings, found.names)
@@ -89,15 +100,40 @@ def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:
     return model
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstModel:
+    """What a diagnosis starts from where no model was given."""
+
+    model: MechanicalModel
+    remarks: tuple[str, ...]
+    """What must be known of it."""
+    balances: tuple[Balance, ...] | None = None
+    """None = not weighed."""
+
+
+def first_model_of(
+    found: DiagnosisInput, without: Sequence[str], patient: Patience, on_progress: Progress
+) -> FirstModel:
+    """From the force balance where that names laws along the motion of one body per command; else by a fit to spectra,
+    which takes longer. Raises StudyError where the recordings do not carry one."""
+    _require_no_weight(found)
+    on_progress("weighing laws in the force balance", 0.0)
+    balances = balances_of(found.recordings, frozenset(without), patient)
+    model = plain_model(balances, found.recordings[0], "fitted to these recordings")
+    if model is not None:
+        return FirstModel(model, (BALANCE_SAID,), balances)
+    on_progress("fitting a linear model, as none was given", 0.5)
+    model, remarks = fitted_model(
+        found, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
+    )
+    return FirstModel(model, remarks, balances)
+
+
 def fitted_model(
     found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """A linear one, and what must be known of it. Raises StudyError where the recordings do not carry one."""
-    if weighted(found.recordings):
-        raise nothing_to_diagnose(
-            ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",),
-            "Give a model of the device without it with --model.",
-        )
+    _require_no_weight(found)
     if wants_rigid_model(found.recordings) and (rigid := _rigid(found.recordings, whose)) is not None:
         return rigid, (RIGID_SAID,)
     try:
@@ -117,6 +153,14 @@ def fitted_model(
         "is not named."
     )
     return opened(fit.model), (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
+
+
+def _require_no_weight(found: DiagnosisInput) -> None:
+    if weighted(found.recordings):
+        raise nothing_to_diagnose(
+            ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",),
+            "Give a model of the device without it with --model.",
+        )
 
 
 def _rigid(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
@@ -155,23 +199,25 @@ def _names(sources: Sequence[Path]) -> tuple[str, ...]:
 
 def same_position(found: DiagnosisInput) -> DiagnosisInput:
     """Compared where every recording has it in the same channels; where not, it is left out, and that is said."""
-    kinds = {None if one.position is None else (one.position.channels, one.position.units) for one in found.recordings}
+    kinds = {
+        None if each.position is None else (each.position.channels, each.position.units) for each in found.recordings
+    }
     if len(kinds) < 2:
         return found
     said = "Only some recordings hold the same position channels: the position was left out of the comparison."
     return replace(
         found,
-        recordings=tuple(replace(one, position=None) for one in found.recordings),
+        recordings=tuple(replace(each, position=None) for each in found.recordings),
         remarks=(*found.remarks, said),
     )
 
 
 def _moving_position(found: DiagnosisInput) -> DiagnosisInput:
     """What stands still throughout says nothing, and its errors cannot be counted in units of anything."""
-    positions = [one.position for one in found.recordings if one.position is not None]
+    positions = [each.position for each in found.recordings if each.position is not None]
     if not positions:
         return found
-    courses = np.vstack([one.samples for one in positions])
+    courses = np.vstack([each.samples for each in positions])
     known = np.where(np.isfinite(courses), courses, np.nanmedian(courses, axis=0))
     still = np.ptp(known, axis=0) <= STILL * np.abs(known).max(axis=0)
     dead = [name for name, stands in zip(positions[0].channels, still, strict=True) if stands]
@@ -180,6 +226,6 @@ def _moving_position(found: DiagnosisInput) -> DiagnosisInput:
     said = f"Position {listed(dead)} never changes: the position was left out of the comparison."
     return replace(
         found,
-        recordings=tuple(replace(one, position=None) for one in found.recordings),
+        recordings=tuple(replace(each, position=None) for each in found.recordings),
         remarks=(*found.remarks, said),
     )

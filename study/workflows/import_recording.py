@@ -15,7 +15,7 @@ from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map
 from study.importing.import_map import CsvMap, ImportMap
 from study.importing.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
-from study.importing.map_library import NO_DATA, MapFile, find_map, read_map
+from study.importing.map_library import NO_DATA, MapFile, find_map, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
 from study.store.hdf5_file import format_of, is_hdf5
 from study.store.provenance import gather_provenance
@@ -137,6 +137,9 @@ def _ours(files: Sequence[Path]) -> Foreign:
 def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
     arrays = read_arrays(files[0], CsvMap())
     wanted = header_map(arrays)
+    if wanted is None and (shipped := map_of_files(files)) is not None:
+        found = _by_map(shipped, files, on_progress)
+        return replace(found, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *found.notes))
     if wanted is None:
         why = "nothing says which array is what, and in which unit"
         raise MapNeededError(files[0].name, why, map_skeleton(arrays))

@@ -88,7 +88,7 @@ This page is made from the code (`python -m study.workflows.format_docs docs`): 
 
 ```
 hapteq import run1.npz run2.npz --map MAP.toml --out rec.h5    # any arrays, by a map
-hapteq import run1.csv --out rec.h5                            # a table whose header says it: time [s],fx [N],ax [g]
+hapteq import run1.csv --out rec.h5                            # names say it: time [s],fx [N]; t_s, fx_N, x_mm
 hapteq import data.mat --out rec.h5 > MAP.toml                 # nothing says it: a map for this file, to be completed
 hapteq import FOLDER --out rec.h5                              # the map in the folder, or the one of ours that fits
 ```

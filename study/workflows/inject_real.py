@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import part_of
+from analysis.diagnosis.data.observed_parts import part_of, parts_of
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.played_errors import played_error
 from analysis.diagnosis.errors.standing import rms_over
@@ -41,6 +41,8 @@ NOTHING = 1 / 6
 PROCESSOR_S = 180.0
 """For the search of one case: real recordings take longer than a bank's."""
 BY_FORCES = "predicted force"
+KEPT = ("feedback", "imposed", "parts")
+"""Notes that a diagnosis goes by."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,18 +60,17 @@ class Carrier:
 
 
 def carriers(out: Path, wanted: Sequence[RealRecording], answers: Sequence[RealAnswer]) -> tuple[Carrier, ...]:
-    """Of the recordings that were diagnosed into `out`. Where forces are compared, a sensor's faults cannot be told
-    from motion, and none is injected."""
+    """Of the recordings that were diagnosed into `out`."""
     found = []
-    for one, answer in zip(wanted, answers, strict=True):
-        if answer.verdict == "refused" or answer.error == BY_FORCES:
+    for each, answer in zip(wanted, answers, strict=True):
+        if answer.verdict == "refused":
             continue
-        model = read_mechanical_model(out / one.folder.name / one.name / "improved.toml")
-        sound, rest = halves(imported(one.found))
+        model = read_mechanical_model(out / each.folder.name / each.name / "improved.toml")
+        sound, rest = halves(imported(each.found))
         sound = without_lead(sound)
         missed = played_error(sound, model, "all").as_it_is
         if missed is not None and missed < 1.0:
-            found.append(Carrier(one.name, model, sound, rest, missed))
+            found.append(Carrier(each.name, model, sound, rest, missed))
     return tuple(found)
 
 
@@ -81,8 +82,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     """
     plain = replace(
         recording,
-        segments=tuple(replace(one, role="") for one in recording.segments),
-        meta={key: value for key, value in recording.meta.items() if key != "parts"},
+        segments=tuple(replace(segment, role="") for segment in recording.segments),
     )
     stop = len(recording)
     half = min(stop // 2, MOST_SAMPLES)
@@ -92,8 +92,18 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 def _led(recording: Recording, start: int, stop: int) -> Recording:
     lead = min(start, MOST_SAMPLES)
     whole = part_of(recording, start - lead, stop)
-    own = [replace(one, start=max(one.start, lead)) for one in whole.segments if one.stop > lead]
-    return replace(whole, segments=tuple(own) or (Segment(lead, len(whole), "noise", 0.0),))
+    own = [replace(segment, start=max(segment.start, lead)) for segment in whole.segments if segment.stop > lead]
+    parts = [
+        {"start": max(begin, start - lead) - start + lead, "stop": min(end, stop) - start + lead}
+        for begin, end in parts_of(recording)
+        if min(end, stop) > max(begin, start - lead)
+    ]
+    meta = {key: value for key, value in recording.meta.items() if key != "parts"}
+    return replace(
+        whole,
+        segments=tuple(own) or (Segment(lead, len(whole), "noise", 0.0),),
+        meta={**meta, "parts": parts} if len(parts) > 1 else meta,
+    )
 
 
 def without_lead(recording: Recording) -> Recording:
@@ -104,7 +114,7 @@ def without_lead(recording: Recording) -> Recording:
 
 
 def _lead_of(recording: Recording) -> int:
-    return min(one.start for one in recording.segments)
+    return min(segment.start for segment in recording.segments)
 
 
 def _unknown(signal: Signal, lead: int) -> Signal:
@@ -165,20 +175,29 @@ def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: 
 
 def _nameless(recording: Recording) -> Recording:
     """Without the notes that say where it is from."""
-    return replace(recording, meta={key: value for key, value in recording.meta.items() if key == "feedback"})
+    return replace(recording, meta={key: recording.meta[key] for key in KEPT if key in recording.meta})
 
 
 def _adds(carrier: Carrier, spoiled: Recording) -> tuple[float, float]:
     """Times the error without the fault, in the channel where it shows most: of the model as it is, and at most that
     of one whose own numbers are re-tuned within their tolerances. What these take up is no fault that can be seen."""
+    as_it_is = _adds_as_it_is(carrier, spoiled)
+    if as_it_is < DETECTABLE:
+        return as_it_is, as_it_is
+    retuned, sound = (_retuned_error(without_lead(each), carrier.model) for each in (spoiled, carrier.rest))
+    return as_it_is, min(as_it_is, float(np.max(retuned / sound)))
+
+
+def _adds_as_it_is(carrier: Carrier, spoiled: Recording) -> float:
+    moved = not np.array_equal(spoiled.command.samples, carrier.rest.command.samples)
+    sound = played_error(without_lead(carrier.rest), carrier.model, "all")
+    if moved or sound.error == BY_FORCES:
+        faulty = played_error(without_lead(spoiled), carrier.model, "all")
+        return faulty.as_it_is / sound.as_it_is if faulty.as_it_is and sound.as_it_is else 1.0
     before, lead = carrier.rest.response.samples, _lead_of(carrier.rest)
     change = np.sqrt(np.nanmean((spoiled.response.samples - before)[lead:] ** 2, axis=0))
     left = carrier.missed * np.nanstd(before[lead:], axis=0)
-    as_it_is = float(np.max(np.hypot(change, left) / np.maximum(left, np.finfo(float).tiny)))
-    if as_it_is < DETECTABLE:
-        return as_it_is, as_it_is
-    retuned, sound = (_retuned_error(without_lead(one), carrier.model) for one in (spoiled, carrier.rest))
-    return as_it_is, min(as_it_is, float(np.max(retuned / sound)))
+    return float(np.max(np.hypot(change, left) / np.maximum(left, np.finfo(float).tiny)))
 
 
 def _retuned_error(recording: Recording, model: MechanicalModel) -> FloatArray:
@@ -186,7 +205,7 @@ def _retuned_error(recording: Recording, model: MechanicalModel) -> FloatArray:
     measure = measure_of((recording,), model).measure
     arena = Arena(measure.shortened(), measure, tuning_of(model, recording.command.channels), map)
     residuals = arena.confirmed(arena.contender(retuned_alone(arena))).fitted.residuals
-    masks = [one.fit | one.choose | one.test for one in measure.records]
+    masks = [record.fit | record.choose | record.test for record in measure.records]
     return np.asarray(np.maximum(rms_over(measure.records, residuals, masks) * measure.unit, np.finfo(float).tiny))
 
 

@@ -46,3 +46,11 @@ def test_samples_cannot_be_changed_and_do_not_follow_their_source():
 def test_a_rate_that_is_no_rate_is_refused(rate):
     with pytest.raises(ValueError, match="sample_rate_hz must be a positive number"):
         Signal(np.zeros((3, 1)), rate, "force", "N", ("fx",))
+
+
+def test_picked_channels_keep_their_words_in_the_order_asked_for():
+    signal = Signal(np.arange(6.0).reshape(2, 3), 10.0, ("force", "angle", "force"), ("N", "rad", "N"), ("a", "b", "c"))
+    mixed, plain = signal.picked((1, 0)), signal.picked((2, 0))
+    assert (mixed.channels, mixed.quantity, mixed.unit) == (("b", "a"), ("angle", "force"), ("rad", "N"))
+    assert mixed.samples.tolist() == [[1.0, 0.0], [4.0, 3.0]]
+    assert (plain.quantity, plain.unit) == ("force", "N")

@@ -61,25 +61,42 @@ def part_of_block(block: Block, columns: Sequence[int]) -> tuple[FloatArray, Flo
     return block.gram[np.ix_(at, at)], block.pull[at]
 
 
+def parts_of(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """(blocks, c, c) and (blocks, c): of some columns."""
+    at = np.asarray(columns, dtype=np.intp)
+    grid = at[:, None], at[None, :]
+    grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(at), len(at))
+    return grams, np.array([block.pull[at] for block in blocks]).reshape(-1, len(at))
+
+
 def total(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    at = list(columns)
-    gram = sum((block.gram[np.ix_(at, at)] for block in blocks), np.zeros((len(at), len(at))))
-    pull = sum((block.pull[at] for block in blocks), np.zeros(len(at)))
-    return np.asarray(gram), np.asarray(pull)
+    grams, pulls = parts_of(blocks, columns)
+    return np.asarray(grams.sum(axis=0)), np.asarray(pulls.sum(axis=0))
 
 
 def solved(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
+    """(..., c), of (..., c, c) and (..., c): each of many systems by itself."""
     gram, pull = products
-    size = float(np.trace(gram)) / len(gram)
-    return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(len(gram)), pull))
+    count = gram.shape[-1]
+    size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / count
+    return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(count), pull[..., None])[..., 0])
 
 
 def shrunk(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
+    """As `solved`, with columns that are not free shrunk."""
     gram, pull = products
-    size = float(np.trace(gram)) / len(gram)
-    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge) * size), pull))
+    size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
+    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, pull[..., None])[..., 0])
 
 
 def error_of(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
     gram, pull = own
     return max(power - 2 * float(weights @ pull) + float(weights @ gram @ weights), 0.0)
+
+
+def errors_of(blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray) -> FloatArray:
+    """(blocks,): sums of squares. own: `parts_of` these blocks. weights: (c,), or (blocks, c) for each its own."""
+    weights = np.broadcast_to(weights, own[1].shape)
+    power = np.array([block.power for block in blocks])
+    squares = ((own[0] @ weights[..., None])[..., 0] * weights).sum(axis=-1)
+    return np.asarray(np.maximum(power - 2 * (own[1] * weights).sum(axis=-1) + squares, 0.0))

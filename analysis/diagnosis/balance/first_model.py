@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.balance.reduced_recordings import is_reduced
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.settings import MASSLESS_SHARE
-from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -15,21 +17,25 @@ OPEN = 0.1
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """None where not each command drives one measured motion. Raises MechanicalModelError."""
+    """recording: what `reduced_recordings` makes of it, where the balances hold more than one body per command. None
+    where not each command drives one measured motion. Raises MechanicalModelError."""
     regressions = [balance.searched.regression for balance in balances]
-    motion = regressions[0].motions[0]
-    count = len(motion.channels)
-    if count != len(balances) or count != len(recording.response.channels):
+    count = len(balances)
+    if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
         return None
+    places = [regression.beside.own for regression in regressions]
     plain, full = (
-        [_numbers(balance, laws) for balance, laws in zip(balances, kinds, strict=True)]
-        for kinds in ([()] * count, [tuple(one.place for one in balance.named) for balance in balances])
+        [_numbers(balance, laws, places) for balance, laws in zip(balances, kinds, strict=True)]
+        for kinds in (
+            [()] * count,
+            [tuple(law.place for law in balance.named if law.place >= 0) for balance in balances],
+        )
     )
     matrices = [np.array([row[part] for row in plain]) for part in range(3)]
     beside = [np.array([row[part] for row in full]) for part in range(3)]
-    mass, damping, stiffness = ((one + one.T) / 2 for one in matrices)
-    floor = MASSLESS_SHARE * _rms(np.vstack([one.force for one in regressions[0].motions]))
-    moved = [np.gradient(one.velocity, 1 / one.rate_hz, axis=0) for one in regressions[0].motions]
+    mass, damping, stiffness = ((each + each.T) / 2 for each in matrices)
+    floor = MASSLESS_SHARE * _rms(np.vstack([each.force for each in regressions[0].motions]))
+    moved = [np.gradient(each.velocity[:, places], 1 / each.rate_hz, axis=0) for each in regressions[0].motions]
     floor = floor / np.maximum(_rms(np.vstack(moved)), 1e-300)
     mass = mass + np.diag(np.maximum(floor - np.diagonal(mass), 0.0))
     spread = [
@@ -50,13 +56,46 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
     )
 
 
-def _numbers(balance: Balance, laws: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows of mass, damping and stiffness."""
+def plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
+    """`first_model` where laws are named along the motions of one body per command: then it needs no other fit."""
+    if not any(balance.named for balance in balances) or is_reduced(balances):
+        return None
+    try:
+        return first_model(balances, recording, name)
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return None
+
+
+def share_within(balances: Sequence[Balance], band_hz: float) -> float:
+    """Of each named law's force, the power below a frequency; the least of them."""
+    shares = [1.0]
+    for balance in balances:
+        regression = balance.searched.regression
+        laws = [law.place for law in balance.named if law.place >= 0]
+        weights, begin = regression.weights(regression.chosen(laws)), regression.base
+        for place in (regression.places[law] for law in laws):
+            own = weights[begin : begin + place.stop - place.start]
+            begin += len(own)
+            shares.append(_below([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz))
+    return min(shares)
+
+
+def _below(courses: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+    within, whole = 0.0, 1e-300
+    for course, motion in zip(courses, motions, strict=True):
+        power = np.abs(np.fft.rfft(course - course.mean())) ** 2
+        frequency_hz = np.fft.rfftfreq(len(course), motion.step / motion.rate_hz)
+        within, whole = within + float(power[frequency_hz <= band_hz].sum()), whole + float(power.sum())
+    return within / whole
+
+
+def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows of mass, damping and stiffness, of the motions at these places."""
     regression = balance.searched.regression
-    weights = regression.weights(regression.chosen(laws))[: regression.base]
-    count = len(regression.motions[0].channels)
-    stiffness = weights[2 * count : 3 * count] if regression.base > 3 * count else np.zeros(count)
-    return weights[:count], weights[count : 2 * count], stiffness
+    weights = regression.weights(regression.chosen(laws))[: regression.matrices]
+    d = len(regression.motions[0].channels)
+    rows = [*weights.reshape(-1, d)[:, list(places)], np.zeros(len(places))]
+    return rows[0], rows[1], rows[2]
 
 
 def _rms(samples: FloatArray) -> FloatArray:

@@ -41,9 +41,7 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
         )  # fmt: skip
     yield Law("asymmetric_friction", c, (), _asymmetric(c, sharp), _asymmetric_values)
     if np.isfinite(of.band_hz):
-        yield Law(
-        "drifting_friction", c, (), lambda m, _: sliding(m.velocity[:, [c]], sharp) * relative_time(m), named("change"),
-    )  # fmt: skip
+        yield Law("drifting_friction", c, (), _drifting(c, sharp), _drifting_values)
     if not of.turns:
         yield Law("position_dependent_friction", c, (), _position_dependent(c, sharp), _position_dependent_values)
 
@@ -74,6 +72,19 @@ def _asymmetric(c: int, sharp: float) -> Columns:
 
 def _asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
     return {"level_positive": float(w[0]), "level_negative": float(w[1])} if w.min() > 0 else None
+
+
+def _drifting(c: int, sharp: float) -> Columns:
+    def columns(m: Motion, _: Numbers) -> FloatArray:
+        rubbing = sliding(m.velocity[:, [c]], sharp)
+        return np.hstack([rubbing, rubbing * relative_time(m)])
+
+    return columns
+
+
+def _drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    """A friction that would push, at the beginning or at the end, is none."""
+    return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 
 def _position_dependent(c: int, sharp: float) -> Columns:

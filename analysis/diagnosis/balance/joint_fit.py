@@ -11,8 +11,9 @@ from typing import Literal
 import numpy as np
 from scipy.stats import t as student
 
+from analysis.diagnosis.balance.band import NOISE_SHARE
 from analysis.diagnosis.balance.blocks import Block, error_of, part_of_block
-from analysis.diagnosis.balance.motion import NOISE_SHARE, Motion
+from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
 from equalizer.signals.signal import FloatArray
 
@@ -60,7 +61,7 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     shape = _shape(regressions[0], parts)
     powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
     own = _products([regression.fit for regression in regressions], shape, powers)
-    whole = np.sum([one[0] for one in own], axis=0), np.sum([one[1] for one in own], axis=0)
+    whole = np.sum([each[0] for each in own], axis=0), np.sum([each[1] for each in own], axis=0)
     found, spread = _solved(whole), _spread(own, whole)
     fit = [regression.fit for regression in regressions]
     crossed = [_solved((whole[0] - gram, whole[1] - pull)) for gram, pull in own]

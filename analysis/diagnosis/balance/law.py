@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, rfft, rfftfreq
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.signals.signal import FloatArray
@@ -37,6 +37,18 @@ class Law:
         return self.effect, self.channel
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Beside:
+    """What the base of one axis's balance is beyond mass, damping and stiffness."""
+
+    own: int
+    """Of the measured motions, the one that the force drives."""
+    laws: tuple[Law, ...] = ()
+    """Linear in the motion."""
+    late_s: float = 0.0
+    """By which the force is late in reaching the motion; the motions' forces are shifted by it already."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scales:
     """Of one channel's motion where it is fitted."""
@@ -55,10 +67,10 @@ class Scales:
 
 
 def scales_of(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
-    position = np.concatenate([one.position[one.fit, channel] for one in motions])
-    velocity = np.concatenate([one.velocity[one.fit, channel] for one in motions])
+    position = np.concatenate([each.position[each.fit, channel] for each in motions])
+    velocity = np.concatenate([each.velocity[each.fit, channel] for each in motions])
     low, high = float(position.min()), float(position.max())
-    seconds = sum(int(one.fit.sum()) for one in motions) / motions[0].rate_hz
+    seconds = sum(int(each.fit.sum()) for each in motions) / motions[0].rate_hz
     speed = float(np.sqrt(np.mean(velocity**2)))
     turns = rotational and high - low > 4 * np.pi
     return Scales(speed, high - low, low, high, seconds, motions[0].band_hz, turns, rotational)
@@ -83,8 +95,10 @@ def positive(name: str) -> Values:
 
 
 def through_lines(samples: FloatArray, rate_hz: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """A causal linear filter from rest, by lines; padded by as much again, so that its memory does not wrap round."""
+    """A causal linear filter from rest, by lines; padded by as much again, so that its memory does not wrap round, and
+    to a length of small factors."""
     count = len(samples)
-    spectrum = rfft(samples, 2 * count, axis=0)
-    s = 2j * np.pi * rfftfreq(2 * count, 1 / rate_hz)
-    return np.asarray(irfft(gain(s)[:, None] * spectrum, 2 * count, axis=0)[:count])
+    padded = next_fast_len(2 * count, real=True)
+    spectrum = rfft(samples, padded, axis=0)
+    s = 2j * np.pi * rfftfreq(padded, 1 / rate_hz)
+    return np.asarray(irfft(gain(s)[:, None] * spectrum, padded, axis=0)[:count])

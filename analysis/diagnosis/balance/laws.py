@@ -25,7 +25,7 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
         if np.isfinite(scales.band_hz):
             yield from dynamic_laws(channel, scales)
         yield from condition_laws(motions, channel)
-    if np.isfinite(motions[0].band_hz):
+    if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
         yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), named("change"))
 
 
@@ -54,8 +54,8 @@ def likely_pitches(
     motions: Sequence[Motion], remainders: Sequence[FloatArray], channel: int, of: Scales
 ) -> list[float]:
     """Of what is left of the force (kept samples each), the strongest lines over the position, the strongest first."""
-    q = np.concatenate([one.position[:: one.step, channel][one.kept(one.fit)] for one in motions])
-    left = np.concatenate([r[one.kept(one.fit)] for one, r in zip(motions, remainders, strict=True)])
+    q = np.concatenate([each.position[:: each.step, channel][each.kept(each.fit)] for each in motions])
+    left = np.concatenate([r[each.kept(each.fit)] for each, r in zip(motions, remainders, strict=True)])
     longest = _longest_pitch(of)
     # Shorter ones pass faster than the band's end at the usual speed.
     shortest = max(of.speed / of.band_hz, longest / 400)

@@ -2,7 +2,8 @@
 
 Differentiation is done line by line of the spectrum, below a band's end that is the highest at which the motion's
 white noise makes at most a hundredth of the acceleration's mean square: regression on a noisier acceleration would
-underestimate the mass by more (errors in variables; Soderstrom, Automatica 43:939, 2007).
+underestimate the mass by more (errors in variables; Soderstrom, Automatica 43:939, 2007). Accelerations are integrated
+above the band's beginning, found likewise by the position, for below it their integrals are drift.
 """
 
 from collections.abc import Sequence
@@ -10,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
-from scipy.signal import welch
 
+from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
 from analysis.diagnosis.data.measured_motion import filled_gaps
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.types import Mask
@@ -20,12 +21,6 @@ from equalizer.signals.band_limited import low_pass, odd_continued
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 
-NOISE_SHARE = 0.01
-"""Of the acceleration's mean square that the motion's noise may make: the bias of a mass, as a share of it."""
-WIDEST = 0.2
-"""The band's end at most, over the sample rate."""
-NARROWEST_CYCLES = 20.0
-"""The band's end at least, in cycles per recording."""
 OVERSAMPLED = 4.0
 """Samples that are kept per period of the band's end."""
 EDGE = 0.5
@@ -60,13 +55,18 @@ class Motion:
     """(n,): to fit and to choose by,"""
     test: Mask
     """and only to look at in the end."""
+    lowest_hz: float = 0.0
+    """Where the band begins: above 0 for integrated accelerations."""
 
     def reduced(self, columns: FloatArray) -> FloatArray:
-        """(kept samples, k): columns (n, k) with what lies above the band taken off."""
+        """(kept samples, k): columns (n, k) with what lies outside the band taken off."""
         if not np.isfinite(self.band_hz):
             return columns
-        filtered = _filtered(columns, self.rate_hz, lambda f: low_pass(f, self.band_hz))
-        return filtered[:: self.step]
+        return self.within(columns)[:: self.step]
+
+    def within(self, columns: FloatArray) -> FloatArray:
+        """(n, k): at the recording's rate."""
+        return filtered(columns, self.rate_hz, lambda f: _within(f, self.band_hz, self.lowest_hz))
 
     def kept(self, mask: Mask) -> Mask:
         """Of the kept samples, those of a mask (n,) that the filter sees whole."""
@@ -89,24 +89,27 @@ def moving_signal(recording: Recording) -> Signal | None:
         lowest = min(known)
         places = [k for k, order in enumerate(orders) if order == lowest and np.nanstd(signal.samples[:, k]) > 0]
         if places:
-            found.append((lowest, _channels(signal, places)))
+            found.append((lowest, signal.picked(places)))
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def motions_of(records: Sequence[Observed]) -> tuple[Motion, ...]:
-    """records: alike in channels, units and rate. Raises NoMotionError where there is none."""
-    signals = [moving_signal(one.recording) for one in records]
+def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
+    """records: alike in channels, units and rate. band_hz: None = what their noise allows. Raises NoMotionError where
+    there is none."""
+    signals = [moving_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a motion")
     moved = [signal for signal in signals if signal is not None]
     order = DERIVATIVE_OF_QUANTITY[moved[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
     filled = [filled_gaps(signal.samples) for signal in moved]
-    untimed = any(one.recording.meta.get("time") == "unknown" for one in records)
-    band_hz = np.inf if untimed else _band_hz(filled, rate_hz, order)
+    untimed = any(record.recording.meta.get("time") == "unknown" for record in records)
+    if band_hz is None:
+        band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
+    lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0
     conditions = _conditions(records)
     return tuple(
-        _motion(record, (samples, order), band_hz, condition, moved[0].channels)
+        _motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels)
         for record, samples, condition in zip(records, filled, conditions, strict=True)
     )
 
@@ -114,15 +117,14 @@ def motions_of(records: Sequence[Observed]) -> tuple[Motion, ...]:
 def _motion(
     record: Observed,
     measured: tuple[FloatArray, int],
-    band_hz: float,
+    band: tuple[float, float],
     condition: FloatArray,
     names: tuple[str, ...],
 ) -> Motion:
-    samples, order = measured
+    (samples, order), (band_hz, lowest_hz) = measured, band
     rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
     # A held command is, over its time, centred half a sample after the reading.
     early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
-    lowest_hz = 2 * rate_hz / len(samples) if order == 2 else 0.0
     if not np.isfinite(band_hz):
         return _untimed(record, samples, condition, names)
     position, velocity, acceleration = (
@@ -130,8 +132,13 @@ def _motion(
     )
     return Motion(
         rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
-        acceleration, filled_gaps(record.command), condition, record.fit | record.choose, record.test,
+        acceleration, filled_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,
     )  # fmt: skip
+
+
+def _within(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
+    shaped = low_pass(frequency_hz, band_hz)
+    return np.asarray(shaped * (1 - low_pass(frequency_hz, lowest_hz)) if lowest_hz > 0 else shaped)
 
 
 def _untimed(record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]) -> Motion:
@@ -152,24 +159,30 @@ def _derivative(
 
     def gain(frequency_hz: FloatArray) -> FloatArray:
         turn = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
-        shaped = low_pass(frequency_hz, band_hz) * np.exp(turn * early_s)
-        if lowest_hz > 0 and times < 0:
-            shaped = shaped * (1 - low_pass(frequency_hz, lowest_hz))
-        return np.asarray(shaped * turn**times)
+        shaped = _within(frequency_hz, band_hz, lowest_hz if times < 0 else 0.0)
+        return np.asarray(shaped * np.exp(turn * early_s) * turn**times)
 
     if times < 0 and lowest_hz == 0:
         # A velocity: its integral goes on and on, which no finite number of lines holds.
         smooth = _derivative(samples, rate_hz, band, 0, early_s)
         return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
     if times < 0:
-        return _filtered(samples, rate_hz, gain, straightened=False)
-    bent = _filtered(samples - line, rate_hz, gain, straightened=False)
+        return filtered(samples, rate_hz, gain, straightened=False)
+    bent = filtered(samples - line, rate_hz, gain, straightened=False)
     if times == 0:
         return bent + line + slope * early_s
     return bent + slope if times == 1 else bent
 
 
-def _filtered(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
+def low_passed(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
+    return filtered(samples, rate_hz, lambda f: low_pass(f, band_hz))
+
+
+def differentiated(samples: FloatArray, rate_hz: float, band_hz: float, times: int) -> FloatArray:
+    return _derivative(samples, rate_hz, (band_hz, 0.0), times, 0.0)
+
+
+def filtered(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
     """Continued beyond both ends as an odd function about them."""
     line = _straight(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
     whole = odd_continued(samples - line)
@@ -184,37 +197,12 @@ def _straight(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArr
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
-def _band_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
-    """The median over recordings and channels of the highest end that the noise allows."""
-    ends = [_end_hz(column, rate_hz, 2 * (2 - order)) for one in samples for column in one.T]
-    longest = max(len(one) for one in samples)
-    return float(np.clip(np.median(ends), NARROWEST_CYCLES * rate_hz / longest, WIDEST * rate_hz))
-
-
-def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
-    flat = column - np.linspace(column[0], column[-1], len(column))
-    frequency_hz, density = welch(flat, rate_hz, nperseg=min(len(flat), 4096))
-    frequency_hz, density = frequency_hz[1:], density[1:]
-    floor = float(np.median(density[3 * len(density) // 4 :]))
-    signal = np.cumsum(np.maximum(density - floor, 0.0) * frequency_hz**power)
-    noise = np.cumsum(floor * frequency_hz**power)
-    allowed = np.flatnonzero(noise <= NOISE_SHARE * signal)
-    return float(frequency_hz[allowed[-1]] if len(allowed) else frequency_hz[0])
-
-
 def _conditions(records: Sequence[Observed]) -> list[FloatArray]:
-    signals = [getattr(one.recording, "condition", None) for one in records]
+    signals = [getattr(record.recording, "condition", None) for record in records]
     if any(signal is None for signal in signals):
-        return [np.zeros((len(one.command), 0)) for one in records]
+        return [np.zeros((len(record.command), 0)) for record in records]
     filled = [filled_gaps(signal.samples) for signal in signals if signal is not None]
     whole = np.vstack(filled)
     spread = whole.std(axis=0)
     told = spread > 0
-    return [(one[:, told] - whole.mean(axis=0)[told]) / spread[told] for one in filled]
-
-
-def _channels(signal: Signal, places: Sequence[int]) -> Signal:
-    return Signal(
-        signal.samples[:, list(places)], signal.sample_rate_hz, tuple(signal.quantities[k] for k in places),
-        tuple(signal.units[k] for k in places), tuple(signal.channels[k] for k in places),
-    )  # fmt: skip
+    return [(each[:, told] - whole.mean(axis=0)[told]) / spread[told] for each in filled]

@@ -12,8 +12,8 @@ MOST_OF_REST, NOTABLE = 0.5, 0.3
 def plainest_structure(searched: Searched) -> Structure:
     """The structure of fewest numbers that leaves hardly more than the best."""
     allowed = searched.best.error + PLAIN * (searched.linear.error - searched.best.error)
-    enough = [one for one in searched.ranked if one.error <= allowed]
-    plain = min(enough, key=lambda one: (_numbers(searched.regression, one), one.error), default=searched.linear)
+    enough = [each for each in searched.ranked if each.error <= allowed]
+    plain = min(enough, key=lambda each: (_numbers(searched.regression, each), each.error), default=searched.linear)
     ceiling = of_everything(searched.regression, range(searched.regression.columns[0].shape[1]))[0]
     while (richer := _further(searched, plain, ceiling)) is not None:
         plain = richer
@@ -24,17 +24,19 @@ def _further(searched: Searched, plain: Structure, ceiling: float) -> Structure 
     """With laws more that take most of what all laws together could still take."""
     allowed = plain.error - max(MOST_OF_REST * (plain.error - ceiling), NOTABLE * plain.error)
     more = [
-        one
-        for one in searched.ranked
-        if set(plain.laws) < set(one.laws) and one.error <= allowed and better(plain, one)
+        each
+        for each in searched.ranked
+        if set(plain.laws) < set(each.laws) and each.error <= allowed and better(plain, each)
     ]
-    return min(more, key=lambda one: (_numbers(searched.regression, one), one.error), default=None)
+    return min(more, key=lambda each: (_numbers(searched.regression, each), each.error), default=None)
 
 
 def _numbers(regression: Regression, structure: Structure) -> int:
-    """The width within which a dry friction turns round counts for none."""
+    """The width within which a dry friction turns round counts for none; a weight on a lever takes the place of the
+    spring, whose number is then none."""
     count = 0
     for number in structure.laws:
         law, place = regression.laws[number], regression.places[number]
         count += place.stop - place.start + (0 if law.effect == "coulomb_friction" else len(law.numbers))
+        count -= law.effect == "gravity_torque"
     return count

@@ -1,8 +1,8 @@
 """Products of all laws' columns, block by block, from which any sum of laws is fitted and tested without new passes.
 
-The base of each balance is mass, damping and stiffness along every measured motion and a constant. Errors are those
-of the force within the band. A fold's error is that of numbers fitted to all other folds (Stone, J. R. Stat. Soc. B
-36:111, 1974).
+The base of each balance is mass, damping and stiffness along every measured motion, linear dynamics of a higher order
+where there are any (`Beside`), and a constant. Errors are those of the force within the band. A fold's error is that of
+numbers fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111, 1974).
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from analysis.diagnosis.balance.blocks import (
     Block,
     blocks_of,
     column_scale,
-    error_of,
-    part_of_block,
+    errors_of,
+    parts_of,
     shrunk,
     solved,
     total,
 )
-from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.law import Beside, Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -38,8 +38,11 @@ class Regression:
     motions: tuple[Motion, ...]
     axis: int
     laws: tuple[Law, ...]
+    beside: Beside
     base: int
-    """Columns of mass, damping, stiffness and constant, which come first."""
+    """Columns of mass, damping, stiffness, of laws beside them, and a constant, which come first."""
+    matrices: int
+    """Of mass, damping and stiffness alone."""
     positive: tuple[int, ...]
     """Columns among them whose weights may not be below zero, and once more: so often a fit is solved at most."""
     places: tuple[slice, ...]
@@ -54,8 +57,8 @@ class Regression:
     test: tuple[Block, ...]
 
     def chosen(self, laws: Sequence[int]) -> list[int]:
-        """Columns of the base and of laws."""
-        more = [k for law in laws for k in range(self.places[law].start, self.places[law].stop)]
+        """Columns of the base and of laws; one of the command, below zero, has none."""
+        more = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
         return [*range(self.base), *more]
 
     def weights(self, columns: Sequence[int]) -> FloatArray:
@@ -64,18 +67,16 @@ class Regression:
 
     def crossed(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each block's sum of squares with numbers fitted to the others."""
-        whole = total(self.fit, columns)
-        found = []
-        for block in self.fit:
-            own = part_of_block(block, columns)
-            rest = (whole[0] - own[0], whole[1] - own[1])
-            found.append(error_of(own, self._fitted(rest), block.power))
-        return np.array(found)
+        own = parts_of(self.fit, columns)
+        rest = own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]
+        weights = solved(rest, RIDGE)
+        for number in np.flatnonzero((weights[:, list(self.positive)] < 0).any(axis=1)):
+            weights[number] = self._fitted((rest[0][number], rest[1][number]))
+        return errors_of(self.fit, own, weights)
 
     def held_out(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each test block's sum of squares."""
-        found = self._fitted(total(self.fit, columns))
-        return np.array([error_of(part_of_block(block, columns), found, block.power) for block in self.test])
+        return errors_of(self.test, parts_of(self.test, columns), self._fitted(total(self.fit, columns)))
 
     def _fitted(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Least squares in which the axis has no mass and no damping below zero."""
@@ -99,27 +100,33 @@ class Regression:
         )
 
 
-def regression_of(motions: Sequence[Motion], axis: int, laws: Sequence[Law], turns: bool) -> Regression:
-    """turns: see `Scales`. Laws whose columns are next to nothing, or not finite, are left out."""
-    aims = [one.reduced(one.force[:, [axis]])[:, 0] for one in motions]
-    parts = [[_base(one, turns) for one in motions]]
+def regression_of(
+    motions: Sequence[Motion], axis: int, laws: Sequence[Law], turns: bool, beside: Beside | None = None
+) -> Regression:
+    """turns: see `Scales`. beside: None = the force drives the motion of its own number. Laws whose columns are next to
+    nothing, or not finite, are left out."""
+    d = len(motions[0].channels)
+    beside = beside or Beside(min(axis, d - 1))
+    aims = [each.reduced(each.force[:, [axis]])[:, 0] for each in motions]
+    parts = [[_base(each, turns, beside.laws) for each in motions]]
     kept, places, begin = [], [], parts[0][0].shape[1]
     base = begin
     for law in laws:
-        columns = [one.reduced(law.columns(one, law.numbers)) for one in motions]
-        if all(np.isfinite(each).all() for each in columns) and all(_seen(columns)):
+        columns = _columns(motions, law)
+        if columns is not None:
             parts.append(columns)
             kept.append(law)
             places.append(slice(begin, begin + columns[0].shape[1]))
             begin = places[-1].stop
     rows = tuple(np.hstack([part[k] for part in parts]) for k in range(len(motions)))
-    fit = [one.kept(one.fit) for one in motions]
+    fit = [each.kept(each.fit) for each in motions]
     scale = column_scale(rows, fit)
-    test = [one.kept(one.test) for one in motions]
+    test = [each.kept(each.test) for each in motions]
     mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
-    d, own = len(motions[0].channels), min(axis, len(motions[0].channels) - 1)
+    own = beside.own
     return Regression(
-        tuple(motions), axis, tuple(kept), base, (own, d + own, own), tuple(places), scale, rows, tuple(aims),
+        tuple(motions), axis, tuple(kept), beside, base, (2 if turns else 3) * d, (own, d + own, own), tuple(places),
+        scale, rows, tuple(aims),
         blocks_of(rows, aims, fit, (scale, mean)), blocks_of(rows, aims, test, (scale, mean)),
     )  # fmt: skip
 
@@ -132,28 +139,27 @@ def of_everything(regression: Regression, columns: Sequence[int]) -> tuple[float
     """All of these columns together, shrunk towards the base alone as much as folds ask for: its crossed error, and
     each test block's. What no sum of a few laws should be expected to beat: a ceiling."""
     free = np.array([k < regression.base for k in columns])
-    whole = total(regression.fit, columns)
-
-    def crossed(ridge: float) -> float:
-        squares = 0.0
-        for block in regression.fit:
-            own = part_of_block(block, columns)
-            weights = shrunk((whole[0] - own[0], whole[1] - own[1]), ridge, free)
-            squares += error_of(own, weights, block.power)
-        return squares
-
-    errors = [crossed(ridge) for ridge in RIDGES]
+    own = parts_of(regression.fit, columns)
+    whole = own[0].sum(axis=0), own[1].sum(axis=0)
+    rest = whole[0] - own[0], whole[1] - own[1]
+    errors = [float(errors_of(regression.fit, own, shrunk(rest, ridge, free)).sum()) for ridge in RIDGES]
     best = int(np.argmin(errors))
     found = shrunk(whole, RIDGES[best], free)
-    return errors[best], np.array(
-        [error_of(part_of_block(block, columns), found, block.power) for block in regression.test]
-    )
+    return errors[best], errors_of(regression.test, parts_of(regression.test, columns), found)
 
 
-def _base(motion: Motion, turns: bool) -> FloatArray:
+def _base(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
     """turns: where a shaft goes round and round, no spring holds it."""
-    linear = np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position])])
+    more = [law.columns(motion, law.numbers) for law in beside]
+    linear = np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
     return np.hstack([motion.reduced(linear), np.ones((len(linear[:: motion.step]), 1))])
+
+
+def _columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
+    """Per motion; None where they are next to nothing, or not finite."""
+    columns = [motion.reduced(law.columns(motion, law.numbers)) for motion in motions]
+    told = all(np.isfinite(each).all() for each in columns) and all(_seen(columns))
+    return columns if told else None
 
 
 def _seen(columns: Sequence[FloatArray]) -> Mask:
@@ -164,23 +170,49 @@ def _seen(columns: Sequence[FloatArray]) -> Mask:
 def with_law(regression: Regression, number: int, law: Law) -> Regression | None:
     """With another law of as many columns in a law's place; None where its columns are next to nothing."""
     place = regression.places[number]
-    columns = [one.reduced(law.columns(one, law.numbers)) for one in regression.motions]
-    if columns[0].shape[1] != place.stop - place.start or not all(np.isfinite(each).all() for each in columns):
-        return None
-    if not all(_seen(columns)):
+    columns = _columns(regression.motions, law)
+    if columns is None or columns[0].shape[1] != place.stop - place.start:
         return None
     rows = tuple(
         np.hstack([old[:, : place.start], new, old[:, place.stop :]])
         for old, new in zip(regression.columns, columns, strict=True)
     )
     scale = regression.scale.copy()
-    scale[place] = column_scale(columns, [one.kept(one.fit) for one in regression.motions])
+    scale[place] = column_scale(columns, [each.kept(each.fit) for each in regression.motions])
     laws = (*regression.laws[:number], law, *regression.laws[number + 1 :])
     changed = replace(regression, laws=laws, columns=rows, scale=scale)
     return replace(
         changed,
         fit=tuple(_again(changed, block, place) for block in regression.fit),
         test=tuple(_again(changed, block, place) for block in regression.test),
+    )
+
+
+def with_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
+    """With more laws after those that it has, whose columns are kept."""
+    kept, rows = [], [[each] for each in regression.columns]
+    ends = [regression.columns[0].shape[1]]
+    for law in laws:
+        columns = _columns(regression.motions, law)
+        if columns is not None:
+            kept.append(law)
+            ends.append(ends[-1] + columns[0].shape[1])
+            for held, new in zip(rows, columns, strict=True):
+                held.append(new)
+    more = tuple(np.hstack(each) for each in rows)
+    fit = [motion.kept(motion.fit) for motion in regression.motions]
+    test = [motion.kept(motion.test) for motion in regression.motions]
+    scale = np.concatenate([regression.scale, column_scale([each[:, ends[0] :] for each in more], fit)])
+    mean = np.concatenate([aim[mask] for aim, mask in zip(regression.force, fit, strict=True)]).mean()
+    units = scale, float(mean)
+    return replace(
+        regression,
+        laws=(*regression.laws, *kept),
+        places=(*regression.places, *(slice(begin, end) for begin, end in pairwise(ends))),
+        scale=scale,
+        columns=more,
+        fit=blocks_of(more, regression.force, fit, units),
+        test=blocks_of(more, regression.force, test, units),
     )
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Law, Scales, scales_of
+from analysis.diagnosis.balance.law import Beside, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
-from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of, with_law
+from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of, with_law, with_laws
 from analysis.diagnosis.types import Patience
 from equalizer.signals.signal import FloatArray
 
@@ -49,20 +49,28 @@ class Searched:
 
 
 def search_structures(
-    motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], patient: Patience
+    motions: Sequence[Motion],
+    axis: int,
+    rotational: bool,
+    without: frozenset[str],
+    patient: Patience,
+    beside: Beside | None = None,
 ) -> Searched:
-    """without: effects that are not to be considered."""
-    if not any(one.kept(one.fit).any() for one in motions):
+    """without: effects that are not to be considered. beside: None = mass, damping and stiffness alone."""
+    if not any(each.kept(each.fit).any() for each in motions):
         raise NoMotionError("too little of the motion is to be fitted to")
     scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
-    turns = any(one.turns for one in scales)
-    laws = [law for law in laws_of(motions, rotational) if law.effect not in without]
-    first = regression_of(motions, axis, laws, turns)
+    turns = any(each.turns for each in scales)
+    held = {(law.key, law.numbers) for law in (beside.laws if beside else ())}
+    laws = [
+        law for law in laws_of(motions, rotational) if law.effect not in without and (law.key, law.numbers) not in held
+    ]
+    first = regression_of(motions, axis, laws, turns, beside)
     if "cogging" not in without:
-        first = _with_pitches(first, scales, (), turns)
+        first = _with_pitches(first, scales, ())
         grown = _grown(first, [_linear(first)])
         if grown:
-            first = _with_pitches(first, scales, grown[0].laws, turns)
+            first = _with_pitches(first, scales, grown[0].laws)
     linear = _linear(first)
     beam, ranked, best = [linear], [linear], linear
     for _ in range(MOST_LAWS):
@@ -71,14 +79,14 @@ def search_structures(
         grown = _grown(first, beam)
         if not grown:
             break
-        first = _refined(first, grown[:BEAM])
-        grown = [replace(one, errors=first.crossed(first.chosen(one.laws))) for one in grown]
+        first = refined(first, grown[:BEAM])
+        grown = [replace(each, errors=first.crossed(first.chosen(each.laws))) for each in grown]
         ranked += grown
-        beam = sorted(grown, key=lambda one: one.error)[:BEAM]
+        beam = sorted(grown, key=lambda each: each.error)[:BEAM]
         if not better(best, beam[0]):
             break
         best = beam[0]
-    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda one: one.error)), patient())
+    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda each: each.error)), patient())
 
 
 def better(plain: Structure, richer: Structure) -> bool:
@@ -112,15 +120,17 @@ def _grown(regression: Regression, beam: Sequence[Structure]) -> list[Structure]
             name = tuple(sorted(regression.laws[k].key for k in laws))
             if (name not in found or grown.error < found[name].error) and _possible(regression, laws):
                 found[name] = grown
-    return sorted(found.values(), key=lambda one: one.error)
+    return sorted(found.values(), key=lambda each: each.error)
 
 
-SLIDING = ("coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction")
+SLIDING = (
+    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "position_dependent_friction", "drifting_friction"
+)  # fmt: skip
 """Laws that share the column of dry friction: two of them on one motion would divide its level by chance."""
 
 
-def _overlap(one: tuple[str, int], other: tuple[str, int]) -> bool:
-    return one[1] == other[1] and one[0] in SLIDING and other[0] in SLIDING
+def _overlap(first: tuple[str, int], other: tuple[str, int]) -> bool:
+    return first[1] == other[1] and first[0] in SLIDING and other[0] in SLIDING
 
 
 def _possible(regression: Regression, laws: Sequence[int]) -> bool:
@@ -131,7 +141,7 @@ def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, flo
     """Each law's numbers with all of them fitted together; None where its signs are not physics."""
     columns = regression.chosen(laws)
     weights = regression.weights(columns)
-    mass, begin, found = float(weights[_mass_place(regression)]), regression.base, []
+    mass, begin, found = float(weights[regression.beside.own]), regression.base, []
     for number in laws:
         law, place = regression.laws[number], regression.places[number]
         count = place.stop - place.start
@@ -140,11 +150,7 @@ def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, flo
     return found
 
 
-def _mass_place(regression: Regression) -> int:
-    return min(regression.axis, len(regression.motions[0].channels) - 1)
-
-
-def _with_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int], turns: bool) -> Regression:
+def _with_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:
     """And with the pitches that the remainder of some laws shows."""
     left = regression.remainder(regression.chosen(laws))
     more = [
@@ -152,10 +158,10 @@ def _with_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequen
         for c, of in enumerate(scales)
         for pitch in likely_pitches(regression.motions, left, c, of)
     ]
-    return regression_of(regression.motions, regression.axis, (*regression.laws, *more), turns) if more else regression
+    return with_laws(regression, more) if more else regression
 
 
-def _refined(regression: Regression, structures: Sequence[Structure]) -> Regression:
+def refined(regression: Regression, structures: Sequence[Structure]) -> Regression:
     """The nonlinear numbers of the structures' laws moved to where the folds' errors are least, each law in the first
     structure that has it."""
     seen: set[int] = set()
@@ -177,9 +183,9 @@ def _moved(alone: Regression, place: int) -> Law:
             other = with_law(alone, place, there)
             if other is not None and _possible(other, laws):
                 tried.append((float(other.crossed(other.chosen(laws)).sum()), other))
-        if not tried or min(tried, key=lambda one: one[0])[0] >= best * (1 - 1e-4):
+        if not tried or min(tried, key=lambda each: each[0])[0] >= best * (1 - 1e-4):
             break
-        best, alone = min(tried, key=lambda one: one[0])
+        best, alone = min(tried, key=lambda each: each[0])
     return alone.laws[place]
 
 

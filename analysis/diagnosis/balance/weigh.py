@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, of_everything
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
+from analysis.diagnosis.balance.weighed import DRAWS, Weighed, drawn_of, gain_of
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
@@ -27,45 +27,23 @@ SMALL = 0.05
 """and of which each must take so much."""
 ALMOST = 0.15
 """Share of a law's gain by which a rival in its place must stay behind to be told from it."""
+OF_SIGNAL = 0.02
+"""Of the force's rms that a law must take: closer, the calibration and filters of laboratory recordings are not known.
+"""
 SECOND = 2 / 3
 """Share of what is left that a second law of one family must take."""
 MENDS = "it acts like a named law, and may only mend its shape"
-DRAWS, SEED, LEVEL = 2000, 1, 0.025
 MOST_ALIKE = 4
 """Effects of a class; more of them tell nothing."""
 LEAST_BLOCKS = 4
 FAMILIES = (
     {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
-     "position_dependent_friction", "quadratic_damping"},
+     "position_dependent_friction", "drifting_friction", "quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
 """Effects that may stand in one class: they act alike. Of different families, none is named."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Weighed:
-    """One law, as a reader would judge it."""
-
-    place: int
-    """In the regression."""
-    law: Law
-    values: dict[str, float]
-    gain: float
-    """Share of the held-out error power that goes with it, beside the other laws;"""
-    gain_low: float
-    """its lower end, at 97.5 %."""
-    share: float
-    """Of what all laws together take of the linear model's error."""
-    alike: tuple[str, ...]
-    """Effects that do as well in its place."""
-    probability: float
-    """Share of resampled blocks in which none of them leaves less."""
-    why_not: str
-    """Empty where it is to be named."""
-
-    @property
-    def named(self) -> bool:
-        return not self.why_not
+PLAYED_AS = {"drifting_friction": "coulomb_friction"}
+"""Laws that no simulation plays, and the one that is fitted in their place: of a class with it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,11 +66,12 @@ class Balance:
 
     @property
     def named(self) -> tuple[Weighed, ...]:
-        return tuple(one for one in self.laws if one.named)
+        return tuple(each for each in self.laws if each.named)
 
-    def left_by(self, laws: Sequence[int]) -> FloatArray:
-        """(blocks,): held-out error power beside mass, damping and stiffness. laws: by place in the regression."""
-        return _held_out(self.searched.regression, laws)
+    def error_of(self, laws: Sequence[int]) -> float:
+        """Beside mass, damping and stiffness, held out. laws: by place in the regression."""
+        regression = self.searched.regression
+        return float(np.sqrt(_held_out(regression, laws).sum() / _size(regression)))
 
 
 def weigh(searched: Searched) -> Balance:
@@ -101,32 +80,35 @@ def weigh(searched: Searched) -> Balance:
     held = _held_out(regression, chosen.laws)
     linear = _held_out(regression, ())
     ceiling = _ceiling(regression, held)
-    room = max(float(linear.sum() - ceiling), 1e-300)
+    room = max(float(linear.sum() - ceiling), 1e-6 * float(linear.sum()), 1e-300)
     told = 1 - float(held.sum() - ceiling) / room
     laws = [_weighed(regression, chosen.laws, number, (held, room, told)) for number in chosen.laws]
     others = _others(regression, searched, chosen, (held, room))
-    size = max(sum(block.signal for block in _judging(regression)), 1e-300)
-    rms = [float(np.sqrt(error / size)) for error in (linear.sum(), held.sum(), ceiling)]
-    ordered = _once_per_family(sorted(laws, key=lambda each: -each.gain))
+    rms = [float(np.sqrt(error / _size(regression))) for error in (linear.sum(), held.sum(), ceiling)]
+    ordered = _once_perfamily_of(sorted(laws, key=lambda each: -each.gain))
     return Balance(searched, chosen, ordered, others, rms[0], rms[1], rms[2], searched.complete)
 
 
-def _once_per_family(laws: Sequence[Weighed]) -> tuple[Weighed, ...]:
+def _once_perfamily_of(laws: Sequence[Weighed]) -> tuple[Weighed, ...]:
     """laws: the largest gain first. Beside a named law of its family, another needs most of what is left: what acts
     alike mends the shape of the first."""
     found: list[Weighed] = []
     for law in laws:
-        mates = [other for other in found if other.named and _family(other.law.effect) & {law.law.effect}]
+        mates = [other for other in found if other.named and family_of(other.law.effect) & {law.law.effect}]
         found.append(replace(law, why_not=MENDS) if law.named and mates and law.gain < SECOND else law)
     return tuple(found)
 
 
-def _family(effect: str) -> set[str]:
+def family_of(effect: str) -> set[str]:
     return next((family for family in FAMILIES if effect in family), {effect})
 
 
 def _judging(regression: Regression) -> tuple[Block, ...]:
     return regression.test if len(regression.test) >= LEAST_BLOCKS else regression.fit
+
+
+def _size(regression: Regression) -> float:
+    return max(sum(block.signal for block in _judging(regression)), 1e-300)
 
 
 def _held_out(regression: Regression, laws: Sequence[int]) -> FloatArray:
@@ -147,30 +129,23 @@ def _weighed(
     held, room, told = against
     rest = tuple(each for each in laws if each != number)
     without = _held_out(regression, rest)
-    gain, low = _gain(without, held)
+    gain, low = gain_of(without, held)
     share = float((without - held).sum()) / room
     law = regression.laws[number]
     values = dict(zip(laws, values_of(regression, laws), strict=True))[number]
     alike, likely = _alike(regression, rest, number, (without, held))
-    why_not = _why_not(law, values, (gain, low, share, told), alike)
+    taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _size(regression)))
+    small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
+    why_not = _why_not(law, values, (gain, low, share, told), alike) or (small if taken < OF_SIGNAL else "")
+    if not why_not and law.effect in PLAYED_AS:
+        alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
+        law = replace(law, effect=PLAYED_AS[law.effect])
     return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not)
-
-
-def _gain(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
-    """Share of the error power that goes, and its lower end, from resampled blocks."""
-    whole = max(float(without.sum()), 1e-300)
-    drawn = _drawn(len(without))
-    shares = 1 - with_it[drawn].sum(axis=1) / np.maximum(without[drawn].sum(axis=1), 1e-300)
-    return float(1 - with_it.sum() / whole), float(np.quantile(shares, LEVEL))
 
 
 def _plainer(effect: str) -> tuple[str, ...]:
     """What a law holds as a special case: beside that it always leaves less."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
-
-
-def _drawn(blocks: int) -> npt.NDArray[np.int64]:
-    return np.random.default_rng(SEED).integers(blocks, size=(DRAWS, blocks))
 
 
 def _alike(
@@ -190,7 +165,7 @@ def _alike(
         if law.effect not in found or crossed < found[law.effect][0]:
             found[law.effect] = crossed, laws
     gained = float((without - held).sum())
-    alike, drawn = [], _drawn(len(held))
+    alike, drawn = [], drawn_of(len(held))
     first = np.ones(DRAWS, dtype=np.bool_)
     for effect, (_, laws) in found.items():
         behind = _held_out(regression, laws) - held
@@ -216,12 +191,14 @@ def _why_not(
         return f"it takes {100 * share:.1f} % of what all laws together take"
     if told < CEILING:
         return f"with it, {100 * (1 - told):.0f} % of what all laws together take are left: the main part is another"
-    family = _family(law.effect)
+    family = family_of(law.effect)
     strange = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in _plainer(effect)]
     if strange or len(others) >= MOST_ALIKE:
         return f"these data cannot tell it from {', '.join(strange or alike)}"
-    return "" if law.effect in EFFECTS_BY_NAME else "no simulation of ours plays it yet"
+    return (
+        "" if {law.effect, PLAYED_AS.get(law.effect)} & set(EFFECTS_BY_NAME) else "no simulation of ours plays it yet"
+    )
 
 
 def _others(
@@ -241,7 +218,7 @@ def _others(
     for _, number in sorted(best.values())[:8]:
         laws = (*chosen.laws, number)
         errors = _held_out(regression, laws)
-        gain, low = _gain(held, errors)
+        gain, low = gain_of(held, errors)
         values = values_of(regression, laws)[-1] or {}
         share = float((held - errors).sum()) / room
         why = "it takes too little beside what is named" if chosen.laws else "its gain is too small to be named"

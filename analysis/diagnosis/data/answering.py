@@ -2,6 +2,8 @@
 
 By the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed., 7.3), which
 for K stretches of noise and r independent commands follows a beta distribution with r and K - r degrees of freedom.
+Stretches of a short recording may be shorter than the device's memory; a response that the commands' past foretells on
+held-out samples answers all the same.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,6 +23,8 @@ DRIVEN = 0.01
 SHARED_BY_WINDOW = 2.0
 """Neighbouring lines share so much of a Hann window that so many count as one."""
 RANK = 1e-6
+MEMORY, MOST_TAPS, RIDGE = 0.1, 100, 1e-3
+"""Of a recording, that its filter spans; the filter's numbers per command at most; and their shrinkage."""
 
 
 def answer(recordings: Sequence[Recording]) -> float | None:
@@ -39,7 +43,28 @@ def answer(recordings: Sequence[Recording]) -> float | None:
     spread = np.sqrt(SHARED_BY_WINDOW * variance.sum()) / len(looks)
     if (ANSWER_COHERENCE - expected.mean()) / spread < 2 * ANSWER_DEVIATIONS:
         return None
-    return float(((found.mean(axis=0) - expected.mean()) / spread).max())
+    sure = float(((found.mean(axis=0) - expected.mean()) / spread).max())
+    told = sure >= ANSWER_DEVIATIONS or not any(_foretold(recording) for recording in recordings)
+    return sure if told else None
+
+
+def _foretold(recording: Recording) -> bool:
+    """Whether a filter of the commands, fitted to the first half, takes so much of a response in the second."""
+    command, n = recording.command.samples, len(recording)
+    every = max(int(MEMORY * n) // MOST_TAPS, 1)
+    taps = min(int(MEMORY * n), MOST_TAPS)
+    padded = np.vstack([np.zeros((taps * every, command.shape[1])), command])
+    past = [padded[taps * every - k * every : len(padded) - k * every] for k in range(taps)]
+    rows = np.hstack([*past, np.ones((n, 1))])
+    kept = np.isfinite(recording.response.samples).all(axis=1) & np.isfinite(rows).all(axis=1)
+    first = kept & (np.arange(n) < n // 2)
+    y = recording.response.samples
+    gram = rows[first].T @ rows[first]
+    weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows[first].T @ y[first])
+    last = kept & ~first
+    left = np.sum((y[last] - rows[last] @ weights) ** 2, axis=0)
+    power = np.maximum(np.sum((y[last] - y[first].mean(axis=0)) ** 2, axis=0), 1e-300)
+    return bool(np.any(left < (1 - ANSWER_COHERENCE) * power))
 
 
 def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:

@@ -2,8 +2,7 @@
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import f as f_distribution
-from scipy.stats import norm
+from scipy.special import fdtrc, ndtr
 
 from equalizer.signals.signal import FloatArray
 
@@ -22,7 +21,7 @@ def noncentral_f_sf(
     shift = np.asarray(noncentrality, dtype=np.float64)
     equal = (degrees + shift) * ((degrees + shift) / (degrees + 2 * shift))
     scaled = np.asarray(ratio, dtype=np.float64) * degrees / (degrees + shift)
-    return np.asarray(f_distribution.sf(scaled, equal, freedom), dtype=np.float64)
+    return np.asarray(fdtrc(equal, freedom, np.minimum(scaled, _LARGEST)), dtype=np.float64)
 
 
 def excess(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
@@ -33,11 +32,11 @@ def excess(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float,
     if len(power) == 0 or not np.isfinite(noise).all():
         return 0.0, 0.0, 1.0
     ratio = float(np.mean(power / np.maximum(noise, _TINY)))
-    p_value = float(f_distribution.sf(min(ratio, _LARGEST), 2 * len(power), max(freedom, 1.0)))
+    p_value = float(fdtrc(2 * len(power), max(freedom, 1.0), min(ratio, _LARGEST)))
     limit = 2 * float(np.sqrt(np.sum(noise**2) + 2 * np.sum(noise) ** 2 / max(freedom, 1.0)))
     return float(np.sum(power - noise)), limit, p_value
 
 
 def two_sided(score: float) -> float:
     """p-value of a normal score."""
-    return float(2 * norm.sf(abs(score)))
+    return float(2 * ndtr(-abs(score)))

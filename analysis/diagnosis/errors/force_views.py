@@ -9,7 +9,7 @@ from analysis.diagnosis.data.channel_noise import ChannelNoise
 from analysis.diagnosis.data.measured_motion import MeasuredMotion, measured_motion
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.needed_force import inverse_lines
+from analysis.diagnosis.errors.needed_force import band_motion, inverse_lines
 from analysis.diagnosis.errors.predicted_force import PredictedForce, edge_samples
 from equalizer.effects.along_motion import entered_force
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -53,7 +53,9 @@ def force_views(
     noise = np.fmin.reduce([view.response_rms for view in seen])
     known = KNOWN * np.sqrt(np.mean(np.vstack([view.measured for view in views]) ** 2, axis=0))
     noise = np.asarray(np.hypot(noise, known))
-    measure = PredictedForce(tuple(views), tuple(motion.position for motion in motions), noise, noise, band_hz)
+    rate_hz = records[0].recording.sample_rate_hz
+    courses = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)
+    measure = PredictedForce(tuple(views), courses, noise, noise, band_hz)
     return ForceViews(measure, tuple(seen))
 
 

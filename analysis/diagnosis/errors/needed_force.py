@@ -23,14 +23,48 @@ class NeededForce:
     axis_acceleration: FloatArray
 
 
-def needed_force(model: MechanicalModel, position: FloatArray, sample_rate_hz: float, band_hz: float) -> NeededForce:
-    """position: (n, m), finite, of the model's first m outputs' rows. Actuator, sensor and effects apart; the mean
-    force over a sample's time around each instant. Raises numpy.linalg.LinAlgError where these rows do not say how the
-    model moves."""
+@dataclass(frozen=True, slots=True, eq=False)
+class BandMotion:
+    """A measured motion within a band: what every model's force is drawn from."""
+
+    position: FloatArray
+    """(n, m): as measured, finite, of the model's first m outputs' rows."""
+    sample_rate_hz: float
+    band_hz: float
+    at: tuple[FloatArray, FloatArray, FloatArray]
+    """(n, m) each: position, velocity and acceleration at each instant,"""
+    around: tuple[FloatArray, FloatArray, FloatArray]
+    """and their means over a sample's time around it."""
+
+
+def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
+    m = position.shape[1]
+
+    def gain(frequency_hz: FloatArray) -> ComplexArray:
+        wave = 2j * np.pi * frequency_hz
+        mean = np.sinc(frequency_hz / sample_rate_hz)
+        rows = [shape * wave**order for shape in (1.0, mean) for order in range(3)]
+        within = low_pass(frequency_hz, band_hz) * np.array(rows)
+        return np.asarray(np.einsum("rl,ij->lrij", within, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
+
+    found = through(position, sample_rate_hz, gain).reshape(len(position), 6, m)
+    slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
+    found[:, [0, 3]] += straight(position)[:, None]
+    found[:, [1, 4]] += slope
+    x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(found[:, k]) for k in range(6))
+    return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
+
+
+def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
+    """Actuator, sensor and effects apart; the mean force over a sample's time around each instant. Raises
+    numpy.linalg.LinAlgError where these rows do not say how the model moves."""
+    if model.coordinates == model.inputs:
+        return _of_seen_bodies(model, motion)
+    position, sample_rate_hz = motion.position, motion.sample_rate_hz
     m = model.inputs
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
-        within = low_pass(frequency_hz, band_hz)[:, None, None]
+        within = low_pass(frequency_hz, motion.band_hz)[:, None, None]
         inverse = inverse_lines(model, frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
         wave = 2j * np.pi * frequency_hz[:, None, None]
@@ -39,6 +73,19 @@ def needed_force(model: MechanicalModel, position: FloatArray, sample_rate_hz: f
 
     found = through(position, sample_rate_hz, gain) + _along_line(model, position, sample_rate_hz)
     return NeededForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
+
+
+def _of_seen_bodies(model: MechanicalModel, motion: BandMotion) -> NeededForce:
+    """Where every coordinate is seen: no spectrum has to be taken again."""
+    moved = np.linalg.inv(model.output[: model.inputs])
+    pushed = np.linalg.inv(model.input)
+    matrices = model.stiffness, model.damping, model.mass
+    force = sum(
+        (course @ (pushed @ matrix @ moved).T for course, matrix in zip(motion.around, matrices, strict=True)),
+        np.zeros_like(motion.position),
+    )
+    along = (driven_axes(model).T @ moved).T
+    return NeededForce(force, *(course @ along for course in motion.at))
 
 
 def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:

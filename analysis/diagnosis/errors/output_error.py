@@ -70,7 +70,8 @@ def sensitivity(
             there = at.copy()
             there[number] += move
             try:
-                change = base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))
+                with np.errstate(over="ignore", invalid="ignore"):
+                    change = base - fitting(measure, measure.residuals(tuning.tuned(there), hypothesis.placed()))
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
             if np.isfinite(change).all():
@@ -104,7 +105,8 @@ def evaluated(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hyp
 
 
 def _cost(errors: FloatArray, deviations: FloatArray) -> float:
-    cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that ran away: no fit is worse
+        cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
     return cost if np.isfinite(cost) else np.inf
 
 
@@ -112,9 +114,10 @@ def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensit
     errors = fitting(measure, from_.residuals)
     own = own_columns(measure, tuning, from_, errors)
     t = len(from_.deviations)
-    cross = known.columns @ own.T
-    products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
-    pull = np.concatenate([known.columns @ errors - from_.deviations, own @ errors])
+    with np.errstate(over="ignore", invalid="ignore"):
+        cross = known.columns @ own.T
+        products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
+        pull = np.concatenate([known.columns @ errors - from_.deviations, own @ errors])
     if not (np.isfinite(products).all() and np.isfinite(pull).all()):
         # Some number moved the model to where it runs away.
         return None
@@ -148,7 +151,9 @@ def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: Fl
     for number, move in enumerate(moves):
         point = from_.hypothesis.point.copy()
         point[number] += move
-        columns[number] = (errors - fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))) / move
+        with np.errstate(over="ignore", invalid="ignore"):
+            moved = fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))
+            columns[number] = (errors - moved) / move
     return columns
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.data.carried_weight import carrying
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.needed_force import NeededForce, needed_force
+from analysis.diagnosis.errors.needed_force import BandMotion, NeededForce, band_motion, needed_force
 from equalizer.effects.along_motion import entered_force, force_along
 from equalizer.effects.bodies import bodies_of
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
@@ -19,6 +19,8 @@ from equalizer.signals.signal import FloatArray
 
 EDGE = 0.5
 """Periods of the band's end."""
+WEAKEST = 1e-3
+"""Of what is commanded: an actuator that gives no more gives nothing, and is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,8 +29,8 @@ class PredictedForce:
 
     records: tuple[Observed, ...]
     """Views: their `measured` is the force that entered, as far as it lies within the band."""
-    motions: tuple[FloatArray, ...]
-    """Per record (n, m): the positions of the model's first m outputs, as measured."""
+    motions: tuple[BandMotion, ...]
+    """Per record: of the model's first m outputs, as measured."""
     unit: FloatArray
     noise: FloatArray
     """(m,): rms of what the noise of the motion makes in the force."""
@@ -51,8 +53,12 @@ class PredictedForce:
             if (record.fit | record.choose).any()
         ]
         records = tuple(record for record, _ in kept)
-        motions = tuple(motion[: len(record.command)] for record, motion in kept)
+        motions = tuple(self._beginning(motion, len(record.command)) for record, motion in kept)
         return replace(self, records=records, motions=motions)
+
+    def _beginning(self, motion: BandMotion, count: int) -> BandMotion:
+        whole = motion.position
+        return motion if count == len(whole) else band_motion(whole[:count], motion.sample_rate_hz, self.band_hz)
 
     def _cut(self, record: Observed) -> Observed:
         """At the last sample that decisions may see; what lies just before feels that nothing follows."""
@@ -79,14 +85,14 @@ class PredictedForce:
         )
 
     def _balance(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: FloatArray
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: BandMotion
     ) -> "_Balance":
         rate_hz = record.recording.sample_rate_hz
         model = carrying(model, record.recording)
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        needed = needed_force(structure, motion, rate_hz, self.band_hz)
+        needed = needed_force(structure, motion)
         entered = entered_force(model, record.command, rate_hz, effects, record.recording.hold)
         within = band_limited(entered, rate_hz, self.band_hz)
         ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
@@ -95,11 +101,12 @@ class PredictedForce:
         # Both are means over the step that begins at a sample; the needed force is that around it.
         total = band_limited(entered + added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
         # A weaker actuator must not make every error smaller.
-        weaker = _rms(record.command) / np.maximum(_rms(entered), np.finfo(float).tiny)
+        strength = _rms(record.command)
+        weaker = strength / np.maximum(_rms(entered), WEAKEST * strength + np.finfo(float).tiny)
         return _Balance(needed, (total - needed.force) * weaker, total)
 
     def _evidence(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: FloatArray
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: BandMotion
     ) -> Evidence:
         found = self._balance(model, effects, record, motion)
         return Evidence(

@@ -61,7 +61,7 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
 def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
     rows, aims = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
-        moved = needed_force(model, motion, record.recording.sample_rate_hz, measure.band_hz)
+        moved = needed_force(model, motion)
         used = record.fit | record.choose
         courses = moved.axis_acceleration, moved.axis_velocity, moved.axis_position, np.ones((len(used), 1))
         rows.append(np.hstack(courses)[used])

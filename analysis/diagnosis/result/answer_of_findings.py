@@ -5,10 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.diagnosis.effect_words import numbers_text
-from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.intervals import standard_errors
-from analysis.diagnosis.errors.output_error import evaluated
-from analysis.diagnosis.errors.tuning import Tuning, tuning_of
+from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.result.candidate_wording import candidate_sentences
 from analysis.diagnosis.result.findings import Course, Findings
 from analysis.diagnosis.result.localisation_words import localisation_sentences
@@ -20,8 +17,6 @@ from analysis.diagnosis.result.wording import (
     inseparable_sentence,
     remainder_sentence,
 )
-from analysis.diagnosis.search.rivalry import Arena, sensitivity_at
-from analysis.diagnosis.types import Mapper
 from analysis.wording import capital
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -35,7 +30,6 @@ def answer_of_findings(
     recording: Recording,
     names: tuple[str, str, str],
     nominal: Mapping[str, float],
-    map_: Mapper,
 ) -> RealAnswer:
     """names: of folder, recording and what it is. What only the caller knows (further tests, a pair, objections, the
     time it took) is left empty."""
@@ -58,7 +52,7 @@ def answer_of_findings(
         effects=tuple(effect.effect for effect in diagnosis.effects),
         left=remainder_sentence(diagnosis),
         remarks=found.remarks,
-        numbers=own_numbers(found, recording, nominal, map_),
+        numbers=own_numbers(found, nominal),
         stretches=held_out_stretches(found.courses),
         excerpt=drawn_excerpt(found.courses),
         further=(),
@@ -145,26 +139,18 @@ def _change(course: Course, start: int, stop: int) -> FloatArray:
 
 
 # The simple model's own numbers after a diagnosis, with their intervals, where it is one body.
-def own_numbers(
-    found: Findings, recording: Recording, nominal: Mapping[str, float], map_: Mapper
-) -> tuple[OwnNumber, ...]:
+def own_numbers(found: Findings, nominal: Mapping[str, float]) -> tuple[OwnNumber, ...]:
     """Mass, damping and stiffness of one body; none where there are more. nominal: by these words, SI.
 
     The intervals are at the end of the search, on the samples that were fitted to. Where what is left is no noise, they
     are widened by how many times the noise it is: a law that is a little wrong shifts what stands beside it.
     """
-    model = found.given
-    if model.coordinates != 1 or found.explanation.statistic is not None:
+    model, tuning = found.given, found.tuning
+    if model.coordinates != 1 or found.explanation.statistic is not None or tuning is None or found.own_errors is None:
         return ()
-    whole = measure_of((recording,), model).measure
-    tuning = tuning_of(model, recording.command.channels)
-    arena = Arena(whole.shortened(), whole, tuning, map_)
     after = found.explanation.after
-    there = evaluated(arena.measure, tuning, after.fitted.deviations, after.fitted.hypothesis)
-    known = sensitivity_at(arena, there.deviations, there.hypothesis, with_forces=True)
     wide = max(after.standing.seen, 1.0)
-    errors = standard_errors(arena.measure, tuning, there, known)[: len(tuning.names)] * tuning.deviation * wide
-    return _numbers(tuning, model, tuning.values(there.deviations), errors, nominal)
+    return _numbers(tuning, model, tuning.values(after.fitted.deviations), found.own_errors * wide, nominal)
 
 
 def _numbers(

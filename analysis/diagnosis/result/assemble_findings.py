@@ -21,36 +21,38 @@ from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.result.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from analysis.diagnosis.result.unit_doubt import unit_sentences
-from analysis.diagnosis.search.determined import number_errors
+from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import learned_sentence
 from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
 
 
 def assembled(
-    arena: Arena,
-    found: Explanation,
-    judged: Judgement,
+    searched: Searched,
     floors: tuple[NoiseFloor, ...],
     names: Sequence[str],
     learned: CleanFloor,
 ) -> Findings:
-    """found.after is what is named; the same as re-tuned where nothing is. names: of the recordings. learned: what
-    clean recordings differ by."""
+    """searched.found.after is what is named; the same as re-tuned where nothing is. names: of the recordings. learned:
+    what clean recordings differ by."""
+    arena, found, judged = searched.arena, searched.found, searched.judged
     measure, tuning = arena.whole, arena.tuning
+    errors = _errors(searched)
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
     maps, courses = maps_of(measure, found.stages, floors, learned), _courses(measure, found, names)
     local = localised(measure, tuning, found.stages, floors, maps.cells)
     proposal = _proposal(arena, found, judged)
-    document = _document(arena, found, judged, (maps, local), proposal)
+    document = _document(searched, errors, (maps, local), proposal)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
         diagnosis=document,
@@ -73,6 +75,7 @@ def assembled(
         axes=tuple(axis_letter(name, said.inputs) for name in said.inputs),
         proposal=proposal,
         split_s=_split_s(measure),
+        own_errors=errors[: len(tuning.names)] * tuning.deviation,
     )
 
 
@@ -100,17 +103,31 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
     }
 
 
+def _errors(searched: Searched) -> FloatArray:
+    """Of the model's own numbers and of the named effects', as far as a reader is shown them; see `final_errors`."""
+    arena, found = searched.arena, searched.found
+    own, numbers = len(arena.tuning.names), len(found.after.fitted.hypothesis.point)
+    if found.statistic is not None:
+        return np.concatenate([np.full(own, np.nan), found.statistic.errors])
+    if searched.errors is not None and searched.judged.named:
+        return searched.errors
+    if searched.judged.named or arena.tuning.model.coordinates == 1:
+        return final_errors(arena, found if searched.judged.named else replace(found, steps=()))
+    return np.full(own + numbers, np.nan)
+
+
 def _document(
-    arena: Arena, found: Explanation, judged: Judgement, looked: tuple[Maps, Localisation], proposal: Proposal | None
+    searched: Searched, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
 ) -> Diagnosis:
-    measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
+    found, judged = searched.found, searched.judged
+    measure, tuning, fitted = searched.arena.whole, searched.arena.tuning, found.after.fitted
     maps, local = looked
     said = said_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.standing)),
-        effects=named_effects(found, number_errors(arena, found), said) if judged.named else (),
+        effects=named_effects(found, errors[len(tuning.names) :], said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")

@@ -29,6 +29,11 @@ _FAMILIES = (
         "a late reading: lag or delay, which these data cannot tell apart",
         {"sensor_lag", "logger_offset", "clock_drift"},
     ),
+    (
+        "a late command or reading: lag or delay",
+        "a late command or reading, by lag or delay, which these data cannot tell apart",
+        {"amplifier_lag", "transport_delay", "sensor_lag", "logger_offset"},
+    ),
 )  # fmt: skip
 """What laws that act alike are called together: short, in a sentence of its own, and which they are."""
 
@@ -97,7 +102,9 @@ def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str
 def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
     """Of the best few; without the first, where the verdict says it."""
     said = 1 if best_candidate_sentence(diagnosis, device) else 0
-    return tuple(f"Not confirmed: {_with_gain(one, device)}" for one in diagnosis.candidates[said:SENTENCES])
+    return tuple(
+        f"Not confirmed: {_with_gain(candidate, device)}" for candidate in diagnosis.candidates[said:SENTENCES]
+    )
 
 
 def best_candidate_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:

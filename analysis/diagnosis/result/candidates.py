@@ -3,15 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from analysis.diagnosis.balance.weigh import Balance, Weighed
+from analysis.diagnosis.balance.reduced_recordings import linear_laws
+from analysis.diagnosis.balance.weigh import SMALL, Balance
+from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
+from analysis.diagnosis.effect_words import noun_of, place_of
 from analysis.diagnosis.result.findings import Reached
+from analysis.diagnosis.search.by_balance import CONSTANTS
+from analysis.wording import listed
 from equalizer.effects.placing import axis_letter
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 MOST = 6
+LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
+"""Where one response was measured, a late command is as good as a late reading."""
 
 
 def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]) -> Diagnosis:
@@ -19,29 +23,61 @@ def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: t
     if not balances:
         return diagnosis
     weighed = {
-        (one.law.effect, axis_letter(channels[axis], channels)): one
+        (law.law.effect, axis_letter(channels[axis], channels)): law
         for axis, balance in enumerate(balances)
-        for one in balance.laws
+        for law in balance.laws
     }
     constants = {
-        f"constant force {one.axis}": one.parameters["force"].value
-        for one in diagnosis.effects
-        if one.effect == "constant_force" and (one.effect, one.axis or "") not in weighed
+        f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANTS[effect.effect]].value
+        for effect in diagnosis.effects
+        if effect.effect in CONSTANTS and (effect.effect, effect.axis or "") not in weighed
     }
     effects = tuple(
-        _with_class(one, weighed.get((one.effect, one.axis or "")))
-        for one in diagnosis.effects
-        if f"{one.effect.replace('_', ' ')} {one.axis}" not in constants
+        _with_class(effect, weighed.get((effect.effect, effect.axis or "")))
+        for effect in diagnosis.effects
+        if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
-    named = {(name, one.axis) for one in effects for name in (one.effect, *one.class_)}
+    named = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
     found = [
-        _candidate(one, axis_letter(channels[axis], channels))
-        for axis, balance in enumerate(balances)
-        for one in (*balance.laws, *balance.others)
+        _candidate(item, axis_letter(channels[axis], channels))
+        for axis, item in sorted(
+            ((axis, each) for axis, balance in enumerate(balances) for each in (*balance.laws, *balance.others)),
+            key=lambda placed: _rank(placed[1]),
+        )
     ]
-    left = [one for one in found if (one.effect, one.axis) not in named]
+    left = [each for each in found if (each.effect, each.axis) not in named]
     retuned = {**diagnosis.retuned, **constants}
-    return replace(diagnosis, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
+    verdict = diagnosis.verdict
+    if not effects and diagnosis.effects:
+        verdict = "parameters" if verdict == "explained" else "unexplained"
+    return replace(diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
+
+
+def _rank(weighed: Weighed) -> int:
+    """Missing physics before a linear model of a higher order, and that before what takes next to nothing."""
+    if weighed.law.linear:
+        return 1
+    return 0 if weighed.share >= SMALL else 2
+
+
+def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...]) -> tuple[str, ...]:
+    """What the first model holds beside mass, damping and stiffness; channels: of the commands."""
+    said = []
+    for channel, balance in zip(channels, balances, strict=False):
+        beside, motion = balance.searched.regression.beside, balance.searched.regression.motions[0]
+        laws = [law.effect for law in linear_laws(balance)]
+        parts = [f"a command that is {1e3 * beside.late_s:.3g} ms late (a lag or a delay)"] if beside.late_s else []
+        parts += [noun_of(name) for name in dict.fromkeys(laws)]
+        if len(motion.channels) > len(balances):
+            others = [name for k, name in enumerate(motion.channels) if k != beside.own]
+            parts.append(f"the motion of {listed(others)}")
+        if parts:
+            where = f" along {channel}" if len(channels) > 1 else ""
+            said.append(
+                f"Beside mass, damping and stiffness the first model holds{where} {listed(parts)}; what is linear is "
+                "no missing physics."
+            )
+    return tuple(said)
 
 
 def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]) -> tuple[Reached, ...]:
@@ -49,30 +85,29 @@ def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tupl
     found = []
     for axis, balance in enumerate(balances):
         letter = axis_letter(channels[axis], channels)
-        names = {one.effect for one in diagnosis.effects if one.axis in (letter, None, "")}
-        laws = [one.place for one in balance.laws if one.law.effect in names]
-        power = float(np.sum(balance.left_by(laws)))
-        linear = float(np.sum(balance.left_by(())))
-        rms = balance.linear * np.sqrt(power / linear) if linear > 0 else 0.0
-        found.append(Reached(letter, balance.linear, float(rms), balance.ceiling, bool(laws)))
+        names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
+        laws = [law.place for law in balance.laws if law.law.effect in names]
+        rms = balance.error_of(laws) if laws else balance.linear
+        found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws)))
     return tuple(found)
 
 
 def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Each effect at its best place."""
     first: dict[str, Candidate] = {}
-    for one in candidates:
-        first.setdefault(one.effect, one)
+    for candidate in candidates:
+        first.setdefault(candidate.effect, candidate)
     return tuple(first.values())
 
 
 def _with_class(effect: NamedEffect, weighed: Weighed | None) -> NamedEffect:
     if weighed is None:
-        return effect
+        late = effect.effect in LATE
+        return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
     rivals = tuple(
         Rival(name, 0.0, True, "as good in its place on held-out data")
         for name in weighed.alike
-        if name not in {one.effect for one in effect.rivals}
+        if name not in {rival.effect for rival in effect.rivals}
     )
     alike = (effect.effect, *weighed.alike) if weighed.alike else ()
     return replace(
@@ -84,14 +119,13 @@ def _with_class(effect: NamedEffect, weighed: Weighed | None) -> NamedEffect:
     )
 
 
-def _candidate(one: Weighed, axis: str) -> Candidate:
-    known = EFFECTS_BY_NAME.get(one.law.effect)
+def _candidate(weighed: Weighed, axis: str) -> Candidate:
     return Candidate(
-        effect=one.law.effect,
-        place=known.place if known is not None else "mechanism",
+        effect=weighed.law.effect,
+        place=place_of(weighed.law.effect),
         axis=axis or None,
-        parameters=one.values,
-        held_out_gain=min(max(one.gain, 0.0), 1.0),
-        share_of_black_box=min(max(one.share, 0.0), 1.0),
-        why_not=one.why_not or "simulations of the whole recording do not bear it out",
+        parameters=weighed.values,
+        held_out_gain=min(max(weighed.gain, 0.0), 1.0),
+        share_of_black_box=min(max(weighed.share, 0.0), 1.0),
+        why_not=weighed.why_not or "simulations of the whole recording do not bear it out",
     )

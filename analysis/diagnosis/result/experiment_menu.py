@@ -10,12 +10,16 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.excitation import faded, log_sweep, sine
 from equalizer.signals.signal import FloatArray
 
-LENGTH_S, LONG_S = 8.0, 40.0
+SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
+"""Where sweeps begin: there, or at such a share of the usual end where the sample rate is low."""
+CYCLES, LONGER = 8.0, 5.0
+"""Of the sweep's beginning: the length of an experiment; and how many times as long the longest is."""
 USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
 """How far sweeps go: to the first, or such a share of the sample rate."""
 ADDED_SHARE = 0.12
 """Of the grounded mass: a weight that is known and strapped on."""
-_FADE_S = 0.5
+_FADE = 1 / 16
+"""Of an experiment's usual length, at both ends."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,39 +40,50 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
     """axis: where the rivals sit. level: the highest that was recorded; nothing louder is proposed."""
     usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
     fastest_hz = FASTEST_SHARE * sample_rate_hz
-    slow_hz = 4.0 / LENGTH_S
-    added = ADDED_SHARE * float(np.diagonal(driven_axes(model).T @ model.mass @ driven_axes(model)).mean())
+    slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)
+    length_s = CYCLES / slowest_hz
+    fade = int(_FADE * length_s * sample_rate_hz)
+    slow_hz = 4.0 / length_s
+    added = ADDED_SHARE * _grounded_mass(model)
 
     def along(wave: FloatArray) -> FloatArray:
-        commands = np.zeros((len(wave), model.inputs))
-        commands[:, axis] = faded(wave, int(_FADE_S * sample_rate_hz), int(_FADE_S * sample_rate_hz))
-        return commands
+        return np.outer(faded(wave, fade, fade), np.arange(model.inputs) == axis)
 
-    def swept(of: float, to_hz: float = usual_hz, length_s: float = LENGTH_S) -> FloatArray:
-        return along(log_sweep(1.0, to_hz, of, int(length_s * sample_rate_hz), sample_rate_hz))
+    def swept(of: float, to_hz: float = usual_hz, times: float = 1.0) -> FloatArray:
+        return along(log_sweep(slowest_hz, to_hz, of, int(times * length_s * sample_rate_hz), sample_rate_hz))
 
     def slow(of: float) -> FloatArray:
-        return along(sine(slow_hz, of, int(LENGTH_S * sample_rate_hz), sample_rate_hz))
+        return along(sine(slow_hz, of, int(length_s * sample_rate_hz), sample_rate_hz))
 
-    sweep, wide = f"a sweep from 1 to {usual_hz:.0f} Hz", f"a sweep from 1 to {fastest_hz:.0f} Hz"
-    weight = (
-        f"{1e3 * added:.0f} g strapped to the handle"
-        if not model.rotational
-        else f"a known inertia of {added:.2g} kg m^2 on the lever"
-    )
+    sweep, wide = (f"a sweep from {slowest_hz:.3g} to {end:.3g} Hz" for end in (usual_hz, fastest_hz))
+    levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
     return (
-        Experiment(f"{sweep} at {level:.3g}, the highest level so far", swept(level), "sweep"),
-        Experiment(f"{sweep} at {level / 4:.3g}, a quarter of the highest level", swept(level / 4), "sweep"),
-        Experiment(f"{sweep} at {level / 20:.3g}, a twentieth of the highest level", swept(level / 20), "sweep"),
+        *(Experiment(f"{sweep} at {level / n:.3g}, {words}", swept(level / n), "sweep") for n, words in levels.items()),
         Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz), "sweep"),
-        Experiment(f"a slow sinusoid of {slow_hz:g} Hz at {level:.3g}", slow(level), "slow"),
+        Experiment(f"a slow sinusoid of {slow_hz:.3g} Hz at {level:.3g}", slow(level), "slow"),
         Experiment(
-            f"a slow sinusoid of {slow_hz:g} Hz at {level / 10:.3g}, so small that it hardly moves",
+            f"a slow sinusoid of {slow_hz:.3g} Hz at {level / 10:.3g}, so small that it hardly moves",
             slow(level / 10),
             "slow",
         ),
         Experiment(
-            f"{wide} at {level:.3g} that lasts {LONG_S:g} s", swept(level, fastest_hz, LONG_S), "sweep", minutes=1.5
+            f"{wide} at {level:.3g} that lasts {LONGER * length_s:.3g} s",
+            swept(level, fastest_hz, LONGER),
+            "sweep",
+            minutes=1.5,
         ),
-        Experiment(f"{sweep} at {level:.3g} with {weight}", swept(level), "sweep", added, minutes=3.0),
+        Experiment(
+            f"{sweep} at {level:.3g} with {_weight_words(model, added)}", swept(level), "sweep", added, minutes=3.0
+        ),
     )
+
+
+def _grounded_mass(model: MechanicalModel) -> float:
+    axes = driven_axes(model)
+    return float(np.diagonal(axes.T @ model.mass @ axes).mean())
+
+
+def _weight_words(model: MechanicalModel, added: float) -> str:
+    if model.rotational:
+        return f"a known inertia of {added:.2g} kg m^2 on the lever"
+    return f"{1e3 * added:.0f} g strapped to the handle"

@@ -125,3 +125,5 @@ class Findings:
     """Per axis, the one to be drawn first."""
     split_s: Mapping[str, float] = field(default_factory=dict)
     """Seconds by "fit", "choose", "test"."""
+    own_errors: FloatArray | None = None
+    """(t,): standard errors of the changes of the model's own numbers, as `tuning` counts them; NaN = not computed."""

@@ -9,18 +9,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.actuator import NO_COLUMN, balance_of
+from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
-from analysis.diagnosis.balance.structures import search_structures, values_of
-from analysis.diagnosis.balance.weigh import Balance, Weighed, weigh
+from analysis.diagnosis.balance.plainest_structure import NOTABLE
+from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.balance.weigh import Balance, family_of, weigh
+from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.search.determined import number_errors
+from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.rivalry import Arena, Contender, refine
 from analysis.diagnosis.search.search import Searched
-from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise
+from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
+from analysis.diagnosis.search.without_step import without_step
 from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
 from analysis.diagnosis.types import Patience
 from equalizer.effects.catalogue import EFFECTS
@@ -28,6 +33,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT = "constant_force"
+CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
+"""Effects that are numbers of a fitted model, and their values."""
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Standard errors of a logarithm from which an interval reaches a number that is none."""
 HELD_BY_SIMULATION = 0.9
@@ -41,7 +48,9 @@ def balances_of(recordings: Sequence[Recording], without: frozenset[str], patien
         turning = any(unit.startswith("rad") for signal in (recordings[0].response,) for unit in signal.units)
         turning |= any(unit.startswith("N m") for unit in recordings[0].command.units)
         axes = range(len(recordings[0].command.channels))
-        return tuple(weigh(search_structures(motions, axis, turning, without, patient)) for axis in axes)
+        if any(recording.meta.get("imposed") for recording in recordings):
+            return tuple(weigh(search_beside_linear(motions, axis, turning, without, patient)) for axis in axes)
+        return tuple(balance_of(motions, axis, turning, without, patient) for axis in axes)
     except (NoMotionError, np.linalg.LinAlgError):
         return ()
 
@@ -53,7 +62,7 @@ def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool
         (axis, law)
         for axis, balance in enumerate(balances)
         for law in balance.named
-        if law.law.effect != CONSTANT and _plays(axis, law)
+        if law.law.effect != CONSTANT and _plays(balance.searched.regression.beside.own, law)
     ]
     if not named:
         return None
@@ -63,27 +72,79 @@ def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool
     confirmed = arena.confirmed(retuned)
     named = _refitted(balances, named)
     while named:
-        steps = _steps(arena, retuned, named, _released(arena.tuning, balances, [law.place for _, law in named]))
-        ends = (before, confirmed, arena.confirmed(steps[-1]))
+        steps, after = _from_starts(arena, balances, (retuned, confirmed), named)
+        ends = (before, confirmed, after)
         explained = Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
-        vague = _vague(arena, explained, len(constant.claims)) if _borne_out(confirmed, ends[2]) else len(named) - 1
+        vague: int | None = len(named) - 1
+        errors: FloatArray | None = None
+        if _borne_out(confirmed, ends[2]):
+            errors = final_errors(arena, explained)
+            vague = _vague(explained, errors[len(arena.tuning.names) :], len(constant.claims))
         if vague is None:
             sealed = float(np.nanmax(ends[2].standing.test, initial=0.0))
             whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
-            return Searched(arena, explained, Judgement("explained" if whole else "partly_explained", True))
+            judged = Judgement("explained" if whole else "partly_explained", True)
+            return Searched(arena, explained, judged, errors=errors)
         named = _refitted(balances, [law for number, law in enumerate(named) if number != vague])
     return None
+
+
+def borne_out(seen: Searched, repeats: bool) -> Searched:
+    """Of what a search beside balances named, the name only where it takes as much of the held-out error power as a
+    law of a balance must, and `explained` only where repeats show the noise; what is a number of the model needs no
+    name, and no proof."""
+    found = seen.found
+    while found.steps and not _takes_enough(seen.arena, found):
+        if len(found.steps) > 1:
+            found = without_step(seen.arena, found, len(found.steps) - 1)
+        else:
+            found = replace(found, after=found.retuned, steps=())
+        seen = replace(seen, found=found, judged=judge(found), errors=None)
+    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed()}
+    if repeats or seen.judged.verdict != "explained" or names <= set(CONSTANTS):
+        return seen
+    return replace(seen, judged=replace(seen.judged, verdict="partly_explained"))
+
+
+def _takes_enough(arena: Arena, found: Explanation) -> bool:
+    """Whether the last effect takes a notable share of the held-out error power beside those before it."""
+    before = arena.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.retuned
+    left, without = (float(np.nanmean(np.log(each.standing.test))) for each in (found.after, before))
+    return not left > without + np.log(1 - NOTABLE) / 2
 
 
 def _refitted(balances: Sequence[Balance], named: Sequence[tuple[int, Weighed]]) -> list[tuple[int, Weighed]]:
     """With the numbers that the balances give these laws alone."""
     found = []
     for axis, law in named:
+        if law.place == NO_COLUMN:
+            found.append((axis, law))
+            continue
         regression = balances[axis].searched.regression
-        places = [other.place for of, other in named if of == axis]
+        places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
         values = values_of(regression, places)[places.index(law.place)]
         found.append((axis, law if values is None else replace(law, values=values)))
     return found
+
+
+def _from_starts(
+    arena: Arena,
+    balances: Sequence[Balance],
+    without: tuple[Contender, Contender],
+    named: Sequence[tuple[int, Weighed]],
+) -> tuple[list[Contender], Contender]:
+    """The steps, and the last of them on all samples. without: the re-tuned model, and the same on all samples. From
+    the balance's linear numbers; where that ends beside the law, from the model's own."""
+    retuned, confirmed = without
+    released = _released(arena.tuning, balances, [law.place for _, law in named])
+    steps = _steps(arena, retuned, named, released)
+    after = arena.confirmed(steps[-1])
+    if np.any(released) and not _borne_out(confirmed, after):
+        again = _steps(arena, retuned, named, np.zeros(len(released)))
+        other = arena.confirmed(again[-1])
+        if np.nanmean(np.log(other.standing.test)) < np.nanmean(np.log(after.standing.test)):
+            return again, other
+    return steps, after
 
 
 def _steps(
@@ -100,15 +161,30 @@ def _steps(
     return steps
 
 
-def _vague(arena: Arena, explained: Explanation, constants: int) -> int | None:
-    """The place among the named laws of one whose main number's interval holds zero; None where none does."""
-    errors, begin = number_errors(arena, explained), 0
-    for place, claim in enumerate(explained.steps[-1].fitted.hypothesis.claims):
+def _vague(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
+    """The place among the named laws of a law whose main number's interval holds zero, or any number's, where the law
+    only refines another of its family; None where there is none."""
+    begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
+    families = [family_of(claim.effect.name) for claim in hypothesis.claims]
+    for place, claim in enumerate(hypothesis.claims):
         free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
-        if place >= constants and free[0].scale == "log" and VAGUE * errors[begin] >= 1:
-            return place - constants
+        refines = place > constants and families[place] in families[constants:place]
+        for number, parameter in enumerate(free[: None if refines else 1], begin):
+            size = {"log": 1.0, "signed": abs(float(hypothesis.point[number])), "linear": np.inf}[parameter.scale]
+            if place >= constants and VAGUE * errors[number] >= size:
+                return place - constants
         begin += len(free)
     return None
+
+
+def leaves_open(searched: Searched) -> bool:
+    """Whether the interval of any positive number of a law reaches zero: a stiffness before sliding, say."""
+    assert searched.errors is not None
+    numbers = searched.found.steps[-1].fitted.hypothesis.numbers
+    errors = searched.errors[len(searched.arena.tuning.names) :]
+    return any(
+        number.parameter.scale == "log" and VAGUE * error >= 1 for number, error in zip(numbers, errors, strict=True)
+    )
 
 
 def _constants(balances: Sequence[Balance]) -> Hypothesis:
@@ -124,9 +200,9 @@ def _constants(balances: Sequence[Balance]) -> Hypothesis:
     return whole
 
 
-def _plays(axis: int, weighed: Weighed) -> bool:
+def _plays(own: int, weighed: Weighed) -> bool:
     effect = EFFECTS.get(weighed.law.effect)
-    if effect is None or weighed.law.channel != axis:
+    if effect is None or weighed.law.channel != own:
         return False
     return all(
         parameter.name in weighed.values and parameter.lower <= weighed.values[parameter.name] <= parameter.upper
@@ -135,7 +211,8 @@ def _plays(axis: int, weighed: Weighed) -> bool:
 
 
 def _claimed(axis: int, weighed: Weighed) -> Hypothesis:
-    return claimed(Claim(EFFECTS[weighed.law.effect], "one", (axis,)), [weighed.values])
+    effect = EFFECTS[weighed.law.effect]
+    return claimed(Claim(effect, "one", (axis,)), [{p.name: weighed.values[p.name] for p in effect.parameters}])
 
 
 def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
@@ -145,7 +222,7 @@ def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) 
     if len(balances) != 1 or model.coordinates != 1:
         return start
     regression = balances[0].searched.regression
-    weights = regression.weights(regression.chosen(laws))[: regression.base - 1]
+    weights = regression.weights(regression.chosen(laws))[: regression.matrices]
     given = (model.mass, model.damping, model.stiffness)
     for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
         if place == 0:

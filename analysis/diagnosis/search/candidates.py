@@ -6,6 +6,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed
 from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
+from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
 from equalizer.effects.effect import ALL_SITES, Effect, Values
 from equalizer.effects.evidence import Evidence
@@ -16,19 +17,23 @@ from equalizer.signals.signal import FloatArray
 CLOCK_DRIFT = "clock_drift"
 
 
-def candidates(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
+def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = map) -> tuple[Hypothesis, ...]:
     """In the catalogue's order; an effect whose estimator finds no starting value is left out."""
-    found: list[Hypothesis] = []
-    for effect in catalogue:
+
+    def of_effect(effect: Effect) -> list[Hypothesis]:
         sensed = EFFECTS_BY_NAME[effect.name].place == "sensor"
         sites = range(evidence.model.outputs if sensed else evidence.model.inputs)
         starts = [effect.starts(evidence, site)[:STARTS_PER_CLAIM] for site in sites]
+        found: list[Hypothesis] = []
         if "one" in effect.sites or len(sites) == 1:
             found += [claimed(Claim(effect, "one", (site,)), [values]) for site in sites for values in starts[site]]
         if len(sites) > 1:
             found += _each(effect, tuple(sites), starts)
             found += _all(effect, tuple(sites), evidence)
-    return tuple(found)
+        return found
+
+    each: list[list[Hypothesis]] = list(map_(of_effect, catalogue))  # type: ignore[arg-type]
+    return tuple(hypothesis for found in each for hypothesis in found)
 
 
 def _all(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:

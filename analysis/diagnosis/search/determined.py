@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Number
 from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.rivalry import Arena, sensitivity_at
@@ -22,15 +23,28 @@ def number_errors(arena: Arena, found: Explanation) -> FloatArray:
     """(numbers,): standard errors of the final hypothesis's point."""
     if found.statistic is not None:
         return found.statistic.errors
-    fitted = found.steps[-1].fitted
-    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
-    return standard_errors(arena.measure, arena.tuning, fitted, known)[len(fitted.deviations) :]
+    return final_errors(arena, found)[len(arena.tuning.names) :]
+
+
+def final_errors(arena: Arena, found: Explanation) -> FloatArray:
+    """(t + numbers,): standard errors of the final fit, of the model's own deviations first. Beside a single body, what
+    a force along the motion changes in the sensitivity to its numbers is not left out: that costs three runs."""
+    last = found.steps[-1] if found.steps else found.retuned
+    if found.errors is not None and found.errors[0] is last.fitted:
+        return found.errors[1]
+    fitted = evaluated(arena.measure, arena.tuning, last.fitted.deviations, last.fitted.hypothesis)
+    single = arena.tuning.model.coordinates == 1
+    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis, with_forces=single)
+    return standard_errors(arena.measure, arena.tuning, fitted, known)
 
 
 def determined(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
     """The same where all numbers are determined; else without the effects whose numbers are not, or with an explanation
     that is as good and whose numbers are determined."""
-    left_open = [number for number, is_open in enumerate(_open(arena, found)) if is_open] if found.steps else []
+    if not found.steps:
+        return found
+    found = replace(found, errors=(found.steps[-1].fitted, final_errors(arena, found)))
+    left_open = [number for number, is_open in enumerate(_open(arena, found)) if is_open]
     if not left_open:
         return found
     worst = left_open[-1]

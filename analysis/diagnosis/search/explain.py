@@ -7,17 +7,20 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
 from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit, gather_evidence
+from analysis.diagnosis.search.brief import brief_of
+from analysis.diagnosis.search.by_brief import fits_by_brief
 from analysis.diagnosis.search.candidates import CLOCK_DRIFT, candidates, clock_drift_by_trial
 from analysis.diagnosis.search.families import excludes
 from analysis.diagnosis.search.no_answer import silences
 from analysis.diagnosis.search.parsimony import plainest_first
 from analysis.diagnosis.search.patience import OutOfPatienceError, always, impatient
-from analysis.diagnosis.search.rivalry import Arena, Contender, contest, refine, sensitivity_at
+from analysis.diagnosis.search.rivalry import Arena, Contender, contest, first_fits, refine, sensitivity_at
 from analysis.diagnosis.search.same_within_errors import excess
 from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.settings import ADDED_GAIN, ADDED_SHARE, MOST_EFFECTS, NOISE_ALONE, SEALED_SURPRISE, SEARCH_ON
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
+from equalizer.effects.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 RETUNING_ROUNDS = 4
@@ -54,6 +57,8 @@ class Explanation:
     """An effect that was not to be named, where nothing but refinements of it explains as much."""
     undetermined: tuple[str, ...] = ()
     """Effects that were found, and are not named: the recordings leave their numbers open."""
+    errors: tuple[Fitted, FloatArray] | None = None
+    """A fit, and the standard errors of all its numbers, where they were computed already; as `final_errors`."""
 
     @property
     def stages(self) -> dict[str, Fitted]:
@@ -132,23 +137,38 @@ class Step:
 
 def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[Contender, ...]:
     step.at(0.0)
-    held = base.hypothesis.claims
-    evidence = gather_evidence(arena.measure, arena.tuning, base)
-    suggested = [
-        hypothesis
-        for hypothesis in candidates([effect for effect in catalogue if arena.measure.tells(effect)], evidence[0])
-        if not any(excludes(claim, hypothesis.claims[0]) for claim in held)
-    ]
-    if arena.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held):
-        suggested += clock_drift_by_trial([effect for effect in catalogue if arena.measure.tells(effect)], evidence[0])
-    known = sensitivity_at(arena, base.deviations, base.hypothesis)
-    step.at(0.2)
-    screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
+    evidence = gather_evidence(arena.measure, arena.tuning, base)[0]
+    told = [effect for effect in catalogue if arena.measure.tells(effect)]
+    brief = brief_of(arena, base.hypothesis)
+    if brief is None:
+        suggested = _suggested(arena, base.hypothesis, told, evidence)
+        known = sensitivity_at(arena, base.deviations, base.hypothesis)
+        step.at(0.2)
+        screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
+        fits = first_fits(arena, base, known, screened)
+    else:
+        timeless = _suggested(
+            arena, base.hypothesis, [effect for effect in told if not effect.of_time], brief.of(evidence)
+        )
+        timed = _suggested(arena, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
+        step.at(0.2)
+        fits = fits_by_brief(arena, brief, base, timeless, timed)
     step.at(0.6)
-    contenders = contest(arena, base, known, screened)
+    contenders = contest(arena, base, fits)
     return plainest_first(
         [contender for contender in contenders if not silences(arena.measure, base, contender.fitted)]
     )
+
+
+def _suggested(arena: Arena, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
+    suggested = [
+        hypothesis
+        for hypothesis in candidates(catalogue, evidence, arena.map_)
+        if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
+    ]
+    if arena.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
+        suggested += clock_drift_by_trial(catalogue, evidence)
+    return suggested
 
 
 def worthwhile(base: Contender, better: Contender) -> bool:

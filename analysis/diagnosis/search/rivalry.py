@@ -88,19 +88,9 @@ class Arena:
         return Contender(fitted, stands.larger(np.exp(gained)), 2 * float(gained.mean()))
 
 
-def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> tuple[Contender, ...]:
-    """The best first. known: of the model's own numbers, near the base."""
-    measure, tuning = arena.measure, arena.tuning
-
-    def first(candidate: Screened) -> Fitted:
-        return fit(
-            measure, tuning, evaluated(measure, tuning, base.deviations, candidate.hypothesis), known, FIRST_ROUNDS
-        )
-
-    fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
-    fits.sort(key=lambda found: found.cost)
-    gained = [base.cost - found.cost for found in fits]
-    worth = [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
+def contest(arena: Arena, base: Fitted, fits: Sequence[Fitted]) -> tuple[Contender, ...]:
+    """The best first. fits: as `first_fits` leaves them."""
+    worth = _worth_refining(base, fits)
     refined, others = [refine(arena, candidate) for candidate in worth[:1]], worth[1:MOST_REFINED]
     if refined and arena.contender(refined[0]).standing.seen <= NO_SECOND_START:
         others = [law for law in others if arena.contender(law).standing.seen <= REACHES_NOISE]
@@ -110,6 +100,25 @@ def contest(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[S
     refined += [refine(arena, law) for law in plain]
     contenders = [arena.contender(law) for law in [*refined, *(law for law in rest if law not in plain)]]
     return tuple(sorted(contenders, key=lambda contender: contender.standing.chosen_by))
+
+
+def first_fits(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> list[Fitted]:
+    """Of those that the screening foresees a gain of, the best first."""
+    measure, tuning = arena.measure, arena.tuning
+
+    def first(candidate: Screened) -> Fitted:
+        return fit(
+            measure, tuning, evaluated(measure, tuning, base.deviations, candidate.hypothesis), known, FIRST_ROUNDS
+        )
+
+    fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
+    return sorted(fits, key=lambda found: found.cost)
+
+
+def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """fits: the best first."""
+    gained = [base.cost - found.cost for found in fits]
+    return [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
 
 
 def refine(arena: Arena, fitted: Fitted) -> Fitted:
@@ -158,10 +167,14 @@ def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tu
     best = fitted
     complete = known is not None
     there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
+    before = np.inf
     for _ in range(MOST_REFRESHED):
         better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
-        settled = better.cost > (1 - max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))) * best.cost
+        gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
+        # Gains shrink about evenly, so that the next one can be foreseen.
+        foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
         best = better
+        settled = (foreseen if complete else gained) < max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))
         if (complete and settled) or (arena.contender(best).standing.seen <= NO_SECOND_START and settled):
             break
         if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:

@@ -15,6 +15,7 @@ from analysis.diagnosis.search.verdict import Judgement, judge
 from analysis.diagnosis.settings import SEALED_ALONE_ERROR, SEALED_ALONE_TIMES
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
+from equalizer.signals.signal import FloatArray
 
 OPENED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
@@ -36,6 +37,8 @@ class Searched:
     found: Explanation
     judged: Judgement
     remarks: tuple[str, ...] = ()
+    errors: FloatArray | None = None
+    """`final_errors`, where the search needed them."""
 
 
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:

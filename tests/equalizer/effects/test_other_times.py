@@ -1,5 +1,7 @@
 """A response read at other times, and which clocks make it so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,9 @@ def test_a_delay_is_no_drift(bench, command):
     model = bench.three_axes()
     seen = bench.measured(model, bench.placed("transport_delay", {"delay": 2e-3}, *ALL), command)
     assert DRIFT.starts(bench.evidence(model, seen), 0) == ()
+
+
+def test_a_clock_slower_than_any_lateness_that_is_looked_for_shows_no_drift(bench, command):
+    model = bench.three_axes()
+    seen = bench.evidence(model, bench.measured(model, (), command, seed=4))
+    assert DRIFT.starts(replace(seen, sample_rate_hz=0.25), 0) == ()

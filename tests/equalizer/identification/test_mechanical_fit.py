@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from equalizer.identification.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical_response import pole_form, sampled_response
+from equalizer.identification.mechanical_response import free_response, pole_form, sampled_response
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import Signal
@@ -286,3 +286,9 @@ def test_a_motor_axis_with_friction_is_within_a_fifth_of_its_known_mass():
     fit = fit_mechanical_model(found, MechanicalFitSettings(most_modes=0))
     assert fit.model.mass[0, 0] == pytest.approx(95, rel=0.2)
     assert fit.held_out is not None and fit.held_out < 0.2
+
+
+def test_a_model_that_runs_away_within_a_sample_answers_with_numbers():
+    model = MechanicalModel("thrown", "position", 1e-9 * np.eye(1), np.eye(1), np.eye(1), np.eye(1), np.eye(1))
+    thrown = replace(model, damping=-np.eye(1))
+    assert np.isfinite(free_response(thrown, np.array([1.0, 70.0]), RATE_HZ)).all()

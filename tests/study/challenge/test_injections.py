@@ -7,6 +7,7 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from study.challenge.force_injections import FORCE_INJECTIONS, moved_axis
 from study.challenge.injections import INJECTIONS, fitting_injections, inject, reading_of
 
 RATE_HZ = 1000.0
@@ -63,6 +64,47 @@ def test_the_numbers_are_those_of_the_samples():
     assert np.allclose(np.linalg.norm(turned, axis=1), np.linalg.norm(recording().response.samples, axis=1))
 
 
+def swinging() -> Recording:
+    """One axis, of which the position was measured."""
+    random, time_s = np.random.default_rng(4), np.arange(6000) / RATE_HZ
+    q = 0.02 * np.sin(2 * np.pi * 1.3 * time_s) + 0.01 * np.sin(2 * np.pi * 3.1 * time_s + 1.0)
+    force = 200.0 * q + 0.3 * np.sign(np.gradient(q)) + 0.05 * random.normal(size=len(q))
+    return Recording(
+        "rig",
+        Signal(force[:, None], RATE_HZ, "force", "N", ("fx",)),
+        Signal((q + 1e-7 * random.normal(size=len(q)))[:, None], RATE_HZ, "position", "m", ("x",)),
+    )
+
+
+@pytest.mark.parametrize("effect", [one.effect for one in FORCE_INJECTIONS])
+def test_a_fault_of_mechanism_or_actuator_changes_the_command_alone_and_more_the_stronger(effect):
+    weak, strong = (inject(swinging(), effect, strength, np.random.default_rng(2)) for strength in (0.2, 0.9))
+    assert 0 < weak.change.max() < strong.change.max()
+    assert np.array_equal(strong.recording.response.samples, swinging().response.samples)
+    assert np.isfinite(strong.recording.command.samples).all()
+
+
+def test_an_added_mass_asks_for_its_force_and_a_weaker_drive_for_a_larger_command():
+    plain = swinging()
+    heavy = inject(plain, "added_mass", 0.8, np.random.default_rng(2))
+    time_s, inside = np.arange(6000) / RATE_HZ, slice(500, -500)
+    turn = 2 * np.pi * np.array([1.3, 3.1])
+    a = -0.02 * turn[0] ** 2 * np.sin(turn[0] * time_s) - 0.01 * turn[1] ** 2 * np.sin(turn[1] * time_s + 1.0)
+    added = (heavy.recording.command.samples - plain.command.samples)[inside, 0]
+    assert np.std(added - heavy.values["size"] * a[inside]) < 0.05 * np.std(added)
+    weak = inject(plain, "force_gain", 0.8, np.random.default_rng(2))
+    assert weak.values["gain"] * weak.recording.command.samples == pytest.approx(plain.command.samples)
+
+
+def test_a_delayed_drive_was_commanded_earlier():
+    plain, moved = swinging(), moved_axis(swinging(), 0)
+    assert moved is not None
+    late = inject(plain, "transport_delay", 0.9, np.random.default_rng(2))
+    shift = late.values["delay"] * RATE_HZ
+    expected = np.interp(np.arange(6000) + shift, np.arange(6000), plain.command.samples[:, 0])
+    assert late.recording.command.samples[:, 0] == pytest.approx(expected)
+
+
 def test_a_clock_that_is_fast_reads_what_comes_later():
     found = injected("clock_drift", 0.9)
     late = found.values["ppm"] * 1e-6 * 3000
@@ -83,6 +125,9 @@ def test_only_faults_that_a_recording_can_carry_are_drawn():
     assert "sensor_misalignment" not in fitting_injections(recording(1))
     places = replace(recording(3).response, channels=("shaker", "wing tip", "payload"))
     assert "sensor_misalignment" not in fitting_injections(replace(recording(3), response=places))
+    imposed = replace(swinging(), meta={"imposed": "position"})
+    assert {"added_mass", "force_gain"} <= set(fitting_injections(swinging()))
+    assert "added_mass" in fitting_injections(imposed) and "force_gain" not in fitting_injections(imposed)
     assert reading_of(recording(1)).middle_hz == pytest.approx(7, abs=0.5)
 
 

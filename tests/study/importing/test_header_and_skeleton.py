@@ -7,7 +7,7 @@ from study.importing.header_map import header_map
 from study.importing.import_map import CsvMap
 from study.importing.map_skeleton import map_skeleton
 from study.importing.map_toml import parse_map
-from study.importing.signal_words import named, unit_in
+from study.importing.signal_words import named, proposed_roles, unit_in
 from study.store.file_errors import UnusableFileError
 
 
@@ -44,6 +44,28 @@ def test_a_header_with_units_needs_no_map(tmp_path, header, roles):
     found = header_map(arrays(tmp_path, header))
     assert found is not None
     assert [channel.role for channel in found.channel] == roles
+
+
+def test_arrays_of_one_length_whose_names_say_units_need_no_map(tmp_path):
+    time = np.arange(20) / 100
+    np.savez(tmp_path / "a.npz", t_s=time, force_N=time, position_mm=time)
+    found = header_map(read_arrays(tmp_path / "a.npz", CsvMap()))
+    assert found is not None
+    assert [(each.value, each.role, each.unit) for each in found.channel] == [
+        ("force_N", "command", "N"),
+        ("position_mm", "response", "mm"),
+    ]
+
+
+def test_arrays_of_several_lengths_are_not_guessed_at(tmp_path):
+    np.savez(tmp_path / "a.npz", t_s=np.arange(20.0), force_N=np.ones(20), position_mm=np.ones(10))
+    assert header_map(read_arrays(tmp_path / "a.npz", CsvMap())) is None
+
+
+def test_a_reference_is_no_response(tmp_path):
+    held = arrays(tmp_path, "t_s,u_V,y_m,y_ref_m")
+    roles = dict(zip(held.by_name, proposed_roles([named(name) for name in held.by_name]), strict=True))
+    assert (roles["u_V"], roles["y_m"], roles["y_ref_m"]) == ("command", "response", "helper")
 
 
 @pytest.mark.parametrize(

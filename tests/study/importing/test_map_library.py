@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from study.errors import WrongUseError
-from study.importing.map_library import find_map, read_map, shipped_maps
+from study.importing.map_library import find_map, map_of_files, read_map, shipped_maps
 from study.store.file_errors import UnusableFileError
 
 OWN = """
@@ -68,3 +68,24 @@ def test_half_of_a_recording_is_not_found(tmp_path):
         tmp_path / "estimation.npz", t_s=np.arange(9.0), u_V=0.0, y_m=0.0, y_ref_m=0.0, gain_N_per_V=1.0, kp=1, kv=1
     )
     assert find_map(tmp_path) == ()
+
+
+def emps_like(folder, *names):
+    for name in names:
+        samples = np.arange(40.0)
+        np.savez(
+            folder / name, t_s=samples / 1000, u_V=samples, y_m=samples, y_ref_m=samples, gain_N_per_V=1.0, kp=1, kv=1
+        )
+    return [folder / name for name in names]
+
+
+def test_files_that_one_map_of_ours_fits_name_it(tmp_path):
+    found = map_of_files(emps_like(tmp_path, "estimation.npz", "validation.npz"))
+    assert found is not None
+    assert found.name == "emps"
+
+
+def test_some_files_of_a_map_or_one_more_name_none(tmp_path):
+    files = emps_like(tmp_path, "estimation.npz", "validation.npz", "other.npz")
+    assert map_of_files(files[:1]) is None
+    assert map_of_files(files) is None

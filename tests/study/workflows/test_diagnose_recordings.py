@@ -299,18 +299,27 @@ def test_a_folder_beside_recordings_is_refused(files, findings, tmp_path):
 
 
 def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path, recording):
-    two = replace(
+    pushed, moved = recording.command.samples, recording.response.samples
+    three = replace(
         recording,
         command=replace(
-            recording.command,
-            samples=np.hstack([recording.command.samples, 0.5 * recording.command.samples]),
-            channels=("fx", "fy"),
+            recording.command, samples=np.hstack([pushed, 0.5 * pushed, 2 * pushed]), channels=("fx", "fy", "fz")
         ),
+        response=replace(recording.response, samples=np.hstack([moved, 0.5 * moved]), channels=("x", "y")),
+        position=None,
     )
-    write_recording(tmp_path / "two.h5", two)
-    error = refused_with(files, findings, tmp_path, sources=(tmp_path / "two.h5",), model=None)
+    write_recording(tmp_path / "three.h5", three)
+    error = refused_with(files, findings, tmp_path, sources=(tmp_path / "three.h5",), model=None)
     assert "No model was given, and none can be fitted" in error.happened
     assert "--model" in error.do_now
+
+
+def test_two_commands_of_one_motion_are_made_one_and_it_is_said(files, findings, tmp_path, recording):
+    pushed = recording.command.samples
+    both = replace(recording.command, samples=np.hstack([pushed, 0.5 * pushed[::-1]]), channels=("fx", "fy"))
+    write_recording(tmp_path / "two.h5", replace(recording, command=both))
+    engine = asked_of_engine(plan(files, tmp_path / "out", sources=(tmp_path / "two.h5",), model=None), findings)
+    assert len(engine.recordings[0].command.channels) == 1
 
 
 def test_at_the_screen_a_stop_is_said_and_leaves_nothing(files, tmp_path):

@@ -75,6 +75,7 @@ def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_pa
         assert np.array_equal(clean.response.samples, carrier.sound.response.samples)
         before = without_lead(carrier.rest).response.samples
         changed = not np.array_equal(given.response.samples, before, equal_nan=True)
+        changed |= not np.array_equal(given.command.samples, carrier.rest.command.samples)
         assert changed == bool(label["effect"])
         assert np.isnan(given.response.samples[: SAMPLES // 2]).all()
         assert label["adds"] <= label["adds_as_it_is"]

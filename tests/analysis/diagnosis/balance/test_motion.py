@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.motion import WIDEST, NoMotionError, motions_of, moving_signal
+from analysis.diagnosis.balance.band import WIDEST
+from analysis.diagnosis.balance.motion import NoMotionError, motions_of, moving_signal
 from analysis.diagnosis.data.observed_parts import observed_parts
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import Signal

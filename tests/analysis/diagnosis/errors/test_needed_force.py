@@ -3,7 +3,7 @@ import pytest
 
 from analysis.diagnosis.data.motion_smoother import smoothed_motion
 from analysis.diagnosis.data.observed import observed
-from analysis.diagnosis.errors.needed_force import needed_force
+from analysis.diagnosis.errors.needed_force import band_motion, needed_force
 from equalizer.effects.along_motion import force_along
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -24,7 +24,7 @@ def body(mass: float = 2.0, damping: float = 5.0, stiffness: float = 300.0, quan
 def test_a_sine_needs_the_force_of_the_books() -> None:
     omega = 2 * np.pi * 2.0
     x = 0.03 * np.sin(omega * TIME_S)
-    needed = needed_force(body(), x[:, None], RATE_HZ, 50.0)
+    needed = needed_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
     wanted = (300.0 - 2.0 * omega**2) * x + 5.0 * 0.03 * omega * np.cos(omega * TIME_S)
     inside = slice(200, -200)
     assert np.allclose(needed.force[inside, 0], wanted[inside], atol=2e-3 * np.abs(wanted).max())
@@ -33,7 +33,7 @@ def test_a_sine_needs_the_force_of_the_books() -> None:
 
 def test_a_steady_slide_needs_its_damping_and_spring() -> None:
     x = 0.1 + 0.2 * TIME_S
-    needed = needed_force(body(), x[:, None], RATE_HZ, 50.0)
+    needed = needed_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
     assert np.allclose(needed.force[:, 0], 300.0 * x + 5.0 * 0.2, atol=1e-6)
     assert np.allclose(needed.axis_velocity, 0.2, atol=1e-6)
 
@@ -46,7 +46,7 @@ def test_bodies_that_are_not_measured_are_moved_along() -> None:
     force = band_limited(np.random.default_rng(1).standard_normal((4000, 1)), RATE_HZ, 10.0)
     force *= np.clip(np.minimum(TIME_S, TIME_S[::-1]) / 0.5, 0, 1)[:, None]
     moved = simulate_mechanism(two, force, RATE_HZ).response
-    needed = needed_force(two, moved, RATE_HZ, 60.0).force
+    needed = needed_force(two, band_motion(moved, RATE_HZ, 60.0)).force
     entered = band_limited(force, RATE_HZ, 60.0, late_s=0.5 / RATE_HZ)
     assert np.std((needed - entered)[300:-600]) < 0.01 * np.std(entered)
 

@@ -130,3 +130,24 @@ def test_a_step_within_bounds_is_the_best_one():
 
         nothing = cost(np.zeros(4))
         assert cost(step) <= nothing + 1e-12
+
+
+class RanAway:
+    """A measure whose simulation diverges as soon as a number of the model moves."""
+
+    def __init__(self, measure, size):
+        self.records, self.measure, self.size = measure.records, measure, size
+
+    def residuals(self, model, effects):
+        return tuple(np.full_like(left, self.size) for left in self.measure.residuals(model, effects))
+
+
+@pytest.mark.parametrize("size", [1e200, np.inf])
+def test_a_simulation_that_ran_away_is_the_worst_of_fits(rubbing_arena, size):
+    zero = np.zeros(len(rubbing_arena.tuning.names))
+    known = sensitivity(rubbing_arena.measure, rubbing_arena.tuning, zero, NOTHING)
+    measure = RanAway(rubbing_arena.measure, size)
+    start = evaluated(measure, rubbing_arena.tuning, zero, alone("coulomb_friction", {"level": 0.1}))
+    assert start.cost == np.inf
+    assert fit(measure, rubbing_arena.tuning, start, known, 2) is start
+    assert not sensitivity(measure, rubbing_arena.tuning, zero, NOTHING).columns.any()

@@ -49,6 +49,13 @@ def foreseen(bench, named, rival, numbers=0.0):
     return foresee(bench, named, rival, known_of(bench, rival, numbers), menu)
 
 
+@pytest.mark.parametrize("rate_hz", [0.5, 1.74, 20.0, 400.0, 20_000.0])
+def test_experiments_suit_the_sample_rate(rate_hz):
+    for experiment in experiment_menu(bench_of().tuning.model, rate_hz, 0, LEVEL_N):
+        assert 60 <= len(experiment.commands) <= max(40 * rate_hz, 2000)
+        assert np.abs(experiment.commands).max() <= LEVEL_N
+
+
 @pytest.fixture(scope="module")
 def friction():
     """Two laws alike in the large, and the experiments, the best first."""

@@ -1,0 +1,201 @@
+"""Whether an actuator gives what it is commanded: the force balance turned round.
+
+A law of the command cannot be a column beside the commanded force, for the command would stand on both sides and take
+the noise of the motion on itself. Solved for the acceleration, the command is known exactly:
+
+    a = g(u) / m - (c v + k x + sum of w phi) / m
+
+with the command's rate of change beside it, for a short lag. g(u) is tried in place of u, with the best sums of laws
+of the motion beside it, and is named where it takes most of what any of them leaves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.blocks import (
+    RIDGE,
+    Block,
+    blocks_of,
+    column_scale,
+    error_of,
+    part_of_block,
+    solved,
+    total,
+)
+from analysis.diagnosis.balance.command_laws import AS_COMMANDED, CommandLaw, closer, command_laws
+from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.linear_part import search_beside_linear
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.balance.plainest_structure import NOTABLE
+from analysis.diagnosis.balance.structures import Searched
+from analysis.diagnosis.balance.weigh import LEAST_BLOCKS, MOST_ALIKE, Balance, weigh
+from analysis.diagnosis.balance.weighed import Weighed, drawn_of, gain_of
+from analysis.diagnosis.types import Patience
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.signals.signal import FloatArray
+
+SUMS = 4
+"""Best sums of laws of the motion that are tried beside a law of the command."""
+MOST = 0.5
+"""Share of the error that the best sum of laws of the motion leaves which a law of the command must take: what lag and
+delay leave is smaller."""
+TOLD = 0.3
+"""Share of its own error by which a rival must leave more to be told from it."""
+ROUNDS = 8
+NEEDLESS = "a law of the command leaves as little without it"
+NO_COLUMN = -1
+"""Place in a regression of a law that changes the force itself."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Turned:
+    """A balance solved for the acceleration along its axis."""
+
+    searched: Searched
+
+    def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
+        """(blocks,): sums of squares. judged: on what nothing was fitted to; else each fold's."""
+        fit, test = self._blocks(self._rows(law, laws))
+        columns = list(range(len(fit[0].pull)))
+        whole = total(fit, columns)
+        if judged and len(test) >= LEAST_BLOCKS:
+            weights = solved(whole, RIDGE)
+            return np.array([error_of(part_of_block(block, columns), weights, block.power) for block in test])
+        found = []
+        for block in fit:
+            own = part_of_block(block, columns)
+            found.append(error_of(own, solved((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power))
+        return np.array(found)
+
+    def _blocks(self, rows: Sequence[FloatArray]) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
+        regression = self.searched.regression
+        motions, own = regression.motions, regression.beside.own
+        aims = [columns[:, own] for columns in regression.columns]
+        fit, test = ([motion.kept(mask) for motion, mask in zip(motions, masks, strict=True)]
+                     for masks in ([m.fit for m in motions], [m.test for m in motions]))  # fmt: skip
+        mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
+        units = column_scale(rows, fit), mean
+        return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units)
+
+    def _rows(self, law: CommandLaw, laws: Sequence[int]) -> list[FloatArray]:
+        regression, found = self.searched.regression, []
+        # Filters of the acceleration would give it back.
+        filters = {regression.beside.own, *range(regression.matrices, regression.base - 1)}
+        beside = [column for column in regression.chosen(laws) if column not in filters]
+        for motion, columns in zip(regression.motions, regression.columns, strict=True):
+            force = law.of(motion.force[:, regression.axis])
+            others = np.delete(motion.force, regression.axis, axis=1)
+            entered = np.hstack([force, np.gradient(force[:, :1], 1 / motion.rate_hz, axis=0), others])
+            found.append(np.hstack([motion.reduced(entered), columns[:, beside]]))
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Actuator:
+    """What takes the most in the command's place."""
+
+    law: CommandLaw
+    weighed: Weighed
+    alone: bool
+    """Without laws of the motion, it leaves as little."""
+
+
+def balance_of(
+    motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], patient: Patience
+) -> Balance:
+    """Of laws of the motion, along what a law of the command lets through where one is named."""
+    balance = weigh(search_beside_linear(motions, axis, rotational, without, patient))
+    actuator = actuator_of(balance.searched, without)
+    if actuator is None:
+        return balance
+    weighed = actuator.weighed
+    if weighed.named:
+        through = [_through(motion, axis, actuator.law) for motion in motions]
+        again = weigh(search_beside_linear(through, axis, rotational, without, patient))
+        return replace(again, laws=(weighed, *again.laws), linear=balance.linear)
+    if weighed.gain_low <= 0 or weighed.gain < NOTABLE:
+        return balance
+    if weighed.gain < MOST:
+        return replace(balance, others=tuple(sorted((*balance.others, weighed), key=lambda each: -each.gain)))
+    laws = (
+        [replace(each, why_not=each.why_not or NEEDLESS) for each in balance.laws] if actuator.alone else balance.laws
+    )
+    return replace(balance, laws=(weighed, *laws))
+
+
+def _through(motion: Motion, axis: int, law: CommandLaw) -> Motion:
+    force = motion.force.copy()
+    force[:, [axis]] = law.of(force[:, axis])
+    return replace(motion, force=force)
+
+
+def actuator_of(searched: Searched, without: frozenset[str]) -> Actuator | None:
+    """None where nothing in the command's place leaves less."""
+    regression = searched.regression
+    commands = np.concatenate([motion.force[motion.fit, regression.axis] for motion in regression.motions])
+    laws = [law for law in command_laws(commands) if law.effect not in without]
+    if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
+        return None
+    turned = _Turned(searched)
+    beside = min(_sums(searched), key=lambda each: float(turned.errors(AS_COMMANDED, each, False).sum()))
+    best = _best_of_each(turned, laws, beside)
+    law = min(best, key=lambda each: each[0])[1]
+    alone, held = (float(turned.errors(law, each, False).sum()) for each in ((), beside))
+    rivals = [other for _, other in best if other is not law]
+    return Actuator(law, _weighed(turned, law, rivals, beside), bool(beside) and alone <= held / (1 - TOLD))
+
+
+def _sums(searched: Searched) -> list[tuple[int, ...]]:
+    """No law that is linear in the motion: such a filter of the acceleration would give it back."""
+    laws = searched.regression.laws
+    plain = [each.laws for each in searched.ranked if each.laws and not any(laws[k].linear for k in each.laws)]
+    return [(), *plain[:SUMS]]
+
+
+def _best_of_each(
+    turned: _Turned, laws: Sequence[CommandLaw], beside: tuple[int, ...]
+) -> list[tuple[float, CommandLaw]]:
+    best: dict[str, tuple[float, CommandLaw]] = {}
+    for law in laws:
+        error = float(turned.errors(law, beside, False).sum())
+        if law.effect not in best or error < best[law.effect][0]:
+            best[law.effect] = error, law
+    return [_moved(turned, *found, beside) for found in best.values()]
+
+
+def _moved(turned: _Turned, error: float, law: CommandLaw, beside: tuple[int, ...]) -> tuple[float, CommandLaw]:
+    for _ in range(ROUNDS):
+        tried = [(float(turned.errors(other, beside, False).sum()), other) for other in closer(law)]
+        if not tried or min(tried, key=lambda each: each[0])[0] >= error * (1 - 1e-3):
+            break
+        error, law = min(tried, key=lambda each: each[0])
+    return error, law
+
+
+def _weighed(turned: _Turned, law: CommandLaw, rivals: Sequence[CommandLaw], beside: tuple[int, ...]) -> Weighed:
+    without, held = (turned.errors(each, beside, True) for each in (AS_COMMANDED, law))
+    linear = float(turned.errors(AS_COMMANDED, (), True).sum())
+    drawn = drawn_of(len(held))
+    behind = [(turned.errors(rival, beside, True), rival.effect) for rival in rivals]
+    alike = tuple(effect for errors, effect in behind if float(errors.sum()) <= float(held.sum()) / (1 - TOLD))
+    first = [errors[drawn].sum(axis=1) >= held[drawn].sum(axis=1) for errors, _ in behind]
+    gain, low = gain_of(without, held)
+    known = Law(law.effect, turned.searched.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
+    return Weighed(
+        NO_COLUMN, known, dict(law.values), gain, low, float((without - held).sum()) / max(linear, 1e-300), alike,
+        float(np.mean(np.all(first, axis=0))) if first else 1.0, _why_not(law, gain, low, alike),
+    )  # fmt: skip
+
+
+def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -> str:
+    """A sentence; empty where it is to be named."""
+    if gain < MOST or low <= 0:
+        return (
+            f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
+        )
+    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME]
+    if strange or len(alike) >= MOST_ALIKE:
+        return f"these data cannot tell it from {', '.join(alike)}"
+    return "" if law.effect in EFFECTS_BY_NAME else "no simulation of ours plays it yet"

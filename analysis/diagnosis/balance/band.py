@@ -1,0 +1,52 @@
+"""The band in which a measured motion tells accelerations and positions, by its own white noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import welch
+
+from equalizer.signals.signal import FloatArray
+
+NOISE_SHARE = 0.01
+"""Of the acceleration's mean square that the motion's noise may make: the bias of a mass, as a share of it."""
+WIDEST = 0.2
+"""The band's end at most, over the sample rate."""
+NARROWEST_CYCLES = 20.0
+"""The band's end at least, in cycles per recording."""
+
+
+def band_end_hz(samples: Sequence[FloatArray], rate_hz: float, order: int) -> float:
+    """The median over recordings and channels of the highest end that the noise allows."""
+    ends = [_end_hz(column, rate_hz, 2 * (2 - order)) for each in samples for column in each.T]
+    longest = max(len(each) for each in samples)
+    return float(np.clip(np.median(ends), NARROWEST_CYCLES * rate_hz / longest, WIDEST * rate_hz))
+
+
+def band_begin_hz(samples: Sequence[FloatArray], rate_hz: float) -> float:
+    """Of integrated accelerations: the median over recordings and channels of the lowest beginning from which noise
+    makes a small share of the position's mean square."""
+    begins = []
+    for column in (column for each in samples for column in each.T):
+        frequency_hz, density, floor = _spectrum(column, rate_hz)
+        weight = frequency_hz**-4.0
+        signal = np.cumsum((np.maximum(density - floor, 0.0) * weight)[::-1])[::-1]
+        noise = np.cumsum((floor * weight)[::-1])[::-1]
+        allowed = np.flatnonzero(noise <= NOISE_SHARE * signal)
+        begins.append(float(frequency_hz[allowed[0]]) if len(allowed) else float(frequency_hz[0]))
+    shortest = min(len(each) for each in samples)
+    return max(float(np.median(begins)), 2 * rate_hz / shortest)
+
+
+def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
+    flat = column - np.linspace(column[0], column[-1], len(column))
+    frequency_hz, density, floor = _spectrum(flat, rate_hz)
+    signal = np.cumsum(np.maximum(density - floor, 0.0) * frequency_hz**power)
+    noise = np.cumsum(floor * frequency_hz**power)
+    allowed = np.flatnonzero(noise <= NOISE_SHARE * signal)
+    return float(frequency_hz[allowed[-1]] if len(allowed) else frequency_hz[0])
+
+
+def _spectrum(column: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, float]:
+    """Frequencies above zero, the density there, and that of white noise."""
+    frequency_hz, density = welch(column, rate_hz, nperseg=min(len(column), 4096))
+    return frequency_hz[1:], density[1:], float(np.median(density[1 + 3 * (len(density) - 1) // 4 :]))

@@ -1,0 +1,66 @@
+"""What an actuator may make of its command, over grids of the sizes that the command itself has.
+
+The laws of a motion are sums of columns beside the force; these change the force itself, so that they are weighed in
+the balance turned round; see `actuator`.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
+"""Shares of the samples that are commanded less: where a dead band ends, and where an actuator gives no more."""
+CLOSER = (0.95, 0.98, 1.02, 1.05)
+"""Factors by which a number is moved, as long as that helps."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommandLaw:
+    effect: str
+    """A name of the vocabulary, or one written like them for physics that it lacks."""
+    values: dict[str, float]
+    columns: Callable[[FloatArray, dict[str, float]], FloatArray]
+    """Of a command (n,), (n, weights): their weighted sum is the force; a single one is the force but for its gain."""
+
+    def of(self, command: FloatArray) -> FloatArray:
+        return self.columns(command, self.values)
+
+
+AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
+
+
+def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
+    """command: (n,), known throughout."""
+    size = np.abs(command)
+    for width in _sizes(size, DEAD):
+        for jump in (0.0, 1.0):
+            yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _beyond)
+    for limit in _sizes(size, FULL):
+        yield CommandLaw(
+            "force_saturation", {"limit": limit}, lambda u, of: np.clip(u, -of["limit"], of["limit"])[:, None]
+        )
+    unit = float(size.max(initial=0.0)) or 1.0
+    yield CommandLaw("actuator_cubic", {}, lambda u, _: np.stack([u, u * (u / unit) ** 2], axis=1))
+    yield CommandLaw("actuator_square", {}, lambda u, _: np.stack([u, u * np.abs(u / unit)], axis=1))
+    yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
+
+
+def closer(law: CommandLaw) -> Iterator[CommandLaw]:
+    """With its size moved a little."""
+    for name in {"width", "limit"} & set(law.values):
+        for factor in CLOSER:
+            yield replace(law, values={**law.values, name: factor * law.values[name]})
+
+
+def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:
+    found = np.unique(np.quantile(size, shares))
+    return [float(value) for value in found if 0 < value < size.max()]
+
+
+def _beyond(command: FloatArray, of: dict[str, float]) -> FloatArray:
+    width = of["width"]
+    beyond = command - np.clip(command, -width, width)
+    return np.asarray(beyond + of["jump"] * width * np.sign(beyond))[:, None]

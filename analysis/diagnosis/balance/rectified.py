@@ -1,0 +1,108 @@
+"""A speed whose sensor tells its amount alone, such as a pulse counter: its sign is restored from the command.
+
+Between two minima near zero the sign is one; it is that of the speed that a linear filter makes of the command, fitted
+in turn to the speed with the signs found (alternating projections, as phases are retrieved; Gerchberg and Saxton,
+Optik 35:237, 1972).
+"""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+BELOW = 0.05
+"""Of its rms: how far below zero noise may bring such a speed at most."""
+BOTH_WAYS = 0.1
+"""Of the command's power that must push either way."""
+TAPS, RIDGE, ROUNDS = 40, 1e-3, 20
+"""Of the filter, with its memory spread over so many samples; its shrinkage; and how often it is fitted."""
+NEAR_ZERO = 0.25
+"""Of the rms speed: below which a minimum may be a turn."""
+FITS, BETTER = 0.5, 0.5
+"""Share of the speed's power that the filter must foretell, and share of what it leaves of the amount that it may
+leave."""
+
+
+def restored(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+    """Where the only response is a speed that is never negative though its command is."""
+    if any(not _only_amount(recording) for recording in recordings):
+        return recordings, ""
+    found = []
+    for recording in recordings:
+        amount = recording.response.samples[:, 0]
+        signed, left = _signed(recording.command.samples[:, 0], amount)
+        plain = _left(recording.command.samples[:, 0], amount)
+        if left > 1 - FITS or left > BETTER * plain:
+            return recordings, ""
+        found.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
+    name = recordings[0].response.channels[0]
+    return tuple(found), (
+        f"{name} is never negative though the command pushes both ways: its sensor tells the amount alone (an absolute "
+        "value), and its sign was restored from the command."
+    )
+
+
+def _only_amount(recording: Recording) -> bool:
+    response, command = recording.response, recording.command
+    if len(response.channels) != 1 or len(command.channels) != 1 or recording.position is not None:
+        return False
+    speed, pushed = response.samples[:, 0], command.samples[:, 0]
+    if DERIVATIVE_OF_QUANTITY.get(response.quantities[0]) not in (1, 0) or not np.isfinite(speed).all():
+        return False
+    rms = float(np.sqrt(np.mean(speed**2)))
+    power = float(np.sum(pushed**2))
+    ways = [float(np.sum(pushed[pushed * sign > 0] ** 2)) for sign in (1, -1)]
+    touches = float(np.quantile(speed, 0.05)) < NEAR_ZERO * rms
+    return rms > 0 and float(speed.min()) > -BELOW * rms and touches and min(ways) > BOTH_WAYS * power
+
+
+def _signed(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]:
+    """With signs, and the share of its power that the filter leaves."""
+    rows = _rows(command)
+    stretches = _stretches(amount)
+    late = np.concatenate([[0.0], np.cumsum(command)])
+    heard = [late[k + 1] - late[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
+    best = _with_signs(amount, np.array(heard), stretches)
+    for _ in range(ROUNDS):
+        signed = _with_signs(amount, _foretold(rows, best), stretches)
+        if np.array_equal(signed, best):
+            break
+        best = signed
+    return best, float(np.sum((best - _foretold(rows, best)) ** 2) / np.sum(best**2))
+
+
+def _left(command: FloatArray, amount: FloatArray) -> float:
+    rows, flat = _rows(command), amount - amount.mean()
+    return float(np.sum((flat - _foretold(rows, flat)) ** 2) / np.sum(amount**2))
+
+
+def _rows(command: FloatArray) -> FloatArray:
+    """(n, TAPS + 1): the command's past, and a constant."""
+    padded = np.concatenate([np.zeros(TAPS), command])
+    return np.column_stack([*(padded[TAPS - k : len(padded) - k] for k in range(TAPS)), np.ones(len(command))])
+
+
+def _foretold(rows: FloatArray, speed: FloatArray) -> FloatArray:
+    gram = rows.T @ rows
+    weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows.T @ speed)
+    return np.asarray(rows @ weights)
+
+
+def _stretches(amount: FloatArray) -> list[slice]:
+    """Between minima near zero."""
+    low = NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
+    inner = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
+    ends = [0, *(np.flatnonzero(inner) + 1).tolist(), len(amount)]
+    return [slice(begin, end) for begin, end in itertools.pairwise(ends) if end > begin]
+
+
+def _with_signs(amount: FloatArray, foretold: FloatArray, stretches: list[slice]) -> FloatArray:
+    found = amount.copy()
+    for part in stretches:
+        if float(amount[part] @ foretold[part]) < 0:
+            found[part] = -amount[part]
+    return found

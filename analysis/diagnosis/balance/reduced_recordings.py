@@ -1,0 +1,102 @@
+"""Recordings without the linear part of a force balance that no matrix of one body per command holds.
+
+What a force needs for motions beside the driven ones, for modes and for a late command is taken off the command. What
+is left drives one measured motion each, so that laws are fitted and drawn as on any device.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.actuator import NO_COLUMN
+from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.motion import Motion, moving_signal
+from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.data.observed_parts import parts_of
+from equalizer.signals.recording import Hold, Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+
+def is_reduced(balances: Sequence[Balance]) -> bool:
+    """Whether the balances hold more than one body per command, and no law of a command, which acts on all of it."""
+    if any(each.place == NO_COLUMN for balance in balances for each in balance.named):
+        return False
+    motion = balances[0].searched.regression.motions[0]
+    if len(motion.channels) > len(balances) or motion.order == 2:
+        return True
+    return any(linear_laws(balance) or balance.searched.regression.beside.late_s for balance in balances)
+
+
+def linear_laws(balance: Balance) -> tuple[Law, ...]:
+    """Beside mass, damping and stiffness: of the base, and of the chosen structure."""
+    return (*balance.searched.regression.beside.laws, *(each.law for each in balance.laws if each.law.linear))
+
+
+def reduced_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
+    """recordings: those that the balances are of, part by part."""
+    found, begin = [], 0
+    for recording in recordings:
+        parts = parts_of(recording)
+        found.append(_reduced(recording, parts, balances, begin))
+        begin += len(parts)
+    return tuple(found)
+
+
+def _reduced(
+    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
+) -> Recording:
+    command = recording.command.samples.copy()
+    for axis, balance in enumerate(balances):
+        regression = balance.searched.regression
+        for number, (start, stop) in enumerate(parts, begin):
+            motion = regression.motions[number]
+            left = motion.force[:, axis] - _beside(balance, motion)
+            # What lies below an integrated motion's band has no motion to balance it.
+            command[start:stop, axis] = motion.within(left[:, None])[:, 0] if motion.order == 2 else left
+    response, integrated = _driven(recording, parts, balances, begin)
+    return replace(
+        recording,
+        command=replace(recording.command, samples=command),
+        response=response,
+        position=None,
+        excitation=None,
+        # An integrated motion was moved to the middle of the steps already.
+        hold=Hold.BAND_LIMITED if integrated else recording.hold,
+    )
+
+
+def _beside(balance: Balance, motion: Motion) -> FloatArray:
+    """(n,): what the force needs beside the driven motion's own mass, damping and stiffness, and the named laws."""
+    regression, d = balance.searched.regression, len(motion.channels)
+    linear = [each.place for each in balance.laws if each.law.linear]
+    weights = regression.weights(regression.chosen([*linear, *(each.place for each in balance.named)]))
+    # The constant of the base is left to the fit.
+    weights = np.delete(weights, regression.base - 1)
+    courses = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
+    whole = np.hstack([*courses, *(law.columns(motion, law.numbers) for law in linear_laws(balance))])
+    others = d > motion.force.shape[1]
+    kept = [k >= regression.matrices or (others and k % d != regression.beside.own) for k in range(whole.shape[1])]
+    return np.asarray(whole[:, kept] @ weights[: whole.shape[1]][kept])
+
+
+def _driven(
+    recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], begin: int
+) -> tuple[Signal, bool]:
+    """The driven motions as measured, and whether they are integrals of what was."""
+    regression = balances[0].searched.regression
+    measured = moving_signal(recording)
+    assert measured is not None
+    d = len(regression.motions[0].channels)
+    places = [
+        k if d <= len(balances) else balances[k].searched.regression.beside.own for k in range(min(d, len(balances)))
+    ]
+    samples, order = measured.samples.copy(), regression.motions[0].order
+    quantities, units = measured.quantities, measured.units
+    if order == 2:
+        for number, (start, stop) in enumerate(parts, begin):
+            samples[start:stop] = regression.motions[number].position
+        turning = [unit.startswith("rad") for unit in units]
+        quantities = tuple("angle" if turns else "position" for turns in turning)
+        units = tuple("rad" if turns else "m" for turns in turning)
+    return replace(measured, samples=samples, quantity=quantities, unit=units).picked(places), order == 2

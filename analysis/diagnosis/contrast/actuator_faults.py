@@ -1,0 +1,136 @@
+"""Faults of an actuator: what the drive made of the recorded command."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import irfft, rfft
+from scipy.signal import lfilter
+
+from analysis.diagnosis.contrast.fault import Fault, Told, Undo, Variant, sized
+from analysis.diagnosis.contrast.taken import Taken
+from equalizer.signals.band_limited import odd_continued, straight
+from equalizer.signals.signal import FloatArray
+
+Made = Callable[[FloatArray, float], FloatArray]
+"""What is made of one axis's command (n,), at a rate."""
+AROUND = (0.75, 1.35)
+"""Sizes between which a change of a size of 1 stands for others."""
+LONGEST = 0.3
+"""Of the period of the command's middle frequency, that it comes late: beyond, late is no word for it."""
+GRID = 12
+
+
+@dataclass(frozen=True, slots=True)
+class _Axis:
+    number: int
+    name: str
+
+    def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
+        return Fault(effect, "actuator", self.name, self.number, tuple(variants))
+
+    def of(self, made: Made) -> Undo:
+        def undo(taken: Taken) -> Taken:
+            command = taken.command.copy()
+            command[:, self.number] = made(command[:, self.number], taken.rate_hz)
+            return replace(taken, command=command)
+
+        return undo
+
+
+def actuator_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fault]:
+    """parts: of all that is compared, which the grids span."""
+    axis = _Axis(number, name)
+    whole = np.concatenate([part.command[:, number] for part in parts])
+    top = float(np.abs(whole).max(initial=0.0)) or 1.0
+    rms = float(np.std(whole)) or top
+    yield from _gains(axis)
+    yield axis.fault("force_offset", [Variant((axis.of(lambda u, rate: u + rms),), sized("offset", rms))])
+    cubed = Variant((axis.of(lambda u, rate: u + u**3 / top**2),), sized("cubic", 1 / top**2))
+    yield axis.fault("actuator_cubic", [cubed])
+    longest = max(parts, key=lambda part: len(part.command))
+    times = late_times(longest.command[:, number], longest.rate_hz)
+    yield axis.fault("transport_delay", [_delayed(axis, time_s) for time_s in times])
+    yield axis.fault("amplifier_lag", [_lagging(axis, time_s) for time_s in times])
+    shares = np.quantile(np.abs(whole), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
+    limits = sorted(top * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
+    yield axis.fault("force_saturation", [_saturated(axis, limit) for limit in limits])
+    yield axis.fault("force_deadband", [_dead(axis, float(width)) for width in rms * np.geomspace(0.02, 1.5, GRID)])
+
+
+def _gains(axis: _Axis) -> Iterator[Fault]:
+    yield axis.fault("force_gain", [
+        Variant((axis.of(lambda u, rate: 2 * u),), lambda s: {"gain": 1 / (1 + float(s[0]))}, -0.9, 20.0,
+                told=lambda x, rate: 2 * x),
+    ])  # fmt: skip
+    drift = axis.fault("force_gain_drift", [
+        Variant((axis.of(lambda u, rate: u * (1 + np.linspace(0.0, 1.0, len(u)))),),
+                lambda s: {"change": 1 / (1 + float(s[0])) - 1}, -0.9, 20.0,
+                told=lambda x, rate: x * (1 + np.linspace(0.0, 1.0, len(x)))[:, None]),
+    ])  # fmt: skip
+    yield replace(drift, varies=True)
+
+
+def _delayed(axis: _Axis, time_s: float) -> Variant:
+    told: Told = lambda x, rate: later(x, -time_s * rate)  # noqa: E731
+    undo = axis.of(lambda u, rate: later(u[:, None], time_s * rate)[:, 0])
+    return Variant((undo,), sized("delay", time_s), *AROUND, told=told)
+
+
+def _lagging(axis: _Axis, time_s: float) -> Variant:
+    undo = axis.of(lambda u, rate: lagged(u, time_s * rate))
+    told: Told = lambda x, rate: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
+    return Variant((undo,), sized("time_constant", time_s), *AROUND, told=told)
+
+
+def _saturated(axis: _Axis, limit: float) -> Variant:
+    return Variant((axis.of(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
+
+
+def _dead(axis: _Axis, width: float) -> Variant:
+    undo = axis.of(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
+    return Variant((undo,), sized("width", width), *AROUND)
+
+
+def late_times(samples: FloatArray, rate_hz: float) -> list[float]:
+    """From a tenth of a sample on, as long as late is a word for it."""
+    shortest, longest = 0.1 / rate_hz, LONGEST / middle_hz(samples, rate_hz)
+    return [float(time_s) for time_s in np.geomspace(shortest, longest, GRID)] if longest > shortest else []
+
+
+def middle_hz(samples: FloatArray, rate_hz: float) -> float:
+    """Below which half of the power lies."""
+    power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
+    line = int(np.searchsorted(np.cumsum(power), 0.5 * power.sum()))
+    return max(line, 1) * rate_hz / len(samples)
+
+
+FINER = 4
+"""Points between samples, from which a line is drawn to any other time: alone it would be a low pass."""
+
+
+def at_times(samples: FloatArray, at: FloatArray) -> FloatArray:
+    """Samples (n,) at other times (n,), in samples; beyond the ends, as at the ends."""
+    line = np.linspace(samples[0], samples[-1], len(samples))
+    bent = samples - line
+    whole = odd_continued(bent[:, None])[:, 0]
+    fine = irfft(rfft(whole), FINER * len(whole))[: FINER * (len(samples) - 1) + 1] * FINER
+    inside = np.clip(at, 0, len(samples) - 1)
+    along = np.interp(inside, np.arange(len(line)), line)
+    return np.asarray(np.interp(FINER * inside, np.arange(len(fine)), fine) + along)
+
+
+def later(samples: FloatArray, by: float) -> FloatArray:
+    """Samples (n, k) by samples, whole or not: line by line of the spectrum, which keeps each line's size."""
+    line = straight(samples)
+    whole = odd_continued(samples - line)
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(whole)) * by)
+    moved = irfft(rfft(whole, axis=0) * turn[:, None], len(whole), axis=0)[: len(samples)]
+    slope = (samples[-1] - samples[0]) / max(len(samples) - 1, 1)
+    return np.asarray(moved + line - slope * by)
+
+
+def lagged(samples: FloatArray, constant: float) -> FloatArray:
+    """A low pass of the first order; constant: in samples."""
+    share = 1 - np.exp(-1 / constant)
+    return np.asarray(lfilter([share], [1.0, share - 1.0], samples, zi=[(1 - share) * samples[0]])[0])

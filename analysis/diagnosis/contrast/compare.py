@@ -1,0 +1,237 @@
+"""Which fault sets recordings apart from clean ones of the same device, weighed against what sets stretches of either
+apart from each other: no real device is the same twice."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.weighed import LEVEL, drawn_of
+from analysis.diagnosis.contrast.actuator_faults import actuator_faults
+from analysis.diagnosis.contrast.fault import Fault, Variant
+from analysis.diagnosis.contrast.force_base import ForceBase, force_base
+from analysis.diagnosis.contrast.ledger import Fit, Pair, fitted, foretold, weights_of
+from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
+from analysis.diagnosis.contrast.sensor_faults import sensor_faults, turned_sensor
+from analysis.diagnosis.contrast.step_base import StepBase, likely_step
+from analysis.diagnosis.contrast.stream import FOLDS, Base, Stream, changed_rows, stream_of
+from analysis.diagnosis.contrast.taken import Taken, taken_of
+from analysis.diagnosis.contrast.watch_base import watch_bases
+from analysis.diagnosis.types import Patience
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+HOLDS = 0.35
+"""Share of a force that a balance may leave to be one."""
+STILL = 1e-4
+"""Of its size: a command that changes by less is none."""
+STEPS = 24
+"""Past samples that tell of the next where no balance holds."""
+ALL = tuple(range(FOLDS))
+APART = ((0, 1), (2, 3), (4, 5), (0, 1, 2))
+"""Blocks of a set that are weighed against its others: thirds and halves, like two recordings."""
+LEAST = 0.005
+"""Of the error power, that a fault must gain: what is less is not worth a name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighed:
+    """A fault, as a reader would judge it."""
+
+    fault: Fault
+    values: dict[str, float]
+    spread: dict[str, float]
+    """Standard error of each value, from leaving blocks out."""
+    errors: FloatArray
+    """(blocks,): what is left with it undone: of the faulty set, then of the clean one."""
+    gain: float
+    """Error with it over error without it, less 1;"""
+    usual: float
+    """the largest that it has between stretches of one set;"""
+    typical: float
+    """their median: so much it gains by what it is, whatever the stretches."""
+    share: float
+    """Of what sets the two sets apart, beyond what each leaves by a base of its own."""
+    held_out: float
+    """What is left of the faulty set, each block by numbers fitted to all others."""
+    gain_low: float
+    """Lower end of the gain beyond the typical one, from resampled blocks."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compared:
+    weighed: tuple[Weighed, ...]
+    """The best first;"""
+    plain: FloatArray
+    """(blocks,): what is left with nothing undone, as `Weighed.errors`."""
+    samples: int
+    """What would be left where each set had a base of its own."""
+    held_out: float
+    """As `Weighed.held_out`, with nothing undone."""
+    faulty_share: float
+    """rms of the own error of the faulty set, over the rms of what is told."""
+    usual: float
+    """The largest excess between stretches of one set; see `excess`."""
+    by_force: bool
+    step_s: float
+
+    @property
+    def excess(self) -> float:
+        return float(self.plain.sum()) / self.samples - 1
+
+
+def compared(
+    recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], patient: Patience
+) -> Compared | None:
+    """None where there is too little, or nothing holds."""
+    sides = taken_of(clean), taken_of(recordings)
+    if not all(sides):
+        return None
+    try:
+        streams, faults, by_force = _streams(*sides)
+        found = _weigh(streams, [fault for fault in faults if fault.effect not in without], patient)
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    base = streams[0].base
+    step_s = 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / sides[0][0].rate_hz
+    return replace(found, faulty_share=min(_left(base, sides[1]), 1.0), by_force=by_force, step_s=step_s)
+
+
+def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[Stream], list[Fault], bool]:
+    recording = clean[0].recording
+    motions: list[Motion] = []
+    band_hz, step = np.inf, 1
+    table: dict[int, Motion] = {}
+    try:
+        first = motions_of([part.observed() for part in clean])
+        band_hz, step = first[0].band_hz, first[0].step
+        motions = [*first, *motions_of([part.observed() for part in faulty], band_hz)]
+        table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=True)}
+    except NoMotionError:
+        pass
+    bases, by_force = _bases(clean, faulty, motions)
+    streams = [stream_of(base, clean, faulty) for base in (*bases, *watch_bases(clean, band_hz, step))]
+    faults: list[Fault] = []
+    for axis, name in enumerate(recording.command.channels):
+        if motions and np.isfinite(band_hz):
+            faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], _turning(recording))
+        if not recording.meta.get("imposed"):
+            faults += actuator_faults(axis, name, (*clean, *faulty))
+    for channel, name in enumerate(recording.response.channels):
+        faults += sensor_faults(channel, name, (*clean, *faulty))
+    if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
+        faults.append(turned_sensor())
+    return streams, faults, by_force
+
+
+def _bases(clean: tuple[Taken, ...], faulty: tuple[Taken, ...], motions: Sequence[Motion]) -> tuple[list[Base], bool]:
+    recording = clean[0].recording
+    turning = _turning(recording)
+    if motions and np.isfinite(motions[0].band_hz):
+        bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
+        if all(_left(base, side) < HOLDS for base in bases for side in (clean, faulty)):
+            return bases, True
+    step = likely_step((*clean, *faulty))
+    return [StepBase(channel, STEPS, step) for channel in range(len(recording.response.channels))], False
+
+
+def _turning(recording: Recording) -> bool:
+    return any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
+
+
+def _left(base: Base, parts: tuple[Taken, ...]) -> float:
+    """Infinite where what is to be told never changes: then nothing can be told of it."""
+    rows = np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.kept(parts), strict=True)])
+    size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
+    spread = float(np.std(rows[:, 0]))
+    if spread <= STILL * size[0]:
+        return np.inf
+    weights = np.linalg.lstsq(rows[:, 1:] / size[1:], rows[:, 0], rcond=1e-10)[0]
+    return float(np.std(rows[:, 0] - rows[:, 1:] / size[1:] @ weights)) / spread
+
+
+def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience) -> Compared:
+    clean = [stream.grams(stream.clean, []).blocks for stream in streams]
+    bare = [Pair(stream.grams(stream.other, []), ALL, tuple(own)) for stream, own in zip(streams, clean, strict=True)]
+    plain = fitted(bare, None)
+    samples = sum(stream.clean.count + stream.other.count for stream in streams)
+    best: list[tuple[Fit, Fault, Variant, list[Pair]]] = []
+    for fault in faults:
+        if not patient():
+            break
+        tried = []
+        for variant in fault.variants:
+            pairs = [
+                Pair(stream.grams(stream.other, changed_rows(stream, stream.other, fault, variant)), ALL, tuple(own))
+                for stream, own in zip(streams, clean, strict=True)
+            ]
+            if all(pair.with_it.sound for pair in pairs):
+                tried.append((fitted(pairs, variant), fault, variant, pairs))
+        if tried:
+            best.append(min(tried, key=lambda each: each[0].error))
+    best.sort(key=lambda each: each[0].error)
+    weighed = sorted(
+        (_weighed(streams, found, plain, samples) for found in best), key=lambda each: float(each.errors.sum())
+    )
+    held = sum(foretold(kept, np.zeros(0), block) for block, kept in enumerate(_apart(bare)))
+    usual = max(max(_excesses(each)) for each in (clean, [pair.with_it.blocks for pair in bare]))
+    return Compared(tuple(weighed), plain.errors, samples, held, 0.0, usual, True, 0.0)
+
+
+def _excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
+    """Of stretches of one set described together over each by itself. sides: per stream, products (blocks, k, k)."""
+
+    def error(blocks: Sequence[int]) -> float:
+        return sum(_left_by_own(side[list(blocks)].sum(axis=0)) for side in sides)
+
+    together = error(ALL)
+    for at in APART:
+        apart = error(at) + error([block for block in ALL if block not in at])
+        yield together / max(apart, 1e-300) - 1
+
+
+def _left_by_own(gram: FloatArray) -> float:
+    weights = weights_of(gram)
+    return max(float(weights @ gram @ weights), 0.0)
+
+
+def _weighed(
+    streams: Sequence[Stream], found: tuple[Fit, Fault, Variant, list[Pair]], plain: Fit, samples: int
+) -> Weighed:
+    fit, fault, variant, pairs = found
+    values = variant.values(fit.sizes)
+    apart = _apart(pairs)
+    fits = [fitted(kept, variant) for kept in apart]
+    others = [variant.values(fit.sizes) for fit in fits]
+    held = sum(foretold(kept, each.sizes, block) for block, (kept, each) in enumerate(zip(apart, fits, strict=True)))
+    spread = {name: float(np.sqrt((len(others) - 1) * np.var([other[name] for other in others]))) for name in values}
+    gains = list(_usual(streams, fault, variant)) if plain.error > (1 + LEAST) * fit.error else [0.0]
+    typical = max(float(np.median(gains)), 0.0)
+    errors = fit.errors * (1 + typical)
+    drawn = drawn_of(len(errors))
+    beyond = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
+    left, room = float(errors.sum()), plain.error - samples
+    return Weighed(
+        fault, values, spread, errors, plain.error / max(left, 1e-300) - 1, max([0.0, *gains]) - typical, typical,
+        (plain.error - left) / room if room > 0 else 0.0, held, float(np.quantile(beyond, LEVEL)),
+    )  # fmt: skip
+
+
+def _apart(pairs: Sequence[Pair]) -> list[list[Pair]]:
+    """Without each block of the faulty set."""
+    return [[replace(pair, at=tuple(other for other in ALL if other != block)) for pair in pairs] for block in ALL]
+
+
+def _usual(streams: Sequence[Stream], fault: Fault, variant: Variant) -> Iterator[float]:
+    """The gains by the fault between stretches of one set."""
+    for clean in (True,) if fault.varies else (True, False):
+        sides = [stream.clean if clean else stream.other for stream in streams]
+        both = [
+            (stream.grams(side, changed_rows(stream, side, fault, variant)), stream.grams(side, []).blocks)
+            for stream, side in zip(streams, sides, strict=True)
+        ]
+        for at in APART:
+            rest = [block for block in ALL if block not in at]
+            pairs = [Pair(grams, at, tuple(plain[rest])) for grams, plain in both]
+            yield fitted(pairs, None).error / max(fitted(pairs, variant).error, 1e-300) - 1

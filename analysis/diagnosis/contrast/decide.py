@@ -1,0 +1,102 @@
+"""What may be said of a comparison with clean recordings: a name, a class of names, or candidates alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.balance.weighed import DRAWS, LEVEL, drawn_of
+from analysis.diagnosis.contrast.compare import LEAST, Compared, Weighed
+
+BEYOND = 5.0
+"""Times the largest gain between stretches of one set that a fault must gain. By hand: of six public
+devices in order, two halves differed by up to 3.7 times."""
+MAIN = 0.4
+"""Share of what sets the sets apart that a name must explain: with less, the main part is another's."""
+ALMOST = 0.1
+"""Share of a fault's gain by which a rival must stay behind to be told from it."""
+MOST_ALIKE = 4
+"""Faults of a class; more of them tell nothing."""
+VAGUE = 1.96
+"""Standard errors from which a number may be none."""
+SAME = {
+    "transport_delay": ("logger_offset",),
+    "logger_offset": ("transport_delay",),
+    "force_offset": ("constant_force",),
+}  # fmt: skip
+"""What no recording of one command and one response could tell apart."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decided:
+    named: Weighed | None
+    alike: tuple[str, ...]
+    """Effects that do as well in its place."""
+    probability: float
+    """Share of resampled blocks in which none of them leaves less."""
+    others: tuple[tuple[Weighed, str], ...]
+    """Candidates, and why they are not named; the best first."""
+
+
+def decide(found: Compared, responses: int) -> Decided:
+    """responses: how many channels there are."""
+    sure = [law for law in found.weighed if _why_not(law) == ""]
+    others = tuple((law, _why_not(law)) for law in found.weighed if law.gain > 0 and law not in sure)
+    if not sure:
+        return Decided(None, (), 0.0, others)
+    best = _plainest(sure)
+    rivals = [law for law in sure if law is not best]
+    alike = tuple(rival for rival in rivals if _alike(best, rival, found))
+    same = SAME.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
+    names = tuple(dict.fromkeys((*(rival.fault.effect for rival in alike), *same)))
+    why_not = ""
+    if best.share < MAIN:
+        why_not = f"it explains {100 * best.share:.0f} % of what sets these recordings apart: the main part is another"
+    elif len(names) >= MOST_ALIKE:
+        why_not = "these data cannot tell it from " + ", ".join(names)
+    behind = tuple((rival, "another explains more of what sets these recordings apart") for rival in rivals)
+    if why_not:
+        return Decided(None, (), 0.0, ((best, why_not), *behind, *others))
+    left = tuple(item for item in behind if item[0] not in alike)
+    return Decided(best, names, _first(best, rivals), (*left, *others))
+
+
+def _plainest(sure: Sequence[Weighed]) -> Weighed:
+    """The one that leaves least; of those that do nearly as well, one that it holds as a special case."""
+    best = min(sure, key=lambda each: float(each.errors.sum()))
+    for law in sure:
+        plainer = law.fault.effect in best.fault.simpler and law.fault.axis == best.fault.axis
+        if plainer and law.gain >= (1 - ALMOST) * best.gain:
+            return law
+    return best
+
+
+def _why_not(weighed: Weighed) -> str:
+    if weighed.gain < LEAST or weighed.gain_low <= 0:
+        return "its gain is not larger than what varies between stretches"
+    if weighed.gain <= BEYOND * weighed.usual:
+        return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
+    main = next(iter(weighed.values))
+    if abs(_distance(weighed, main)) <= VAGUE * weighed.spread[main]:
+        return "the interval of its number holds none"
+    return ""
+
+
+def _distance(weighed: Weighed, name: str) -> float:
+    """From a number that is no fault."""
+    return weighed.values[name] - (1.0 if name == "gain" else 0.0)
+
+
+def _alike(best: Weighed, other: Weighed, found: Compared) -> bool:
+    behind = other.errors - best.errors
+    drawn = drawn_of(len(behind))
+    whole = float(found.plain.sum() - best.errors.sum())
+    return bool(behind.sum() <= ALMOST * whole or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
+
+
+def _first(best: Weighed, rivals: Sequence[Weighed]) -> float:
+    drawn = drawn_of(len(best.errors))
+    first = np.ones(DRAWS, dtype=np.bool_)
+    for other in rivals:
+        first &= (other.errors - best.errors)[drawn].sum(axis=1) >= 0
+    return float(first.mean())

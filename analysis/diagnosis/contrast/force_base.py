@@ -1,0 +1,89 @@
+"""What the device in order is, by forces: along each axis, mass, damping, stiffness and the laws that its own clean
+recordings ask for. Nothing of it is named: it is what a fault stands out from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import Law, scales_of
+from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
+from analysis.diagnosis.balance.motion import Motion, motions_of
+from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of
+from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.types import Mask
+from equalizer.signals.signal import FloatArray
+
+MOST_LAWS = 10
+WORTH = 0.01
+"""Share of the folds' error that a further law must take."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceBase:
+    """One axis. Rows are the force, then the columns of what the device is known to need."""
+
+    axis: int
+    laws: tuple[Law, ...]
+    band_hz: float
+    turns: bool
+    rate_hz: float
+    """Of the rows."""
+
+    def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+        """Per part (kept, 1 + columns). like: rows of parts with the same motion."""
+        motions = motions_of([part.observed() for part in parts], self.band_hz)
+        targets = [motion.reduced(motion.force[:, [self.axis]]) for motion in motions]
+        if like is not None:
+            return tuple(np.hstack([target, old[:, 1:]]) for target, old in zip(targets, like, strict=True))
+        plain = regression_of(motions, self.axis, (), self.turns)
+        found = []
+        for target, motion, base in zip(targets, motions, plain.columns, strict=True):
+            more = [motion.reduced(law.columns(motion, law.numbers)) for law in self.laws]
+            found.append(np.hstack([target, base, *more]))
+        return tuple(found)
+
+    def kept(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+        return tuple(
+            motion.kept(part.known)
+            for motion, part in zip(motions_of([part.observed() for part in parts], self.band_hz), parts, strict=True)
+        )
+
+
+def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
+    """motions: of the clean recordings, all to be fitted to."""
+    scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
+    turns = any(scale.turns for scale in scales)
+    regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
+    left = regression.remainder(regression.chosen(_grown(regression)))
+    more = [
+        pitched(channel, pitch, scale)
+        for channel, scale in enumerate(scales)
+        for pitch in likely_pitches(motions, left, channel, scale)
+    ]
+    if more:
+        regression = regression_of(motions, axis, (*regression.laws, *more), turns)
+    return ForceBase(
+        axis,
+        of_laws(regression, _grown(regression)).laws,
+        motions[0].band_hz,
+        turns,
+        motions[0].rate_hz / motions[0].step,
+    )
+
+
+def _grown(regression: Regression) -> tuple[int, ...]:
+    """Law after law, as long as the folds gain by it."""
+    laws: tuple[int, ...] = ()
+    left = float(regression.crossed(regression.chosen(laws)).sum())
+    while len(laws) < MOST_LAWS:
+        tried = [
+            (float(regression.crossed(regression.chosen((*laws, number))).sum()), number)
+            for number in range(len(regression.laws))
+            if number not in laws
+        ]
+        if not tried or min(tried)[0] > (1 - WORTH) * left:
+            break
+        left, best = min(tried)
+        laws = (*laws, best)
+    return laws

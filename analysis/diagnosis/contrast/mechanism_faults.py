@@ -1,0 +1,125 @@
+"""Faults of a mechanism: forces along the measured motion that came in beside what the device needs."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.friction_laws import SHARP
+from analysis.diagnosis.balance.law import sliding
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, sized
+from analysis.diagnosis.contrast.taken import Taken
+from equalizer.effects.bristle_kernel import bent
+from equalizer.signals.signal import FloatArray
+
+Shape = Callable[[Motion], FloatArray]
+"""(n,) of a part's motion: a force of size 1."""
+Along = Callable[[Taken], Motion]
+WIDER = (1.0, 3.0, 8.0, 20.0)
+"""Of the sharpest turn of dry friction."""
+GIVES = tuple(np.geomspace(0.003, 0.3, 7).tolist())
+"""Of the way that was covered: where it slides."""
+RIPPLES = tuple(np.arange(2.0, 40.0, 0.35).tolist())
+"""Of a ripple on that way: nearer than it takes to tell two of them apart."""
+STOPS = tuple(np.arange(0.05, 0.5, 0.05).tolist())
+"""Of the way, from its middle."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Axis:
+    number: int
+    name: str
+    along: Along
+    """A part's motion as it was measured."""
+    channel: int
+    """Of the motion."""
+    middle: float
+    width: float
+    sharp: float
+
+    def fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
+        return Fault(effect, "mechanism", self.name, self.number, tuple(variants), simpler)
+
+    def plain(self, effect: str, shape: Shape, number: str, least: float = 0.0) -> Fault:
+        return self.fault(effect, [Variant((self.of(shape),), sized(number), least=least)])
+
+    def of(self, shape: Shape) -> Undo:
+        def undo(taken: Taken) -> Taken:
+            command = taken.command.copy()
+            command[:, self.number] -= shape(self.along(taken))
+            return replace(taken, command=command)
+
+        return undo
+
+    def q(self, motion: Motion) -> FloatArray:
+        """From the middle of the way."""
+        return np.asarray(motion.position[:, self.channel] - self.middle)
+
+    def v(self, motion: Motion) -> FloatArray:
+        return motion.velocity[:, self.channel]
+
+
+def mechanism_faults(
+    number: int, name: str, motions: Sequence[Motion], along: Along, rotational: bool
+) -> Iterator[Fault]:
+    """motions: of all that is compared, which the grids span."""
+    channel = min(number, len(motions[0].channels) - 1)
+    position = np.concatenate([motion.position[:, channel] for motion in motions])
+    velocity = np.concatenate([motion.velocity[:, channel] for motion in motions])
+    low, width = float(position.min()), max(float(np.ptp(position)), 1e-300)
+    way = min(width, 2 * np.pi) if rotational else width
+    sharp = max(SHARP * float(np.sqrt(np.mean(velocity**2))), 1e-300)
+    axis = _Axis(number, name, along, channel, low + 0.5 * width, width, sharp)
+    yield axis.plain("added_mass", lambda m: m.acceleration[:, channel], "mass")
+    yield axis.plain("viscous_damping", axis.v, "damping")
+    yield axis.plain("quadratic_damping", lambda m: axis.v(m) * np.abs(axis.v(m)), "coefficient")
+    yield axis.plain("added_stiffness", axis.q, "stiffness", least=-np.inf)
+    yield axis.plain("hardening_stiffness", lambda m: axis.q(m) ** 3, "k3", least=-np.inf)
+    yield axis.fault("coulomb_friction", [_rubbing(axis, wide * sharp) for wide in WIDER])
+    yield axis.fault("asymmetric_friction", [_one_sided(axis, wide * sharp) for wide in WIDER], ("coulomb_friction",))
+    yield axis.fault("presliding_hysteresis", [_giving(axis, give * width) for give in GIVES], ("coulomb_friction",))
+    yield axis.fault("cogging", [_ripple(axis, way / count) for count in RIPPLES])
+    yield axis.fault("end_stop", [stop for share in STOPS for stop in _stops(axis, share * width)])
+
+
+def _rubbing(axis: _Axis, wide: float) -> Variant:
+    return Variant((axis.of(lambda m: sliding(axis.v(m), wide)),), sized("level"), least=0.0)
+
+
+def _one_sided(axis: _Axis, wide: float) -> Variant:
+    undo = (
+        axis.of(lambda m: np.maximum(sliding(axis.v(m), wide), 0.0)),
+        axis.of(lambda m: np.minimum(sliding(axis.v(m), wide), 0.0)),
+    )
+    return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, least=0.0)
+
+
+def _giving(axis: _Axis, give: float) -> Variant:
+    numbers: Numbers = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
+    return Variant((axis.of(lambda m: bent(m.position[:, axis.channel], give)),), numbers, least=0.0)
+
+
+def _ripple(axis: _Axis, pitch: float) -> Variant:
+    undo = (
+        axis.of(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
+        axis.of(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),
+    )
+    # The catalogue's force pushes along the motion where this is what the motion needs.
+    return Variant(undo, lambda s: {
+        "amplitude": float(np.hypot(*s)), "pitch": pitch, "phase": float(np.arctan2(-s[1], -s[0])),
+    })  # fmt: skip
+
+
+def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
+    """At both ends, and at either."""
+    both = axis.of(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
+    yield Variant((both,), lambda s: {"position": axis.middle + reach, "stiffness": float(s[0])}, least=0.0)
+    for side in (1.0, -1.0):
+        yield _stop(axis, side, reach)
+
+
+def _stop(axis: _Axis, side: float, reach: float) -> Variant:
+    undo = axis.of(lambda m: side * np.maximum(side * axis.q(m) - reach, 0.0))
+    numbers: Numbers = lambda s: {"position": axis.middle + side * reach, "stiffness": float(s[0])}  # noqa: E731
+    return Variant((undo,), numbers, least=0.0)

@@ -1,0 +1,130 @@
+"""Faults of a sensor: what it would have read without them."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.contrast.actuator_faults import AROUND, GRID, at_times, late_times, later, middle_hz
+from analysis.diagnosis.contrast.fault import Fault, Undo, Variant, sized
+from analysis.diagnosis.contrast.taken import Taken
+from equalizer.signals.signal import FloatArray
+
+Read = Callable[[FloatArray, float], FloatArray]
+"""What one channel (n,) would have read, at a rate."""
+WIDELY = (0.5, 1.6)
+"""As AROUND, of faults that act nearly in proportion to their size."""
+GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
+SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
+"""Of the channel's rms."""
+BENT = (0.02, 0.06, 0.15, 0.3)
+"""Share of its largest reading by which that is off."""
+FASTEST = 0.05
+"""No clock is further off."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Channel:
+    number: int
+    name: str
+    rms: float
+    top: float
+
+    def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
+        return Fault(effect, "sensor", self.name, self.number, tuple(variants))
+
+    def of(self, read: Read) -> Undo:
+        def undo(taken: Taken) -> Taken:
+            response = taken.response.copy()
+            response[:, self.number] = read(response[:, self.number], taken.rate_hz)
+            return replace(taken, response=response)
+
+        return undo
+
+
+def sensor_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fault]:
+    """parts: of all that is compared, which the grids span."""
+    whole = np.concatenate([part.response[:, number] for part in parts])
+    channel = _Channel(number, name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
+    longest = max(parts, key=lambda part: len(part.response))
+    times = late_times(longest.response[:, number], longest.rate_hz)
+    yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
+    shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
+    yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
+    yield replace(channel.fault("sensor_drift", [_drift(channel, shift) for shift in shifts]), varies=True)
+    yield channel.fault("logger_offset", [_late(channel, time_s) for time_s in times])
+    yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
+    bent = [side * share for share in BENT for side in (1.0, -1.0)]
+    yield channel.fault("sensor_nonlinearity", [_bent(channel, share, 3, "cubic") for share in bent])
+    yield channel.fault("sensor_asymmetry", [_bent(channel, share, 2, "square") for share in bent])
+    seconds = len(longest.response) / longest.rate_hz
+    least = 0.02 / middle_hz(longest.response[:, number], longest.rate_hz) / seconds
+    rates = [side * float(rate) for rate in least * np.geomspace(0.2, 100.0, GRID) for side in (1.0, -1.0)]
+    clocks = [_other_clock(channel, rate) for rate in rates if abs(rate) < FASTEST]
+    yield replace(channel.fault("clock_drift", clocks), varies=True)
+
+
+def _gain(channel: _Channel, gain: float) -> Variant:
+    undo = channel.of(lambda y, rate: y / gain)
+    return Variant((undo,), lambda s: {"gain": 1 / (1 + float(s[0]) * (1 / gain - 1))}, *AROUND, gain)
+
+
+def _offset(channel: _Channel, shift: float) -> Variant:
+    return Variant((channel.of(lambda y, rate: y - shift),), sized("offset", shift), *WIDELY)
+
+
+def _drift(channel: _Channel, total: float) -> Variant:
+    undo = channel.of(lambda y, rate: y - total * np.linspace(0.0, 1.0, len(y)))
+    return Variant((undo,), sized("total", total), *WIDELY)
+
+
+def _late(channel: _Channel, time_s: float) -> Variant:
+    return Variant(
+        (channel.of(lambda y, rate: later(y[:, None], -time_s * rate)[:, 0]),), sized("offset", time_s), *AROUND
+    )
+
+
+def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
+    """A low pass y += share (x - y) from sample to sample, taken back exactly."""
+    kept = float(np.exp(-1 / (time_s * rate_hz)))
+    undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1], y[:-1]])) / (1 - kept))
+    return Variant((undo,), lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}, *AROUND, 1 - kept)
+
+
+def _bent(channel: _Channel, share: float, power: int, number: str) -> Variant:
+    top = channel.top
+    undo = channel.of(lambda y, rate: _straightened(y / top, share, power) * top)
+    return Variant((undo,), sized(number, share / top ** (power - 1)), *WIDELY)
+
+
+def _straightened(y: FloatArray, share: float, power: int) -> FloatArray:
+    """The x with y = x + share x^power, by Newton's steps."""
+    x = y.copy()
+    for _ in range(20):
+        slope = 1 + power * share * x ** (power - 1)
+        x = x - (x + share * x**power - y) / np.where(np.abs(slope) > 0.1, slope, 0.1)
+    return np.asarray(np.clip(x, -3.0, 3.0))
+
+
+def _other_clock(channel: _Channel, late: float) -> Variant:
+    """Read at t (1 + late), put back to t."""
+    undo = channel.of(lambda y, rate: at_times(y, np.arange(len(y)) / (1 + late)))
+    return Variant((undo,), sized("ppm", 1e6 * late), *AROUND)
+
+
+TURNS = (
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
+    ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+)
+
+
+def turned_sensor() -> Fault:
+    """Three directions of one sensor, turned together by small angles."""
+
+    def of(turn: FloatArray) -> Undo:
+        return lambda taken: replace(taken, response=taken.response + taken.response @ turn.T)
+
+    undo = tuple(of(np.array(turn)) for turn in TURNS)
+    variant = Variant(undo, lambda s: {"degrees": float(np.degrees(np.linalg.norm(s)))})
+    return Fault("sensor_misalignment", "sensor", "", -1, (variant,))

@@ -1,0 +1,66 @@
+"""What the device in order is, step by step: each response from its past and the commands, by linear regression (ARX;
+Ljung, System Identification, 2nd ed., chapter 4.2). For what no balance of forces holds: voltages, many modes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import low_passed
+from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.types import Mask
+from equalizer.signals.signal import FloatArray
+
+POWER = 0.999
+"""Of the response, that lies below the band's end;"""
+OVERSAMPLED = 3.0
+"""samples per period there, at least."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepBase:
+    """One response. Rows are its next value, then the past of all responses and commands, and 1."""
+
+    channel: int
+    order: int
+    step: int
+    """Every so many samples are kept, after a low pass."""
+
+    def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+        return tuple(self._rows(part) for part in parts)
+
+    def kept(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+        found = []
+        for part in parts:
+            known = part.known[:: self.step]
+            bad = np.convolve(~known, np.ones(self.order + 3))[: len(known)] > 0
+            bad[: self.order + 2] = True
+            bad[len(bad) - 2 :] = True
+            found.append(~bad[self.order :])
+        return tuple(found)
+
+    def _rows(self, part: Taken) -> FloatArray:
+        response, command = (thinned(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
+        count = len(response) - self.order
+        past = [response[self.order - lag : self.order - lag + count] for lag in range(1, self.order + 1)]
+        pushed = [command[self.order - lag : self.order - lag + count] for lag in range(self.order + 1)]
+        now = response[self.order :, [self.channel]]
+        return np.hstack([now, *past, *pushed, np.ones((count, 1))])
+
+
+def thinned(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
+    return samples if step == 1 else low_passed(samples, rate_hz, 0.4 * rate_hz / step)[::step]
+
+
+def likely_step(parts: Sequence[Taken]) -> int:
+    ends = []
+    for part in parts:
+        moved = part.response - part.response.mean(axis=0)
+        power = np.abs(np.fft.rfft(moved, axis=0)) ** 2
+        for column in power.T:
+            floor = float(np.median(column[3 * len(column) // 4 :]))
+            course = np.cumsum(np.maximum(column - floor, 0.0))
+            if course[-1] > 0:
+                ends.append(int(np.searchsorted(course, POWER * course[-1])) * part.rate_hz / len(moved))
+    fastest = max(ends, default=parts[0].rate_hz / 2)
+    return max(int(parts[0].rate_hz / (OVERSAMPLED * 2 * max(fastest, 1e-9))), 1)

@@ -1,0 +1,64 @@
+"""One sensor by another: a measured velocity or acceleration by the measured position, differentiated.
+
+No physics of the device enters, so that what they do not share is a fault of either sensor.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import differentiated, low_passed
+from analysis.diagnosis.contrast.taken import Taken
+from analysis.diagnosis.types import Mask
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.signal import FloatArray
+
+REACH = 2
+"""Samples before and after that tell of one: filters of the two sensors differ by so much."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WatchBase:
+    channel: int
+    times: int
+    """Derivatives between the two."""
+    band_hz: float
+    step: int
+
+    def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+        return tuple(self._rows(part) for part in parts)
+
+    def kept(self, parts: Sequence[Taken]) -> tuple[Mask, ...]:
+        found = []
+        for part in parts:
+            edge = int(part.rate_hz / self.band_hz) + 1
+            inside = part.known.copy()
+            inside[:edge] = False
+            inside[max(len(inside) - edge, 0) :] = False
+            found.append(inside[:: self.step][REACH:-REACH])
+        return tuple(found)
+
+    def _rows(self, part: Taken) -> FloatArray:
+        assert part.position is not None
+        read = low_passed(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
+        moved = differentiated(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[:: self.step]
+        count = len(read) - 2 * REACH
+        near = [moved[shift : shift + count] for shift in range(2 * REACH + 1)]
+        return np.hstack([read[REACH : REACH + count], *near, np.ones((count, 1))])
+
+
+def watch_bases(parts: Sequence[Taken], band_hz: float, step: int) -> tuple[WatchBase, ...]:
+    """One per response that a position measures, too."""
+    recording = parts[0].recording
+    if recording.position is None or parts[0].position is None or not np.isfinite(band_hz):
+        return ()
+    if parts[0].position.shape[1] != parts[0].response.shape[1]:
+        return ()
+    orders = [
+        (DERIVATIVE_OF_QUANTITY.get(read, -1), DERIVATIVE_OF_QUANTITY.get(moved, 9))
+        for read, moved in zip(recording.response.quantities, recording.position.quantities, strict=True)
+    ]
+    return tuple(
+        WatchBase(channel, read - moved, band_hz, step) for channel, (read, moved) in enumerate(orders) if read > moved
+    )

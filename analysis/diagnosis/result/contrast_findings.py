@@ -1,0 +1,162 @@
+"""What a comparison with clean recordings adds to the findings: the fault that came since, and candidates."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.contrast.compare import Compared, Weighed
+from analysis.diagnosis.contrast.decide import Decided
+from analysis.diagnosis.contrast.stream import FOLDS
+from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
+from analysis.diagnosis.effect_words import si_unit
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.search.by_contrast import AS_ONE, Contrast
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.placing import axis_letter
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.signals.recording import Recording
+
+MOST = 6
+BESIDE = (
+    "The recordings were compared with the clean ones by a model that was fitted to both at once and holds whatever "
+    "laws they ask for: a fault is what the clean ones lack. It counts beyond {:.3g} times what it would gain between "
+    "stretches of either."
+)
+BY_ITSELF = "This is seen in the readings themselves, and not in those of the clean recordings; no model was asked."
+
+
+def with_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
+    if found.compared is None or found.decided is None:
+        named = _shown(found, recording)
+        if named is None:
+            return whole
+        diagnosis = _with(whole.diagnosis, "partly_explained", (named,), ())
+        remarks: tuple[str, ...] = (BY_ITSELF,)
+    else:
+        diagnosis = _compared(whole.diagnosis, found.compared, found.decided, recording, whole.given.rotational)
+        remarks = (BESIDE.format(beyond),)
+    improved = _improved(whole.given, diagnosis.effects)
+    return replace(
+        whole, diagnosis=diagnosis, improved=improved, remarks=(*remarks, *whole.remarks), proposal=None, black_box=None
+    )
+
+
+def _with(
+    diagnosis: Diagnosis, verdict: Verdict, effects: tuple[NamedEffect, ...], candidates: tuple[Candidate, ...]
+) -> Diagnosis:
+    left = diagnosis.remainder or diagnosis.mismatch
+    return replace(
+        diagnosis,
+        verdict=verdict,
+        effects=effects,
+        candidates=candidates,
+        next_experiment=None,
+        mismatch=diagnosis.mismatch if verdict != "no_mismatch" else (),
+        remainder=left if verdict in ("partly_explained", "unexplained") else (),
+    )
+
+
+def _compared(
+    diagnosis: Diagnosis, found: Compared, decided: Decided, recording: Recording, rotational: bool
+) -> Diagnosis:
+    best = decided.named
+    named = () if best is None else (_named(best, decided, recording, rotational),)
+    candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
+    verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= AS_ONE else "unexplained"
+    fit = Fit(
+        _errors(found, found.plain[:FOLDS].sum(), (found.plain if best is None else best.errors)[:FOLDS].sum()),
+        _errors(found, found.held_out, found.held_out if best is None else best.held_out),
+    )
+    error = "predicted force" if found.by_force else f"windows of {found.step_s:.6f} s"
+    changed = _with(diagnosis, verdict, named, candidates[:MOST])
+    return replace(changed, fit=fit, error=error)
+
+
+def _errors(found: Compared, before: float, after: float) -> Errors:
+    """Of the faulty set, as shares of its signal."""
+    own = found.samples / 2
+    sizes = [float(np.sqrt(left / own)) * found.faulty_share for left in (before, after)]
+    return Errors(sizes[0], sizes[0], sizes[1], None)
+
+
+def _named(best: Weighed, decided: Decided, recording: Recording, rotational: bool) -> NamedEffect:
+    effect = best.fault.effect
+    rivals = tuple(
+        Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike if name != effect
+    )
+    return NamedEffect(
+        effect=effect,
+        place=best.fault.place,
+        axis=_axis(best, recording),
+        share=float(np.clip(best.share, 0.0, 1.0)),
+        probability=decided.probability,
+        parameters=_estimates(best, recording, rotational),
+        rivals=rivals,
+        class_=(effect, *decided.alike) if decided.alike else (),
+    )
+
+
+def _axis(weighed: Weighed, recording: Recording) -> str | None:
+    channels = recording.response.channels if weighed.fault.place == "sensor" else recording.command.channels
+    return axis_letter(weighed.fault.axis, channels) if weighed.fault.axis in channels else None
+
+
+def _estimates(weighed: Weighed, recording: Recording, rotational: bool) -> dict[str, Estimate]:
+    units = _units(weighed.fault.effect, weighed.fault.site, recording, rotational)
+    return {
+        name: Estimate(value, units.get(name, "1"), (value - 1.96 * spread, value + 1.96 * spread) if spread else None)
+        for (name, value), spread in zip(weighed.values.items(), weighed.spread.values(), strict=True)
+    }
+
+
+def _units(effect: str, site: int, recording: Recording, rotational: bool) -> Mapping[str, str]:
+    known = EFFECTS_BY_NAME.get(effect)
+    read = recording.response.units[max(site, 0)]
+    if known is None:
+        return {
+            name: si_unit(effect, name, rotational) for name in ("stiffness", "offset", "cubic", "change", "square")
+        }
+    return {parameter.name: parameter.unit_in(rotational, read) for parameter in known.parameters}
+
+
+def _candidate(weighed: Weighed, why: str, recording: Recording) -> Candidate:
+    return Candidate(
+        effect=weighed.fault.effect,
+        place=weighed.fault.place,
+        axis=_axis(weighed, recording),
+        parameters=weighed.values,
+        held_out_gain=float(np.clip(1 - 1 / (1 + weighed.gain), 0.0, 1.0)),
+        share_of_black_box=float(np.clip(weighed.share, 0.0, 1.0)),
+        why_not=why,
+    )
+
+
+def _shown(found: Contrast, recording: Recording) -> NamedEffect | None:
+    channels = recording.response.channels
+    if found.hum is not None:
+        name, sites = "mains_hum", found.hum.channels
+        values = {"amplitude": found.hum.amplitude, "frequency": found.hum.frequency_hz}
+    elif found.shown is not None:
+        claim = found.shown.claims[0]
+        name, sites, values = claim.effect.name, claim.sites, dict(found.shown.placed()[0].values)
+    else:
+        return None
+    units = {
+        parameter.name: parameter.unit_in(False, recording.response.units[sites[0]])
+        for parameter in EFFECTS_BY_NAME[name].parameters
+    }
+    known = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
+    axis = axis_letter(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None
+    return NamedEffect(name, "sensor", axis, 1.0, 1.0, known)
+
+
+def _improved(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
+    """The device in order, with the fault where a simulation plays it."""
+    played = tuple(
+        ModelEffect(effect.effect, effect.axis, {name: estimate.value for name, estimate in effect.parameters.items()})
+        for effect in effects
+        if effect.effect in EFFECTS
+    )
+    return replace(given, effects=(*given.effects, *played))

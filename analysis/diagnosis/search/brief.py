@@ -1,0 +1,81 @@
+"""A shorter stand-in for the recordings, laws are compared on it first: of a periodic segment one settled period.
+
+The further periods of a segment repeat the first but for noise. What is kept is joined end to end and simulated as one
+course; before each kept stretch a run-in lets the model forget where it came from (Pintelon and Schoukens 2012, System
+Identification, ch. 2: transients of periodic excitation).
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.growth import growth_rate
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.periods import settled_periods
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.settings import BRIEF_CONSTANTS, BRIEF_SHARE
+from analysis.diagnosis.types import Mask
+from equalizer.effects.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Brief:
+    arena: Arena
+    """Its measure holds the kept samples alone; what there is to fit is also what is chosen by."""
+    kept: tuple[np.ndarray, ...]
+    """Per record of the long measure, the samples that are kept."""
+
+    def of(self, evidence: Evidence) -> Evidence:
+        """The first record's, at the kept samples."""
+        kept, n = self.kept[0], len(evidence.command)
+        cut = {
+            field.name: value[kept]
+            for field in fields(evidence)
+            if isinstance(value := getattr(evidence, field.name), np.ndarray) and len(value) == n and value.ndim
+        }
+        used: FloatArray = self.arena.measure.records[0].fit.astype(np.float64)
+        # The noise is per channel, whatever its length happens to be.
+        return replace(
+            evidence, **{**cut, "used": used, "noise": evidence.noise, "position_noise": evidence.position_noise}
+        )
+
+
+def brief_of(arena: Arena, held: Hypothesis) -> Brief | None:
+    """None where little would be saved, where what is held hangs on when a sample was taken, and where the first
+    record, of which evidence is taken, has nothing to fit."""
+    measure = arena.measure
+    if not isinstance(measure, FreeSimulation) or arena.sound is not None:
+        return None
+    if any(placed.effect.of_time for placed in (*measure.known, *held.placed())):
+        return None
+    settling_s = BRIEF_CONSTANTS / max(-growth_rate(arena.tuning.model), np.finfo(float).tiny)
+    cut = [_cut(record, settling_s) for record in measure.records]
+    before = sum(len(record.command) for record in measure.records)
+    if not len(cut[0][0]) or sum(len(kept) for kept, _ in cut) > BRIEF_SHARE * before:
+        return None
+    records = tuple(_spliced(record, *each) for record, each in zip(measure.records, cut, strict=True))
+    short = measure.with_records(tuple(record for record in records if len(record.command)))
+    return Brief(replace(arena, measure=short), tuple(kept for kept, _ in cut if len(kept)))
+
+
+def _cut(record: Observed, settling_s: float) -> tuple[np.ndarray, Mask]:
+    """Which samples are kept, and which of all are fitted to."""
+    fit = record.fit.copy()
+    for periods in settled_periods(record.recording):
+        inside = slice(periods.segment.start, periods.segment.stop)
+        last = slice(periods.starts[-1], periods.starts[-1] + periods.length)
+        if periods.settled and fit[inside].any() and record.fit[last].all():
+            fit[inside] = False
+            fit[last] = True
+    needed, run_in = fit.copy(), int(np.ceil(min(settling_s * record.recording.sample_rate_hz, len(fit))))
+    for start in np.flatnonzero(np.diff(np.concatenate([[0], fit.astype(np.int8)])) > 0).tolist():
+        needed[max(start - run_in, 0) : start] = True
+    return np.flatnonzero(needed), fit
+
+
+def _spliced(record: Observed, kept: np.ndarray, fit: Mask) -> Observed:
+    sealed = np.zeros(len(kept), dtype=np.bool_)
+    return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], sealed)

@@ -1,0 +1,39 @@
+"""First fits where a drive repeats: laws are compared on one period of each segment, the best then on all samples."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import Fitted, evaluated
+from analysis.diagnosis.search.brief import Brief
+from analysis.diagnosis.search.rivalry import Arena, first_fits, sensitivity_at
+from analysis.diagnosis.search.screening import Screened, screen
+from analysis.diagnosis.settings import WORTH_FITTING
+
+
+def fits_by_brief(
+    arena: Arena, brief: Brief, base: Fitted, timeless: Sequence[Hypothesis], timed: Sequence[Hypothesis]
+) -> list[Fitted]:
+    """On all samples, the best first. timed: what hangs on when a sample was taken, which the brief cannot judge."""
+    short = brief.arena
+    there = evaluated(short.measure, short.tuning, base.deviations, base.hypothesis)
+    known = sensitivity_at(short, base.deviations, base.hypothesis)
+    screened = screen(short.measure, short.tuning, there, known, timeless, short.map_)
+
+    def whole(fitted: Fitted) -> Fitted:
+        return evaluated(arena.measure, arena.tuning, fitted.deviations, fitted.hypothesis)
+
+    fits: list[Fitted] = list(arena.map_(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
+    if timed:
+        known = sensitivity_at(arena, base.deviations, base.hypothesis)
+        screened = screen(arena.measure, arena.tuning, base, known, timed, arena.map_)
+        fits += first_fits(arena, base, known, _promising(base, fits, screened))
+    # A law that the brief leaves open may run away on the whole.
+    return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
+
+
+def _promising(base: Fitted, fits: Sequence[Fitted], screened: Sequence[Screened]) -> list[Screened]:
+    """Those that foresee as much of the best gain so far as a first fit asks for."""
+    best = max((base.cost - law.cost for law in fits), default=0.0)
+    return [law for law in screened if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]

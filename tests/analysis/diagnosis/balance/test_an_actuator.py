@@ -1,0 +1,62 @@
+"""What an actuator makes of its command is found where the balance is solved for the acceleration."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def found(axes, balance_of):
+    """Of an axis behind an actuator: what it is commanded is recorded, what it gives moves the axis."""
+
+    def laws(given, physics=None, seed=1, level=5.0):
+        axis = physics or axes.Physics()
+        command = axes.wave(seed, 2000, 250.0) * level
+        entered = given(command)
+        count, random = len(command), np.random.default_rng([seed, 9])
+        position, _ = axes.played(axis.numbers(), entered, np.zeros(2), 3e-6 * random.standard_normal(count), 250.0)
+        return balance_of(axes.recording(command[:, None], position[:, None], 250.0))[0]
+
+    return laws
+
+
+def named(balance):
+    return {law.law.effect: law for law in balance.named}
+
+
+def test_a_dead_band_is_recovered_with_its_width(found):
+    balance = found(lambda u: u - np.clip(u, -1.5, 1.5))
+    law = named(balance)["force_deadband"]
+    assert law.values["width"] == pytest.approx(1.5, rel=0.1)
+    assert law.gain > 0.8
+    assert set(named(balance)) == {"force_deadband"}
+
+
+def test_a_limit_of_the_force_is_recovered(found):
+    balance = found(lambda u: np.clip(u, -4.0, 4.0))
+    assert named(balance)["force_saturation"].values["limit"] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_dead_band_leaves_the_dry_friction_beside_it(found, axes):
+    balance = found(lambda u: u - np.clip(u, -1.5, 1.5), replace(axes.Physics(), coulomb=0.5))
+    assert set(named(balance)) == {"force_deadband", "coulomb_friction"}
+    assert named(balance)["coulomb_friction"].values["level"] == pytest.approx(0.5, rel=0.2)
+
+
+def test_the_error_before_is_that_of_the_force_as_commanded(found):
+    balance = found(lambda u: u - np.clip(u, -1.5, 1.5))
+    assert balance.error < 0.5 * balance.linear
+
+
+@pytest.mark.parametrize("physics", [{"coulomb": 0.8}, {"coulomb": 0.4, "stiction": 0.6, "cubic": 2e5}])
+def test_an_actuator_that_gives_what_is_commanded_has_neither(found, axes, physics):
+    balance = found(lambda u: u, replace(axes.Physics(), **physics))
+    assert not {"force_deadband", "force_saturation"} & set(named(balance))
+
+
+def test_a_gain_that_grows_with_the_command_is_a_candidate_alone(found):
+    balance = found(lambda u: u * (1 + 0.02 * u**2))
+    law = balance.laws[0]
+    assert law.law.effect in ("actuator_cubic", "actuator_square")
+    assert not balance.named

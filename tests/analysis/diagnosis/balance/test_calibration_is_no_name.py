@@ -1,0 +1,48 @@
+"""What is a number of a fitted model is not named, and what repeats have not shown is not explained."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.identification.mechanical_fit import fit_mechanical_model
+from equalizer.identification.open_tolerance import opened
+
+SEED = 4
+
+
+@pytest.fixture(scope="module")
+def said(axes):
+    """Of a linear axis whose reading is changed, with the model that was fitted to it."""
+    from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+
+    def of(changed, **physics):
+        given = axes.recorded(axes.Physics(**physics), SEED, seconds=10.0, rate_hz=200.0, noise=1e-4)
+        response = replace(given.response, samples=changed(given.response.samples))
+        recording = replace(given, response=response)
+        model = opened(fit_mechanical_model([recording], name="fitted").model)
+        found = diagnose([recording], model, DiagnosisSettings(fitted=True), map, lambda said, share: None)
+        return found.diagnosis
+
+    return of
+
+
+def test_an_offset_of_the_reading_is_a_number_and_no_effect(said):
+    diagnosis = said(lambda read: read + 0.02)
+    assert not diagnosis.effects
+    assert diagnosis.verdict in ("no_mismatch", "parameters", "unexplained")
+
+
+def test_a_late_reading_is_a_class_and_not_explained_without_repeats(said):
+    diagnosis = said(lambda read: np.vstack([read[:3] * 0, read[:-3]]))
+    assert diagnosis.verdict != "explained"
+    for effect in diagnosis.effects:
+        assert {"transport_delay", "logger_offset"} <= set(effect.class_)
+
+
+@pytest.mark.parametrize("cubic", [2e5, -1200.0])
+def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_repeats(said, cubic):
+    diagnosis = said(lambda read: read, cubic=cubic)
+    assert diagnosis.verdict == "partly_explained"
+    assert [effect.effect for effect in diagnosis.effects] == ["hardening_stiffness"]
+    assert diagnosis.effects[0].parameters["k3"].value == pytest.approx(cubic, rel=0.1)

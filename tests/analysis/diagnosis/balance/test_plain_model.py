@@ -1,0 +1,48 @@
+"""Where a force balance names laws along one body per command, its own numbers are the first model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def played(axes, balance_of):
+    def balances(physics):
+        command = axes.wave(1, 2000, 250.0) * 5.0
+        noise = 3e-6 * np.random.default_rng([1, 9]).standard_normal(len(command))
+        position, _ = axes.played(physics.numbers(), command, np.zeros(2), noise, 250.0)
+        recording = axes.recording(command[:, None], position[:, None], 250.0)
+        return balance_of(recording), recording
+
+    return balances
+
+
+def test_beside_friction_it_is_that_of_the_balance(played, axes):
+    from analysis.diagnosis.balance.first_model import plain_model
+
+    model = plain_model(*played(replace(axes.Physics(), coulomb=0.8)), "first")
+    assert model is not None
+    assert model.mass[0, 0] == pytest.approx(0.3, rel=0.05)
+    assert model.stiffness[0, 0] == pytest.approx(100.0, rel=0.1)
+
+
+def test_without_a_named_law_another_fit_is_asked_for(played, axes):
+    from analysis.diagnosis.balance.first_model import plain_model
+
+    assert plain_model(*played(axes.Physics()), "first") is None
+
+
+def test_a_second_body_asks_for_another_fit(played, axes):
+    from analysis.diagnosis.balance.first_model import plain_model
+
+    assert plain_model(*played(replace(axes.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
+
+
+def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(played, axes):
+    from analysis.diagnosis.balance.first_model import share_within
+
+    balances, _ = played(replace(axes.Physics(), coulomb=0.8))
+    shares = [share_within(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]
+    assert shares[0] < 0.05 and shares[0] < shares[1] < shares[2]
+    assert shares[2] == pytest.approx(1.0)

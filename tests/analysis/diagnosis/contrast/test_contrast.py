@@ -1,0 +1,167 @@
+"""A device with physics of its own, clean and with a fault: what came since is named, and only that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis import diagnose as engine
+from analysis.diagnosis.contrast.compare import compared
+from analysis.diagnosis.contrast.decide import Decided, decide
+from analysis.diagnosis.contrast.lines import hum_of
+from analysis.diagnosis.contrast.taken import taken_of
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.errors.rigid_model import rigid_model
+from analysis.diagnosis.search.by_contrast import Contrast, contrast_of
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned
+from analysis.diagnosis.types import Patience
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+RATE_HZ, COUNT = 500.0, 5000
+UNDONE = (
+    "coulomb_friction", "asymmetric_friction", "presliding_hysteresis", "viscous_damping", "quadratic_damping",
+    "force_gain", "force_gain_drift", "actuator_cubic", "force_deadband", "force_saturation",
+)  # fmt: skip
+"""All that comes near dry friction."""
+
+
+def motion(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Position, velocity, acceleration: a sum of sines up to 6 Hz."""
+    random, t = np.random.default_rng(seed), np.arange(COUNT) / RATE_HZ
+    found = np.zeros((3, COUNT))
+    for f in np.arange(0.25, 6.0, 0.25):
+        turn, phase, size = 2 * np.pi * f, random.uniform(0, 2 * np.pi), 0.02 / (1 + f**2)
+        found[0] += size * np.sin(turn * t + phase)
+        found[1] += size * turn * np.cos(turn * t + phase)
+        found[2] -= size * turn**2 * np.sin(turn * t + phase)
+    return found[0], found[1], found[2]
+
+
+def recording(seed: int, change: str = "", level: float = 0.0) -> Recording:
+    """Friction that is stronger at rest and on one side, a bent spring, model error that changes slowly."""
+    q, v, a = motion(seed)
+    random = np.random.default_rng(seed + 100)
+    own = 1.2 * a + 3.0 * v + 80.0 * q + 9000.0 * q**3 + (1.0 + 0.6 * np.exp(-((v / 0.02) ** 2))) * np.tanh(v / 0.004)
+    slow = np.convolve(random.normal(size=COUNT + 400), np.hanning(400), "same")[:COUNT]
+    force = own + 0.03 * np.std(own) * slow / slow.std() + 0.005 * np.std(own) * random.normal(size=COUNT)
+    position = q + 2e-6 * random.normal(size=COUNT)
+    added = {"added_mass": a, "viscous_damping": v, "coulomb_friction": np.tanh(v / 0.004)}
+    if change in added:
+        force = force + level * added[change]
+    if change == "force_gain":
+        force = force / level
+    if change == "sensor_gain":
+        position = position * level
+    if change == "mains_hum":
+        position = position + level * np.sin(2 * np.pi * 50.02 * np.arange(COUNT) / RATE_HZ)
+    return Recording(
+        "rig",
+        Signal(force[:, None], RATE_HZ, "force", "N", ("fx",)),
+        Signal(position[:, None], RATE_HZ, "position", "m", ("x",)),
+        meta={"imposed": ""},
+    )
+
+
+def patient() -> bool:
+    return True
+
+
+def decided(faulty: Recording, without: frozenset[str] = frozenset(), wait: Patience = patient) -> Decided:
+    found = compared([faulty], [recording(1)], without, wait)
+    assert found is not None
+    return decide(found, 1)
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "number", "place"),
+    [
+        ("added_mass", 0.3, "mass", "mechanism"),
+        ("viscous_damping", 2.0, "damping", "mechanism"),
+        ("coulomb_friction", 0.6, "level", "mechanism"),
+        ("force_gain", 0.75, "gain", "actuator"),
+        ("sensor_gain", 1.3, "gain", "sensor"),
+    ],
+)
+def test_what_came_since_is_named_with_its_place_and_number(change, level, number, place):
+    found = decided(recording(2, change, level))
+    assert found.named is not None
+    assert (found.named.fault.effect, found.named.fault.place) == (change, place)
+    assert found.named.values[number] == pytest.approx(level, rel=0.15)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_another_recording_of_the_same_device_names_nothing(seed):
+    assert decided(recording(seed)).named is None
+
+
+def test_an_effect_that_is_not_to_be_considered_is_not_named():
+    found = decided(recording(2, "added_mass", 0.3), frozenset({"added_mass"}))
+    assert found.named is None or found.named.fault.effect != "added_mass"
+
+
+def test_a_body_alone_cannot_tell_a_mass_from_a_gain():
+    """The force is proportional to the acceleration: more mass, less force, and a sensor that reads less are one."""
+    random = np.random.default_rng(5)
+
+    def body(seed: int, mass: float) -> Recording:
+        _, _, a = motion(seed)
+        plain = recording(seed)
+        force = mass * a + 0.02 * a.std() * random.normal(size=COUNT)
+        return replace(plain, command=replace(plain.command, samples=force[:, None]))
+
+    found = compared([body(2, 1.6)], [body(1, 1.2)], frozenset(), patient)
+    assert found is not None
+    answer = decide(found, 1)
+    names = {one.fault.effect for one, _ in answer.others} if answer.named is None else set(answer.alike)
+    assert {"force_gain", "sensor_gain"} <= names | {"" if answer.named is None else answer.named.fault.effect}
+
+
+def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none():
+    clean = taken_of([recording(1)])
+    found = hum_of(taken_of([recording(2, "mains_hum", 2e-5)]), clean)
+    assert found is not None
+    assert (found.frequency_hz, found.amplitude) == (pytest.approx(50.0, abs=0.1), pytest.approx(2e-5, rel=0.2))
+    assert hum_of(taken_of([recording(2)]), clean) is None
+
+
+def test_what_is_cut_short_ends_with_what_it_has():
+    assert decided(recording(2, "added_mass", 0.3), wait=lambda: False).named is None
+
+
+def contrast(change: str = "", level: float = 0.0, without: tuple[str, ...] = (), seed: int = 2) -> Contrast:
+    return contrast_of([recording(seed, change, level)], [recording(1)], frozenset(without), patient)
+
+
+def test_a_fault_that_the_comparison_cannot_undo_is_left_open():
+    found = contrast("coulomb_friction", 0.6, UNDONE)
+    assert found.left_open
+    assert not set(UNDONE) & set(found.weighed)
+    assert "added_mass" in found.weighed
+
+
+def test_nothing_is_left_open_where_a_fault_is_named():
+    assert not contrast("coulomb_friction", 0.6).left_open
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_nothing_is_left_open_between_recordings_of_the_same_device(seed):
+    assert not contrast(seed=seed).left_open
+
+
+def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_is(monkeypatch):
+    asked = []
+
+    def teaches_nothing(*given):
+        asked.append(given)
+        raise NothingLearned("they were measured otherwise")
+
+    monkeypatch.setattr(engine, "learned_from", teaches_nothing)
+    clean = recording(1)
+    settings = DiagnosisSettings(without=UNDONE, clean=(clean,))
+    faulty = recording(2, "coulomb_friction", 0.6)
+    found = diagnose([faulty], rigid_model([clean], "given"), settings, map, lambda said, share: None)
+    assert len(asked) == 2
+    assert found.diagnosis.verdict == "unexplained"
+    assert found.diagnosis.candidates
+    assert not found.diagnosis.effects

@@ -1,0 +1,62 @@
+"""One settled period of each segment tells of a law what the whole recording does."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search import brief
+from analysis.diagnosis.search.brief import brief_of
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+LAG = {"time_constant": 0.002}
+
+
+def claim(name, **values):
+    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+@pytest.fixture(scope="module")
+def lagging(arena_of):
+    return arena_of((PlacedEffect(EFFECTS["amplifier_lag"], (0,), LAG),))
+
+
+def error(arena, hypothesis):
+    return evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), hypothesis).cost
+
+
+def test_it_holds_one_period_of_each_segment_and_a_run_in(lagging):
+    short = brief_of(lagging, NOTHING)
+    (record,), (long,) = short.arena.measure.records, lagging.measure.records
+    assert record.fit.sum() == 2 * 1000  # of three levels one is kept to choose by
+    assert len(record.command) < 0.7 * len(long.command)
+    assert np.array_equal(record.measured, long.measured[short.kept[0]])
+
+
+def test_the_true_law_leaves_noise_alone_on_it_and_no_law_leaves_what_it_leaves_on_the_whole(lagging):
+    short = brief_of(lagging, NOTHING).arena
+    assert error(short, claim("amplifier_lag", **LAG)) == pytest.approx(
+        error(lagging, claim("amplifier_lag", **LAG)), rel=0.05
+    )
+    assert error(short, NOTHING) == pytest.approx(error(lagging, NOTHING), rel=0.05)
+
+
+def test_without_a_run_in_the_true_law_would_leave_more_than_noise(lagging, monkeypatch):
+    monkeypatch.setattr(brief, "BRIEF_CONSTANTS", 0.0)
+    short = brief_of(lagging, NOTHING).arena
+    assert error(short, claim("amplifier_lag", **LAG)) > 1.5 * error(lagging, claim("amplifier_lag", **LAG))
+
+
+def test_evidence_is_cut_like_the_samples(lagging):
+    short = brief_of(lagging, NOTHING)
+    base = evaluated(lagging.measure, lagging.tuning, np.zeros(len(lagging.tuning.names)), NOTHING)
+    (whole,) = lagging.measure.evidence(lagging.tuning.model, (), base.residuals)
+    cut = short.of(whole)
+    assert np.array_equal(cut.axis_force, whole.axis_force[short.kept[0]])
+    assert cut.used.sum() == short.arena.measure.records[0].fit.sum()
+    assert cut.noise is whole.noise
+
+
+def test_there_is_none_where_what_is_held_hangs_on_the_time(lagging):
+    assert brief_of(lagging, claim("sensor_drift", total=1.0, bend=0.0, start=0.0)) is None
