@@ -6,6 +6,7 @@ when ticks run in `virtual_drive` and `realtime_drive`.
 
 import atexit
 import contextlib
+import signal
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -49,7 +50,9 @@ class SafeDevice:
         self._drive = self._drive_of(clock)
         self._held: HeldStimulus | None = None
         self._closing = self._closed = False
-        atexit.register(self.close)
+        # Twice: an interruption that waits as the first begins ends it before its first line.
+        atexit.register(self._close_at_exit)
+        atexit.register(self._close_at_exit)
 
     @property
     def info(self) -> DeviceInfo:
@@ -118,11 +121,21 @@ class SafeDevice:
                 self._runner.disconnect()
         # Last, so that a close that was interrupted is made good for when the program ends.
         self._closed = True
-        atexit.unregister(self.close)
+        atexit.unregister(self._close_at_exit)
         if not self._runner.force_off:
             # Closing never raises and may be the last thing a program does: whoever holds the handle must hear it.
             with contextlib.suppress(OSError):
                 sys.stderr.writelines([f"{Fault.FORCE_LEFT.value}\n"])
+
+    def _close_at_exit(self) -> None:
+        """The program's last chance: it ignores Ctrl-C, for the interpreter stops all threads next, the one that writes
+        the zero force among them. `close` has time limits of its own."""
+        while not self._closed:
+            try:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                self.close()
+            except KeyboardInterrupt:  # came before it was ignored
+                continue
 
     def _attend_play(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
         nap_s = min(BLOCK_S, self._limits.watchdog_s / 4)

@@ -2,6 +2,7 @@
 
 import contextlib
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -405,16 +406,19 @@ def test_an_interruption_while_a_recording_lets_go_stops_at_once(rigs, rig):
 
 
 PROGRAM = """
-import pathlib, sys, time
+import os, struct, sys, time
 sys.path.insert(0, {tests!r})
 import rigs
 from study.devices.clock import RealClock
 from study.devices.safe import SafeDevice
 
 class Witness(rigs.HeldForceRig):
+    # The file is the device: one system call writes a whole force or none.
+    file = os.open({path!r}, os.O_CREAT | os.O_WRONLY)
+
     def write(self, force_n):
         super().write(force_n)
-        pathlib.Path({path!r}).write_text(str(force_n[0]))
+        os.pwrite(self.file, struct.pack("d", force_n[0]), 0)
 
 device = SafeDevice(Witness(), rigs.SETTINGS, RealClock())
 device.hold(rigs.push())
@@ -427,7 +431,7 @@ for k in range({naps}):
 
 
 def program(tmp_path, naps: int) -> tuple[subprocess.Popen, Path]:
-    path = tmp_path / "force.txt"
+    path = tmp_path / "force"
     code = PROGRAM.format(tests=str(TESTS), path=str(path), naps=naps)
     process = subprocess.Popen(
         [sys.executable, "-c", code], cwd=TESTS.parent, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
@@ -437,11 +441,16 @@ def program(tmp_path, naps: int) -> tuple[subprocess.Popen, Path]:
     return process, path
 
 
+def force_left_n(path: Path) -> float:
+    (force_n,) = struct.unpack("d", path.read_bytes())
+    return float(force_n)
+
+
 def test_a_program_that_ends_without_closing_leaves_no_force(tmp_path):
     process, path = program(tmp_path, naps=12)
     with process:
         assert process.wait(20) == 0
-    assert float(path.read_text()) == 0.0
+    assert force_left_n(path) == 0.0
 
 
 def test_a_program_that_is_interrupted_again_and_again_leaves_no_force(tmp_path):
@@ -455,4 +464,4 @@ def test_a_program_that_is_interrupted_again_and_again_leaves_no_force(tmp_path)
             process.send_signal(signal.SIGINT)
             time.sleep(0.01)
         process.wait(20)
-    assert float(path.read_text()) == 0.0
+    assert force_left_n(path) == 0.0
