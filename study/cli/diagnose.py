@@ -61,12 +61,18 @@ def diagnose(
     Writes diagnosis.json, improved.toml, report.html and figures.
     """
     from study.cli.progress import steps
-    from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
-    from study.workflows.diagnosed_summary import diagnosed_lines, summary
+    from study.workflows.diagnose_recordings import DiagnosePlan, answered, written
+    from study.workflows.diagnosed_summary import answer_lines, file_lines, summary
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare, seconds)
     with steps("Diagnosing") as show:
-        done = diagnose_recordings(plan, show)
+        answer = answered(plan, show)
     if no_discovery:
         typer.echo("Note: no law outside the catalogue is looked for yet; --no-discovery changes nothing.", err=True)
-    typer.echo(json.dumps(summary(done), indent=2) if as_json else "\n".join(diagnosed_lines(done)))
+    found = answer.findings
+    # Said before it is drawn: the page takes a while.
+    typer.echo(json.dumps(summary(found), indent=2) if as_json else "\n".join(answer_lines(found)))
+    with steps("Diagnosing") as show:
+        written(answer, show)
+    if not as_json:
+        typer.echo("\n".join(file_lines(out)))

@@ -15,6 +15,9 @@ from study.store.file_errors import UnusableFileError
 from study.store.json_document import read_json, write_json
 from study.store.provenance import Provenance
 
+DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "report.html"
+"""In the folder of a diagnosis."""
+
 
 def read_diagnosis(path: Path) -> Diagnosis:
     """Raises CannotReadError, UnusableFileError."""

@@ -5,8 +5,8 @@ from itertools import count
 from pathlib import Path
 
 from study.errors import LeftError
+from study.store.diagnosis_file import DIAGNOSIS_NAME
 from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
-from study.workflows.write_diagnosis import DIAGNOSIS_NAME
 
 
 def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:

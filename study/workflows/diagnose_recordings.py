@@ -34,7 +34,6 @@ from study.workflows.diagnosis_input import (
 )
 from study.workflows.spring_in_model import spring_words, with_spring
 from study.workflows.worker_threads import worker_threads
-from study.workflows.write_diagnosis import write_diagnosis_into
 from study.workflows.write_twin import TwinPlan, write_twin
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
@@ -70,6 +69,16 @@ class DiagnosedRecordings:
     out: Path
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What is found, before any of it is written."""
+
+    findings: Findings
+    plan: DiagnosePlan
+    parents: tuple[Path, ...]
+    """Files that it was made from."""
+
+
 class Engine(Protocol):
     def __call__(
         self,
@@ -83,6 +92,11 @@ class Engine(Protocol):
 
 def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
     """`on_progress(what is being done, share)`. Interrupted or refused (StudyError), nothing is written."""
+    return written(answered(plan, on_progress, engine), on_progress)
+
+
+def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
+    """The first part, which writes nothing: figures and page take seconds that an answer need not wait for."""
     check_names(plan.without)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
@@ -117,11 +131,24 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
         improved=with_spring(findings.improved, -spring),
         remarks=(*found.remarks, *spring_words(spring), *first.remarks, *findings.remarks),
     )
+    return Answer(
+        findings, plan, (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
+    )
+
+
+def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
+    """The second part: document, improved model, figures and page, whole or not at all."""
+    # Here, for drawing takes long to import, and the answer comes first.
+    from study.workflows.write_diagnosis import write_diagnosis_into
+
     on_progress("writing the report", DIAGNOSED)
-    parents = (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
-    _write(plan, findings, parents)
+    plan = answer.plan
+    for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
+        note_written(session, plan.out)
+    with new_folder(plan.out) as folder:
+        write_diagnosis_into(folder, answer.findings, answer.parents)
     on_progress("done", 1.0)
-    return DiagnosedRecordings(findings, plan.out)
+    return DiagnosedRecordings(answer.findings, plan.out)
 
 
 def _patience(plan: DiagnosePlan) -> Patience:
@@ -158,13 +185,6 @@ def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: Mechanical
     raise WrongUseError(
         "Forces cannot be compared", happened, "Leave --compare out, or ask for motion.", saved="Nothing was written."
     )
-
-
-def _write(plan: DiagnosePlan, findings: Findings, parents: Sequence[Path]) -> None:
-    for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
-        note_written(session, plan.out)
-    with new_folder(plan.out) as folder:
-        write_diagnosis_into(folder, findings, parents)
 
 
 def check_names(without: Sequence[str]) -> None:

@@ -1,32 +1,35 @@
 """What is said of a diagnosis at its end: lines for a person, the document for a program."""
 
+from pathlib import Path
 from typing import Any
 
 from analysis.diagnosis.document import FORMAT, VERSION, Errors, diagnosis_to_json
+from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.unit_wording import error_text
-from study.workflows.diagnose_recordings import DiagnosedRecordings
-from study.workflows.write_diagnosis import MODEL_NAME, PAGE_NAME
+from study.store.diagnosis_file import MODEL_NAME, PAGE_NAME
 
 
-def summary(done: DiagnosedRecordings) -> dict[str, Any]:
+def summary(findings: Findings) -> dict[str, Any]:
     """As diagnosis.json has it."""
-    return {"format": FORMAT, "version": VERSION, **diagnosis_to_json(done.findings.diagnosis)}
+    return {"format": FORMAT, "version": VERSION, **diagnosis_to_json(findings.diagnosis)}
 
 
-def diagnosed_lines(done: DiagnosedRecordings) -> tuple[str, ...]:
-    """The verdict first; in the end where everything is."""
-    found = done.findings.diagnosis
+def answer_lines(findings: Findings) -> tuple[str, ...]:
+    """The verdict first."""
+    found = findings.diagnosis
     return (
-        *summary_lines(done.findings),
+        *summary_lines(findings),
         "",
         f"Errors, normalised over the channels, measured by {found.error}:",
         _errors("fitted", found.fit.fit, bool(found.effects)),
         _errors("held out", found.fit.test, bool(found.effects)),
-        "",
-        f"Report: {done.out / PAGE_NAME}",
-        f"Improved model: {done.out / MODEL_NAME}",
     )
+
+
+def file_lines(out: Path) -> tuple[str, ...]:
+    """Where everything is."""
+    return ("", f"Report: {out / PAGE_NAME}", f"Improved model: {out / MODEL_NAME}")
 
 
 def _errors(which: str, errors: Errors, named: bool) -> str:

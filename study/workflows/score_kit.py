@@ -9,11 +9,10 @@ from analysis.proof.lab_kit import MISSING, Label, Scored, kit_figures, not_answ
 from analysis.proof.share import Figure
 from study.errors import StudyError, WrongUseError
 from study.store.csv_rows import rows_to_csv
-from study.store.diagnosis_file import read_diagnosis
+from study.store.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
 from study.store.provenance import sha256_of
 from study.store.text_file import write_text
 from study.workflows.lab_kit import read_labels, seal_of, sealed_hash
-from study.workflows.write_diagnosis import DIAGNOSIS_NAME
 
 UNSCORED = "Nothing was scored, and nothing written."
 

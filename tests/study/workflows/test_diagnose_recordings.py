@@ -15,8 +15,8 @@ from study.store.json_document import read_json
 from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
 from study.store.recording_file import write_recording
 from study.workflows.diagnose_at_screen import diagnose_at_screen, free_out
-from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
-from study.workflows.diagnosed_summary import diagnosed_lines, summary
+from study.workflows.diagnose_recordings import DiagnosePlan, answered, diagnose_recordings, written
+from study.workflows.diagnosed_summary import answer_lines, file_lines, summary
 from study.workflows.diagnosis_input import read_input
 
 
@@ -104,12 +104,20 @@ def test_it_knows_where_it_comes_from(done):
     assert "hapteq" in origin["versions"]
 
 
-def test_the_summary_begins_with_the_verdict_and_ends_with_the_files(done):
-    lines = diagnosed_lines(done)
+def test_the_answer_is_there_before_anything_is_written(files, findings, tmp_path):
+    answer = answered(plan(files, tmp_path / "out"), quiet, Scripted(findings))
+    assert answer_lines(answer.findings) == answer_lines(findings)
+    assert list(tmp_path.iterdir()) == []
+    assert written(answer, quiet).out == tmp_path / "out"
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_the_summary_begins_with_the_verdict_and_then_says_where_the_files_are(done):
+    lines = answer_lines(done.findings)
     assert lines[0].startswith("Missing in the model: dry friction on the x drive.")
-    assert lines[-2:] == (f"Report: {done.out}/report.html", f"Improved model: {done.out}/improved.toml")
+    assert file_lines(done.out)[1:] == (f"Report: {done.out}/report.html", f"Improved model: {done.out}/improved.toml")
     assert any(line.startswith("  held out  as given") for line in lines)
-    document = summary(done)
+    document = summary(done.findings)
     assert (document["format"], document["version"], document["verdict"]) == ("hapteq-diagnosis", 1, "explained")
 
 
