@@ -8,12 +8,31 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
-from scipy.spatial.transform import Rotation
 
+from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from study.challenge.force_injections import FORCE_INJECTIONS, ForceInjection, moved_axis
+from study.challenge.drive_injections import ForceInjection
+from study.challenge.force_injections import FORCE_INJECTIONS
+from study.challenge.moved_axis import moved_axis
+from study.challenge.spoiled_readings import (
+    clip,
+    cross,
+    cubic,
+    drift,
+    hum,
+    lag,
+    late,
+    lose,
+    noise,
+    offset,
+    other_clock,
+    play,
+    scale,
+    square,
+    steps,
+    turn,
+)
 
 MAINS_HZ = (50.0, 60.0)
 FASTEST_PPM = 2e4
@@ -65,70 +84,6 @@ def _between(low: float, high: float, strength: float) -> float:
     return float(low * (high / low) ** strength)
 
 
-def _lag(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    share = 1.0 - np.exp(-2 * np.pi * of["bandwidth"] / rate_hz)
-    filtered, _ = lfilter([share], [1.0, share - 1.0], samples, axis=0, zi=(1.0 - share) * samples[:1])
-    return np.asarray(filtered)
-
-
-def _clip(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return np.asarray(np.clip(samples, -of["limit"], of["limit"]))
-
-
-def _hum(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    turns = of["frequency"] * np.arange(len(samples)) / rate_hz + of["turn"]
-    return np.asarray(samples + of["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
-
-
-def _drift(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return samples + of["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
-
-
-def _offset(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return samples + of["offset"]
-
-
-def _steps(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return np.asarray(of["step"] * np.round(samples / of["step"]))
-
-
-def _lose(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    lost = random.random(len(samples)) < of["fraction"]
-    lost[0] = False
-    kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
-    return np.asarray(samples[kept])
-
-
-def _other_clock(
-    samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
-    at = np.arange(len(samples), dtype=np.float64)
-    read = at * (1.0 + 1e-6 * of["ppm"])
-    return np.column_stack([np.interp(read, at, channel) for channel in samples.T])
-
-
-def _turn(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    about = np.array([of["about_x"], of["about_y"], of["about_z"]])
-    return np.asarray(Rotation.from_rotvec(np.radians(of["degrees"]) * about).apply(np.array(samples)))
-
-
-def _scale(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return of["gain"] * samples
-
-
-def _late(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    at = np.arange(len(samples), dtype=np.float64)
-    return np.column_stack([np.interp(at - of["offset"] * rate_hz, at, channel) for channel in samples.T])
-
-
-def _cubic(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return np.asarray(samples + of["cubic"] * samples**3)
-
-
-def _square(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
-    return np.asarray(samples + of["square"] * samples**2)
-
-
 def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dict[str, float]:
     x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
     return {"degrees": _between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
@@ -139,8 +94,8 @@ def _either(random: np.random.Generator) -> float:
 
 
 INJECTIONS: tuple[Injection, ...] = (
-    Injection("sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _between(20.0, 0.5, s)}, _lag),
-    Injection("sensor_clipping", lambda at, s, r: {"limit": at.peak * _between(0.95, 0.25, s)}, _clip),
+    Injection("sensor_lag", lambda at, s, r: {"bandwidth": at.middle_hz * _between(20.0, 0.5, s)}, lag),
+    Injection("sensor_clipping", lambda at, s, r: {"limit": at.peak * _between(0.95, 0.25, s)}, clip),
     Injection(
         "mains_hum",
         lambda at, s, r: {
@@ -148,28 +103,31 @@ INJECTIONS: tuple[Injection, ...] = (
             "frequency": float(r.choice(MAINS_HZ)) + float(r.normal(0.0, 0.02)),
             "turn": float(r.random()),
         },
-        _hum,
+        hum,
     ),
-    Injection("sensor_drift", lambda at, s, r: {"total": _either(r) * at.rms * _between(0.05, 3.0, s)}, _drift),
-    Injection("sensor_offset", lambda at, s, r: {"offset": _either(r) * at.rms * _between(0.02, 1.5, s)}, _offset),
-    Injection("quantization", lambda at, s, r: {"step": at.rms * _between(0.05, 1.5, s)}, _steps),
-    Injection("lost_samples", lambda at, s, r: {"fraction": _between(0.003, 0.3, s)}, _lose),
+    Injection("sensor_drift", lambda at, s, r: {"total": _either(r) * at.rms * _between(0.05, 3.0, s)}, drift),
+    Injection("sensor_offset", lambda at, s, r: {"offset": _either(r) * at.rms * _between(0.02, 1.5, s)}, offset),
+    Injection("quantization", lambda at, s, r: {"step": at.rms * _between(0.05, 1.5, s)}, steps),
+    Injection("lost_samples", lambda at, s, r: {"fraction": _between(0.003, 0.3, s)}, lose),
     Injection(
         "clock_drift",
         lambda at, s, r: {
             "ppm": _either(r) * min(1e6 * _between(0.02, 1.0, s) / at.middle_hz / at.seconds, FASTEST_PPM)
         },
-        _other_clock,
+        other_clock,
     ),
     Injection(
-        "sensor_gain", lambda at, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _between(0.02, 0.8, s)}, _scale
+        "sensor_gain", lambda at, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _between(0.02, 0.8, s)}, scale
     ),
-    Injection("logger_offset", lambda at, s, r: {"offset": _between(0.005, 0.1, s) / at.middle_hz}, _late),
+    Injection("logger_offset", lambda at, s, r: {"offset": _between(0.005, 0.1, s) / at.middle_hz}, late),
     Injection(
-        "sensor_nonlinearity", lambda at, s, r: {"cubic": _either(r) * _between(0.02, 0.3, s) / at.peak**2}, _cubic
+        "sensor_nonlinearity", lambda at, s, r: {"cubic": _either(r) * _between(0.02, 0.3, s) / at.peak**2}, cubic
     ),
-    Injection("sensor_asymmetry", lambda at, s, r: {"square": _either(r) * _between(0.02, 0.4, s) / at.peak}, _square),
-    Injection("sensor_misalignment", _draw_turn, _turn, axes=3),
+    Injection("sensor_asymmetry", lambda at, s, r: {"square": _either(r) * _between(0.02, 0.4, s) / at.peak}, square),
+    Injection("sensor_noise", lambda at, s, r: {"rms": at.rms * _between(0.003, 0.5, s)}, noise),
+    Injection("sensor_play", lambda at, s, r: {"gap": at.rms * _between(0.01, 0.6, s)}, play),
+    Injection("cross_axis_sensitivity", lambda at, s, r: {"from_next": _between(0.02, 0.8, s)}, cross, axes=2),
+    Injection("sensor_misalignment", _draw_turn, turn, axes=3),
 )
 
 
@@ -218,11 +176,21 @@ def fitting_injections(recording: Recording) -> tuple[str, ...]:
     rate_hz = recording.sample_rate_hz
     width = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
     hums = rate_hz > 4 * max(MAINS_HZ)
-    sensed = [each.effect for each in INJECTIONS if each.axes in (1, width) and (hums or each.effect != "mains_hum")]
+    several = len(recording.response.channels) > 1
+    sensed = [
+        each.effect
+        for each in INJECTIONS
+        if (each.axes in (1, width) or (each.axes == 2 and several)) and (hums or each.effect != "mains_hum")
+    ]
     axes = range(recording.command.samples.shape[1])
     forced = [each for each in FORCE_INJECTIONS if not (each.actuator and "imposed" in recording.meta)]
     moves = all(moved_axis(recording, axis) is not None for axis in axes)
     return (*sensed, *(each.effect for each in forced if moves))
+
+
+def place_of(effect: str) -> Place:
+    forced = next((each for each in FORCE_INJECTIONS if each.effect == effect), None)
+    return "sensor" if forced is None else "actuator" if forced.actuator else "mechanism"
 
 
 def reading_of(recording: Recording) -> Reading:

@@ -36,15 +36,15 @@ class RealRow:
 
 @dataclass(frozen=True, slots=True)
 class InjectedRow:
-    """`adds`: error with the fault over error without it, of the model that knows what is really there."""
+    """`change`: held-out error with the fault over that without it, of a base model fitted to the clean half."""
 
     recording: str
     injected: str
     strength: float
     values: str
-    adds: float
+    change: float | None
     detectable: bool
-    right: bool
+    judged: str
     verdict: str
     named: str
     returned: str
@@ -101,6 +101,6 @@ def _row(one: RealAnswer) -> RealRow:
 def _injected(one: InjectedOutcome) -> InjectedRow:
     values = " ".join(f"{name}={value:.6g}" for name, value in one.values.items())
     return InjectedRow(
-        one.recording, one.effect or "nothing", one.strength, values, one.adds, one.detectable, one.right,
+        one.recording, one.injected or "nothing", one.strength, values, one.change, one.detectable, one.judged,
         one.verdict, " ".join(one.named), " ".join(one.returned), one.seconds,
     )  # fmt: skip

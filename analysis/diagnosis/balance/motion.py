@@ -66,7 +66,7 @@ class Motion:
 
     def within(self, columns: FloatArray) -> FloatArray:
         """(n, k): at the recording's rate."""
-        return filtered(columns, self.rate_hz, lambda f: _within(f, self.band_hz, self.lowest_hz))
+        return within(columns, self.rate_hz, self.band_hz, self.lowest_hz)
 
     def kept(self, mask: Mask) -> Mask:
         """Of the kept samples, those of a mask (n,) that the filter sees whole."""
@@ -134,6 +134,11 @@ def _motion(
         rate_hz, band_hz, max(int(rate_hz / (OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
         acceleration, filled_gaps(record.command), condition, record.fit | record.choose, record.test, lowest_hz,
     )  # fmt: skip
+
+
+def within(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
+    """(n, k): with what lies outside the band taken off."""
+    return filtered(columns, rate_hz, lambda f: _within(f, band_hz, lowest_hz))
 
 
 def _within(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:

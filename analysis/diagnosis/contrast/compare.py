@@ -2,6 +2,7 @@
 apart from each other: no real device is the same twice."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,21 +101,15 @@ def compared(
 
 def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[Stream], list[Fault], bool]:
     recording = clean[0].recording
-    motions: list[Motion] = []
-    band_hz, step = np.inf, 1
-    table: dict[int, Motion] = {}
-    try:
-        first = motions_of([part.observed() for part in clean])
-        band_hz, step = first[0].band_hz, first[0].step
-        motions = [*first, *motions_of([part.observed() for part in faulty], band_hz)]
-        table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=True)}
-    except NoMotionError:
-        pass
-    bases, by_force = _bases(clean, faulty, motions)
+    bases, motions = bases_of(clean, faulty)
+    by_force = isinstance(bases[0], ForceBase)
+    timed = bool(motions) and np.isfinite(motions[0].band_hz)
+    band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
+    table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
     streams = [stream_of(base, clean, faulty) for base in (*bases, *watch_bases(clean, band_hz, step))]
     faults: list[Fault] = []
     for axis, name in enumerate(recording.command.channels):
-        if motions and np.isfinite(band_hz):
+        if timed:
             faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], _turning(recording))
         if not recording.meta.get("imposed"):
             faults += actuator_faults(axis, name, (*clean, *faulty))
@@ -125,15 +120,22 @@ def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[
     return streams, faults, by_force
 
 
-def _bases(clean: tuple[Taken, ...], faulty: tuple[Taken, ...], motions: Sequence[Motion]) -> tuple[list[Base], bool]:
+def bases_of(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[Base], tuple[Motion, ...]]:
+    """By forces, one per axis, where they hold on both sides (the faulty one may be empty); else step by step, one per
+    response. And the motions of both sides, none where there are none."""
     recording = clean[0].recording
     turning = _turning(recording)
+    motions: tuple[Motion, ...] = ()
+    with suppress(NoMotionError):
+        first = motions_of([part.observed() for part in clean])
+        more = motions_of([part.observed() for part in faulty], first[0].band_hz) if faulty else ()
+        motions = (*first, *more)
     if motions and np.isfinite(motions[0].band_hz):
         bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
-        if all(_left(base, side) < HOLDS for base in bases for side in (clean, faulty)):
-            return bases, True
+        if all(_left(base, side) < HOLDS for base in bases for side in (clean, faulty) if side):
+            return bases, motions
     step = likely_step((*clean, *faulty))
-    return [StepBase(channel, STEPS, step) for channel in range(len(recording.response.channels))], False
+    return [StepBase(channel, STEPS, step) for channel in range(len(recording.response.channels))], motions
 
 
 def _turning(recording: Recording) -> bool:

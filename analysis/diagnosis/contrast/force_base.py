@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import Law, scales_of
 from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
-from analysis.diagnosis.balance.motion import Motion, motions_of
+from analysis.diagnosis.balance.motion import Motion, motions_of, within
 from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.types import Mask
@@ -29,13 +29,17 @@ class ForceBase:
     turns: bool
     rate_hz: float
     """Of the rows."""
+    lowest_hz: float = 0.0
+    """Where the band begins, see `Motion`."""
 
     def rows(self, parts: Sequence[Taken], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
         """Per part (kept, 1 + columns). like: rows of parts with the same motion."""
+        if like is not None:
+            told = (within(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts)
+            step = round(parts[0].rate_hz / self.rate_hz)
+            return tuple(np.hstack([target[::step], old[:, 1:]]) for target, old in zip(told, like, strict=True))
         motions = motions_of([part.observed() for part in parts], self.band_hz)
         targets = [motion.reduced(motion.force[:, [self.axis]]) for motion in motions]
-        if like is not None:
-            return tuple(np.hstack([target, old[:, 1:]]) for target, old in zip(targets, like, strict=True))
         plain = regression_of(motions, self.axis, (), self.turns)
         found = []
         for target, motion, base in zip(targets, motions, plain.columns, strict=True):
@@ -69,6 +73,7 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
         motions[0].band_hz,
         turns,
         motions[0].rate_hz / motions[0].step,
+        motions[0].lowest_hz,
     )
 
 

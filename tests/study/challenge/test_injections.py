@@ -7,8 +7,9 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from study.challenge.force_injections import FORCE_INJECTIONS, moved_axis
+from study.challenge.force_injections import FORCE_INJECTIONS
 from study.challenge.injections import INJECTIONS, fitting_injections, inject, reading_of
+from study.challenge.moved_axis import moved_axis
 
 RATE_HZ = 1000.0
 

@@ -1,0 +1,78 @@
+"""The motion along a command of a recording, as position, velocity and acceleration."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import welch
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+DERIVATIVE = {
+    "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2, "voltage": 0,
+    "angular velocity": 1, "angular speed": 1, "angular acceleration": 2,
+}  # fmt: skip
+WIDEST, LOUD = 0.15, 30.0
+"""A motion is differentiated up to this share of the sample rate, and as far as its power is so often its noise's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moved:
+    """One axis of a recording; all (n,)."""
+
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    command: FloatArray
+    rate_hz: float
+
+    @property
+    def seconds(self) -> float:
+        return len(self.q) / self.rate_hz
+
+    @property
+    def share_of_time(self) -> FloatArray:
+        """From 0 to 1."""
+        return np.linspace(0.0, 1.0, len(self.q))
+
+
+def _end_hz(samples: FloatArray, rate_hz: float) -> float:
+    frequency, power = welch(samples, rate_hz, nperseg=min(len(samples), 2048))
+    loud = np.flatnonzero(power > LOUD * np.median(power[3 * len(power) // 4 :]))
+    last = float(frequency[loud[-1]]) if len(loud) else 0.0
+    return float(np.clip(last, 20 * rate_hz / len(samples), WIDEST * rate_hz))
+
+
+def moved_axis(recording: Recording, axis: int) -> Moved | None:
+    """None where the axis has no motion of its own."""
+    signals = [each for each in (recording.position, recording.response) if each is not None]
+    width = recording.command.samples.shape[1]
+    for signal in sorted(signals, key=lambda each: DERIVATIVE.get(each.quantities[0], 9)):
+        orders = {DERIVATIVE.get(quantity, 9) for quantity in signal.quantities}
+        if (signal.samples.shape[1] == width or width == 1) and max(orders) < 9:
+            order = DERIVATIVE[signal.quantities[axis]]
+            return _moved(signal.samples[:, axis], order, recording, axis)
+    return None
+
+
+def _moved(samples: FloatArray, order: int, recording: Recording, axis: int) -> Moved:
+    """Line by line of the spectrum, mirrored at both ends; what was not measured lies on a straight line."""
+    rate_hz, places = recording.sample_rate_hz, np.arange(len(samples))
+    known = np.isfinite(samples)
+    filled = np.interp(places, places[known], samples[known])
+    line = np.interp(places, [0, len(filled) - 1], [filled[0], filled[-1]])
+    whole = np.concatenate([filled - line, -(filled - line)[-2:0:-1]])
+    frequency = np.fft.rfftfreq(len(whole), 1 / rate_hz)
+    spectrum = np.fft.rfft(whole)
+    cut = _end_hz(filled - line, rate_hz)
+    slope = (filled[-1] - filled[0]) / max(len(filled) - 1, 1) * rate_hz
+    found = []
+    for wanted in range(3):
+        times = wanted - order
+        turn = 2j * np.pi * np.maximum(frequency, 1e-12)
+        gain = turn**times / (1 + (frequency / cut) ** 8)
+        if times < 0:
+            gain = np.where(frequency < 4 * rate_hz / len(filled), 0.0, gain)
+        course = np.fft.irfft(gain * spectrum, len(whole))[: len(filled)]
+        found.append(course + (line if times == 0 else slope if times == 1 else 0.0))
+    return Moved(found[0], found[1], found[2], recording.command.samples[:, axis], rate_hz)

@@ -1,0 +1,94 @@
+"""What faults of sensor, clock and line make of readings (n, p): samples, sample rate, numbers, random numbers."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from equalizer.signals.signal import FloatArray
+
+
+def lag(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    share = 1.0 - np.exp(-2 * np.pi * of["bandwidth"] / rate_hz)
+    filtered, _ = lfilter([share], [1.0, share - 1.0], samples, axis=0, zi=(1.0 - share) * samples[:1])
+    return np.asarray(filtered)
+
+
+def clip(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(np.clip(samples, -of["limit"], of["limit"]))
+
+
+def hum(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    turns = of["frequency"] * np.arange(len(samples)) / rate_hz + of["turn"]
+    return np.asarray(samples + of["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
+
+
+def drift(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return samples + of["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
+
+
+def offset(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return samples + of["offset"]
+
+
+def steps(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(of["step"] * np.round(samples / of["step"]))
+
+
+def lose(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    lost = random.random(len(samples)) < of["fraction"]
+    lost[0] = False
+    kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
+    return np.asarray(samples[kept])
+
+
+def other_clock(
+    samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
+    at = np.arange(len(samples), dtype=np.float64)
+    read = at * (1.0 + 1e-6 * of["ppm"])
+    return np.column_stack([np.interp(read, at, channel) for channel in samples.T])
+
+
+def turn(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    about = np.array([of["about_x"], of["about_y"], of["about_z"]])
+    return np.asarray(Rotation.from_rotvec(np.radians(of["degrees"]) * about).apply(np.array(samples)))
+
+
+def scale(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return of["gain"] * samples
+
+
+def late(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    at = np.arange(len(samples), dtype=np.float64)
+    return np.column_stack([np.interp(at - of["offset"] * rate_hz, at, channel) for channel in samples.T])
+
+
+def cubic(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(samples + of["cubic"] * samples**3)
+
+
+def square(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(samples + of["square"] * samples**2)
+
+
+def noise(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    return np.asarray(samples + of["rms"] * random.normal(size=samples.shape))
+
+
+def play(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    """The sensor is driven through a gap."""
+    found, read, half = np.empty_like(samples), samples[0], 0.5 * of["gap"]
+    for k, here in enumerate(samples):
+        known = np.isfinite(here)
+        read = np.where(known, np.where(np.isfinite(read), np.clip(read, here - half, here + half), here), read)
+        found[k] = np.where(known, read, np.nan)
+    return found
+
+
+def cross(samples: FloatArray, rate_hz: float, of: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+    """The first channel also reads the second."""
+    found = samples.copy()
+    found[:, 0] += of["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
+    return np.asarray(found)

@@ -1,0 +1,139 @@
+"""A real recording in two: a half that stays as it is, and another that faults are put into; and how much they show."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.contrast.compare import bases_of
+from analysis.diagnosis.contrast.ledger import weights_of
+from analysis.diagnosis.contrast.stream import Base
+from analysis.diagnosis.contrast.taken import Taken, taken_of
+from analysis.diagnosis.data.observed_parts import part_of, parts_of
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+
+MOST_SAMPLES = 10_000
+"""Of each half of a recording, and of what is played before it."""
+SHORTEST = 0.6
+"""Of the longest half that a recording allows."""
+PARTS = 4
+"""From so many parts on, halves may also be made of parts by chance."""
+
+
+def drawn_halves(recording: Recording, random: np.random.Generator) -> tuple[Recording, Recording]:
+    """Two stretches one after the other, of a length and at a place by chance, or parts by chance; which of them stays
+    clean is by chance, too. Both are without roles: which samples are fitted to is drawn anew in each."""
+    plain = replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
+    parts = parts_of(plain)
+    if len(parts) >= PARTS and random.random() < 0.5:
+        order = random.permutation(len(parts))
+        picked = [sorted(order[: len(parts) // 2]), sorted(order[len(parts) // 2 :])]
+        first, second = (_of_parts(plain, [parts[k] for k in each]) for each in picked)
+    else:
+        half = int(min(len(recording) // 2, MOST_SAMPLES) * random.uniform(SHORTEST, 1.0))
+        start = int(random.integers(len(recording) - 2 * half + 1))
+        first, second = _led(plain, start, start + half), _led(plain, start + half, start + 2 * half)
+    return (first, second) if random.random() < 0.5 else (second, first)
+
+
+def _of_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recording:
+    """Joined, up to as many samples as a half may have; a part that is longer by itself, as far as it may."""
+    pieces: list[Recording] = []
+    left = MOST_SAMPLES
+    for start, stop in parts:
+        if left > 0:
+            pieces.append(part_of(recording, start, min(stop, start + left)))
+            left -= len(pieces[-1])
+    stops = np.cumsum([len(piece) for piece in pieces])
+    starts = stops - [len(piece) for piece in pieces]
+    segments = [
+        replace(segment, start=segment.start + int(at), stop=segment.stop + int(at))
+        for piece, at in zip(pieces, starts, strict=True)
+        for segment in piece.segments
+    ]
+    named = [{"start": int(start), "stop": int(stop)} for start, stop in zip(starts, stops, strict=True)]
+    first = pieces[0]
+    return replace(
+        first,
+        command=_joined([piece.command for piece in pieces]),
+        response=_joined([piece.response for piece in pieces]),
+        position=_joined_if([piece.position for piece in pieces]),
+        excitation=_joined_if([piece.excitation for piece in pieces]),
+        condition=_joined_if([piece.condition for piece in pieces]),
+        time_s=None,
+        segments=tuple(segments) or (Segment(0, int(stops[-1]), "noise", 0.0),),
+        meta={**recording.meta, "parts": named},
+    )
+
+
+def _joined(signals: Sequence[Signal]) -> Signal:
+    return replace(signals[0], samples=np.vstack([signal.samples for signal in signals]))
+
+
+def _joined_if(signals: Sequence[Signal | None]) -> Signal | None:
+    known = [signal for signal in signals if signal is not None]
+    return _joined(known) if len(known) == len(signals) else None
+
+
+def _led(recording: Recording, start: int, stop: int) -> Recording:
+    """A half begins in the middle of a motion. So that it can be played from rest all the same, what was there until
+    then goes before it, outside all segments."""
+    lead = min(start, MOST_SAMPLES)
+    whole = part_of(recording, start - lead, stop)
+    own = [replace(segment, start=max(segment.start, lead)) for segment in whole.segments if segment.stop > lead]
+    parts = [
+        {"start": max(begin, start - lead) - start + lead, "stop": min(end, stop) - start + lead}
+        for begin, end in parts_of(recording)
+        if min(end, stop) > max(begin, start - lead)
+    ]
+    meta = {key: value for key, value in recording.meta.items() if key != "parts"}
+    return replace(
+        whole,
+        segments=tuple(own) or (Segment(lead, len(whole), "noise", 0.0),),
+        meta={**meta, "parts": parts} if len(parts) > 1 else meta,
+    )
+
+
+def without_lead(recording: Recording) -> Recording:
+    """What was commanded is known there, and nothing else (NaN)."""
+    lead = min((segment.start for segment in recording.segments), default=0)
+    position = None if recording.position is None else _unknown(recording.position, lead)
+    return replace(recording, response=_unknown(recording.response, lead), position=position)
+
+
+def _unknown(signal: Signal, lead: int) -> Signal:
+    samples = signal.samples.copy()
+    samples[:lead] = np.nan
+    return replace(signal, samples=samples)
+
+
+def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> float | None:
+    """Error on the spoiled half over that on the same half as it was, of a model that is fitted to the sound half
+    alone; of the axis or channel where that is most. None where no model can be fitted.
+
+    The model is the base that a comparison begins with: forces along the motion where they hold, else each reading from
+    its past. Nothing in it knows of faults.
+    """
+    before, after, clean = (taken_of([each]) for each in (rest, spoiled, sound))
+    if not before or not after or not clean:
+        return None
+    try:
+        bases = bases_of(clean, ())[0]
+        found = [_error(base, clean, after) / max(_error(base, clean, before), 1e-300) for base in bases]
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    return max(found, key=lambda times: abs(np.log(max(times, 1e-12))))
+
+
+def _error(base: Base, clean: tuple[Taken, ...], other: tuple[Taken, ...]) -> float:
+    """Rms of what is told of the others by a base that was fitted to the clean ones."""
+    known, asked = _rows(base, clean), _rows(base, other)
+    size = np.sqrt(np.mean(known**2, axis=0))
+    size = np.where(size > 0, size, 1.0)
+    weights = weights_of((known / size).T @ (known / size)) / size
+    return float(np.sqrt(np.mean((asked @ weights * size[0]) ** 2)))
+
+
+def _rows(base: Base, parts: tuple[Taken, ...]) -> FloatArray:
+    return np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.kept(parts), strict=True)])
