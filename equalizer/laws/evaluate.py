@@ -1,0 +1,51 @@
+"""A law along samples, compiled: what a simulation would compute at the same instants."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from equalizer.laws.kernel import FROM_ZERO, along, along_held
+from equalizer.laws.law import Law
+from equalizer.laws.parse import LawError
+from equalizer.laws.program import Program, program_of
+from equalizer.signals.signal import FloatArray
+
+
+def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
+    """(n,): the law's value at each sample. columns: (n,) each, by the signals' names, SI; `t` is counted from the
+    first sample where it is not among them. Between samples signals go on straight lines; what a law remembers begins
+    as if its signals had always been what they are first, integrals at zero. Outside its domain a function gives NaN or
+    inf.
+
+    Raises LawError for a signal that is not there.
+    """
+    program, signals = _bound(law, columns, sample_rate_hz)
+    value, memory = np.empty(len(signals)), np.zeros(program.memory)
+    along(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, value)
+    return value
+
+
+def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> FloatArray:
+    """(2, n): at the start and at the end of each step, over which the signals (n,) are held, as commands are. Before
+    the first all was zero. Raises LawError."""
+    program, signals = _bound(law, columns, sample_rate_hz)
+    values, memory = np.empty((2, len(signals))), np.zeros(program.memory)
+    memory[0] = FROM_ZERO
+    along_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
+    return values
+
+
+def _bound(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> tuple[Program, FloatArray]:
+    if not columns:
+        raise LawError("a law is evaluated along signals, and there are none")
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) > 1:
+        raise LawError(f"the signals have different lengths: {', '.join(str(length) for length in sorted(lengths))}")
+    length = lengths.pop()
+    used = law.variables
+    known = {"t": np.arange(length) / sample_rate_hz, **columns} if "t" in used else columns
+    program = program_of(law.tree, {name: number for number, name in enumerate(used) if name in known})
+    signals = np.empty((length, len(used)))
+    for number, name in enumerate(used):
+        signals[:, number] = known[name]
+    return program, signals

@@ -1,0 +1,240 @@
+"""Runs the program of a law at one instant, or along samples, compiled.
+
+A step has a start and an end. Between them signals that are remembered go on a straight line; at a start they may jump
+(a command does). What is remembered moves on when a step is kept.
+"""
+
+import numpy as np
+from numba import njit, types
+
+from equalizer.laws.program import CELLS, CODE, DEEPEST, KEPT
+from equalizer.signals.signal import FloatArray
+
+START, END = 0, 1
+SETTLED, BEGUN, FROM_ZERO = 0.0, 1.0, 2.0
+"""What the memory's first number says: nothing is remembered, and all is taken to have been as it is first; the run has
+begun; nothing is remembered, and all is taken to have been zero."""
+_VECTOR = types.float64[::1]
+_MATRIX = types.float64[:, ::1]
+_NUMBER, _VARIABLE = CODE["number"], CODE["variable"]
+_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _POWER = (CODE[name] for name in ("+", "-", "*", "/", "**"))
+_MINIMUM = CODE["minimum"]
+_NEGATE, _ABS, _SIGN, _SQRT = CODE["neg"], CODE["abs"], CODE["sign"], CODE["sqrt"]
+_SIN, _COS, _EXP, _LOG, _TANH, _ATAN = (CODE[name] for name in ("sin", "cos", "exp", "log", "tanh", "atan"))
+_LAG, _PLAY, _DELAY, _INTEGRAL = (CODE[name] for name in ("lag", "play", "delay", "integral"))
+_SAME = 1e-9
+"""Of a delay: instants that are no further apart are the same, but for rounding."""
+_RING = (KEPT["delay"] - 4) // 2
+
+
+@njit(inline="always")
+def _binary(code: int, left: float, right: float) -> float:
+    if code == _MULTIPLY:
+        return left * right
+    if code == _ADD:
+        return left + right
+    if code == _SUBTRACT:
+        return left - right
+    if code == _DIVIDE:
+        return left / right
+    if code == _POWER:
+        return left * left if right == 2.0 else left**right
+    if code == _MINIMUM:
+        return right if right < left or np.isnan(right) else left
+    return right if right > left or np.isnan(right) else left
+
+
+@njit(inline="always")
+def _unary(code: int, of: float) -> float:  # noqa: C901 - a table, in the only form that compiles to a jump
+    if code == _NEGATE:
+        return -of
+    if code == _ABS:
+        return abs(of)
+    if code == _SIGN:
+        return float(np.sign(of))
+    if code == _TANH:
+        return float(np.tanh(of))
+    if code == _SIN:
+        return float(np.sin(of))
+    if code == _COS:
+        return float(np.cos(of))
+    if code == _EXP:
+        return float(np.exp(of))
+    if code == _LOG:
+        return float(np.log(of))
+    if code == _SQRT:
+        return float(np.sqrt(of))
+    if code == _ATAN:
+        return float(np.arctan(of))
+    return float(np.tan(of))
+
+
+@njit(inline="always")
+def _lag(signal: float, tau_s: float, memory: FloatArray, at: int, phase: int, step_s: float) -> float:
+    """y' = (s - y) / tau, exact for straight lines. memory: y and s at the start, and at the end."""
+    if not tau_s > 0:
+        return signal
+    if phase == START:
+        memory[at + 1] = signal
+        return float(memory[at])
+    steps = step_s / tau_s
+    gone = -np.expm1(-steps)
+    mean = gone / steps
+    memory[at + 2] = (1 - gone) * memory[at] + (mean - 1 + gone) * memory[at + 1] + (1 - mean) * signal
+    memory[at + 3] = signal
+    return float(memory[at + 2])
+
+
+@njit(inline="always")
+def _integral(signal: float, memory: FloatArray, at: int, phase: int, step_s: float) -> float:
+    if phase == START:
+        memory[at + 1] = signal
+        return float(memory[at])
+    memory[at + 2] = memory[at] + 0.5 * step_s * (memory[at + 1] + signal)
+    memory[at + 3] = signal
+    return float(memory[at + 2])
+
+
+@njit(inline="always")
+def _play(signal: float, half_width: float, memory: FloatArray, at: int, phase: int) -> float:
+    width = max(half_width, 0.0)
+    follows = min(max(memory[at], signal - width), signal + width)
+    memory[at + 1] = follows
+    if phase == START:
+        memory[at] = follows
+    return float(follows)
+
+
+@njit(
+    types.float64(types.float64, types.float64, _VECTOR, types.int64, types.int64, types.float64),
+    cache=True, nogil=True,
+)  # fmt: skip
+def _late(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float) -> float:
+    """memory: how many instants were written, the first that still counts, their times and values; then the last signal
+    and delay, which are not written yet. At a jump, a step starts after it and ends before it."""
+    times, values, wanted = at + 2, at + 2 + _RING, time_s - delay_s
+    first, last = int(memory[at + 1]), int(memory[at]) - 1
+    passed = wanted + (_SAME if phase == START else -_SAME) * delay_s
+    while first < last and memory[times + (first + 1) % _RING] <= passed:
+        first += 1
+    before_s, before = memory[times + first % _RING], memory[values + first % _RING]
+    after_s, after = time_s, signal
+    if first < last:
+        after_s, after = memory[times + (first + 1) % _RING], memory[values + (first + 1) % _RING]
+    if after_s <= before_s:
+        return float(before)
+    return float(before + (after - before) * min(max((wanted - before_s) / (after_s - before_s), 0.0), 1.0))
+
+
+@njit(types.void(types.float64, types.float64, _VECTOR, types.int64, types.float64), cache=True, nogil=True)
+def _write(signal: float, delay_s: float, memory: FloatArray, at: int, time_s: float) -> None:
+    """Over the newest instant, while that is too close to the one before it to be kept."""
+    times, values, count = at + 2, at + 2 + _RING, int(memory[at])
+    if count < 2 or time_s - memory[times + (count - 2) % _RING] >= delay_s / CELLS * (1 - _SAME):
+        count += 1
+    memory[at], memory[times + (count - 1) % _RING], memory[values + (count - 1) % _RING] = count, time_s, signal
+    first = int(memory[at + 1])
+    while first < count - 1 and memory[times + (first + 1) % _RING] <= time_s - (1 + _SAME) * delay_s:
+        first += 1
+    memory[at + 1] = max(first, count - _RING)
+
+
+@njit(inline="always")
+def _delayed(signal: float, delay_s: float, memory: FloatArray, at: int, phase: int, time_s: float) -> float:
+    if not delay_s > 0:
+        return signal
+    newest = at + 2 + _RING + (int(memory[at]) - 1) % _RING
+    if phase == START and memory[newest] != signal:
+        _write(signal, delay_s, memory, at, time_s)
+    memory[at + 2 + 2 * _RING], memory[at + 3 + 2 * _RING] = signal, delay_s
+    return float(_late(signal, delay_s, memory, at, phase, time_s))
+
+
+@njit(inline="always")
+def _begin(code: int, signal: float, memory: FloatArray, at: int, time_s: float) -> None:
+    """As if the signal had always been so."""
+    if code == _DELAY:
+        memory[at], memory[at + 1], memory[at + 2], memory[at + 2 + _RING] = 1.0, 0.0, time_s, signal
+    elif code != _INTEGRAL:
+        memory[at] = signal
+
+
+@njit(inline="always")
+def _remembered(  # noqa: PLR0913 - a kernel takes flat arrays
+    code: int, signal: float, number: float, memory: FloatArray, at: int, phase: int, time_s: float, step_s: float
+) -> float:
+    if memory[0] != BEGUN:
+        _begin(code, 0.0 if memory[0] == FROM_ZERO else signal, memory, at, time_s)
+    if code == _LAG:
+        return float(_lag(signal, number, memory, at, phase, step_s))
+    if code == _PLAY:
+        return float(_play(signal, number, memory, at, phase))
+    if code == _DELAY:
+        return float(_delayed(signal, number, memory, at, phase, time_s))
+    return float(_integral(signal, memory, at, phase, step_s))
+
+
+@njit(
+    types.float64(_VECTOR, _VECTOR, _VECTOR, _VECTOR, types.int64, types.float64, types.float64),
+    cache=True, nogil=True, error_model="numpy",
+)  # fmt: skip
+def run(  # noqa: PLR0913 - a kernel takes flat arrays
+    program: FloatArray, signals: FloatArray, memory: FloatArray, stack: FloatArray, phase: int, time_s: float,
+    step_s: float,
+) -> float:  # fmt: skip
+    """The value at a step's start or end. program: (2 k,). time_s: of this instant. stack: (DEEPEST,), scratch."""
+    top = -1
+    for row in range(0, program.shape[0], 2):
+        code = int(program[row])
+        if code == _NUMBER:
+            top += 1
+            stack[top] = program[row + 1]
+        elif code == _VARIABLE:
+            top += 1
+            stack[top] = signals[int(program[row + 1])]
+        elif code < _NEGATE:
+            top -= 1
+            stack[top] = _binary(code, stack[top], stack[top + 1])
+        elif code < _LAG:
+            stack[top] = _unary(code, stack[top])
+        else:
+            top -= code != _INTEGRAL
+            stack[top] = _remembered(
+                code, stack[top], stack[top + 1], memory, int(program[row + 1]), phase, time_s, step_s
+            )
+    return float(stack[0])
+
+
+@njit(types.void(_VECTOR, _VECTOR, types.float64), cache=True, nogil=True)
+def keep(program: FloatArray, memory: FloatArray, time_s: float) -> None:
+    """The end of a step as it was run last becomes what is remembered. time_s: of that end."""
+    for row in range(0, program.shape[0], 2):
+        code, at = int(program[row]), int(program[row + 1])
+        if code in (_LAG, _INTEGRAL):
+            memory[at], memory[at + 1] = memory[at + 2], memory[at + 3]
+        elif code == _PLAY:
+            memory[at] = memory[at + 1]
+        elif code == _DELAY and memory[at + 3 + 2 * _RING] > 0:
+            _write(memory[at + 2 + 2 * _RING], memory[at + 3 + 2 * _RING], memory, at, time_s)
+
+
+@njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _VECTOR), cache=True, nogil=True, error_model="numpy")
+def along(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray) -> None:
+    """Fills out (n,). signals: (n, k), on straight lines from sample to sample."""
+    stack = np.empty(DEEPEST)
+    for k in range(signals.shape[0]):
+        out[k] = run(program, signals[k], memory, stack, END if k > 0 else START, k * step_s, step_s)
+        if k > 0:
+            keep(program, memory, k * step_s)
+        memory[0] = BEGUN
+
+
+@njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _MATRIX), cache=True, nogil=True, error_model="numpy")
+def along_held(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, out: FloatArray) -> None:
+    """Fills out (2, n): at the start and at the end of each step, over which the signals (n, k) are held."""
+    stack = np.empty(DEEPEST)
+    for k in range(signals.shape[0]):
+        out[0, k] = run(program, signals[k], memory, stack, START, k * step_s, step_s)
+        memory[0] = BEGUN
+        out[1, k] = run(program, signals[k], memory, stack, END, (k + 1) * step_s, step_s)
+        keep(program, memory, (k + 1) * step_s)

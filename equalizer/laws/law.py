@@ -1,0 +1,68 @@
+"""A law without a name: a formula with free numbers, and what it acts on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from equalizer.laws.parse import LawError, parsed
+from equalizer.laws.tree import Free, Node, Variable, nodes, written
+
+ActsOn = Literal["force", "command", "response"]
+KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """Raises LawError where the formula is not in the language, or its numbers do not fit it."""
+
+    expression: str
+    """A template, its free numbers called p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Numbers in it are part of the form."""
+    numbers: tuple[float, ...]
+    """Of p0, p1, …; SI."""
+    units: tuple[str, ...]
+    """Of the numbers; empty where they are not known."""
+    acts_on: ActsOn
+    """force: it is added to the force at the axis; command, response: it replaces that of the axis."""
+    axis: str
+    """Its letter ('y') or channel."""
+
+    def __post_init__(self) -> None:
+        if self.acts_on not in KINDS:
+            raise LawError(f"a law acts on {', '.join(KINDS)}; not on '{self.acts_on}'")
+        if not self.axis:
+            raise LawError("the law says no axis that it acts at")
+        used = {node.place for node in nodes(self.tree) if isinstance(node, Free)}
+        if used != set(range(len(self.numbers))):
+            names = ", ".join(f"p{place}" for place in sorted(used)) or "none"
+            raise LawError(f"the law names the free numbers {names}, but {len(self.numbers)} are given")
+        if self.units and len(self.units) != len(self.numbers):
+            raise LawError(f"the law has {len(self.numbers)} free numbers and {len(self.units)} units")
+
+    @property
+    def tree(self) -> Node:
+        return parsed(self.expression, template=True)[0]
+
+    @property
+    def text(self) -> str:
+        """With its numbers written in, to five digits."""
+        return written(self.tree, self.numbers)
+
+    @property
+    def exact_text(self) -> str:
+        """The same with all digits: `law_of` reads the same numbers back."""
+        return written(self.tree, self.numbers, None)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Signals that it needs, sorted."""
+        return tuple(sorted({node.name for node in nodes(self.tree) if isinstance(node, Variable)} - {"pi"}))
+
+    def with_numbers(self, numbers: Sequence[float]) -> "Law":
+        return replace(self, numbers=tuple(float(number) for number in numbers))
+
+
+def law_of(text: str, acts_on: ActsOn, axis: str) -> Law:
+    """From a formula with its numbers. Those with a point or an exponent become free: '-4.1*abs(vy)**1.5*sign(vy)' is
+    '-p0*abs(vy)**p1*sign(vy)' with 4.1 and 1.5; in '-4.1*vy**2' the 2 stays. Raises LawError."""
+    tree, numbers = parsed(text)
+    return Law(written(tree), numbers, (), acts_on, axis)

@@ -1,0 +1,79 @@
+"""A formula as a flat program for a stack, as compiled code runs it; see `equalizer.laws.kernel`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from equalizer.laws.parse import LawError
+from equalizer.laws.tree import Apply, Free, Node, Number, Variable
+from equalizer.signals.signal import FloatArray
+
+CODES = (
+    "number", "variable", "+", "-", "*", "/", "**", "minimum", "maximum",
+    "neg", "sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "tanh", "atan",
+    "lag", "play", "delay", "integral",
+)  # fmt: skip
+CODE: Mapping[str, int] = {name: number for number, name in enumerate(CODES)}
+CELLS = 256
+"""A delayed signal is remembered at so many instants over the delay, or at all if they are fewer."""
+KEPT: Mapping[str, int] = {"lag": 4, "play": 2, "delay": 4 + 2 * (2 * CELLS + 8), "integral": 4}
+"""How many numbers each operator remembers."""
+DEEPEST = 32
+"""Numbers on the stack."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    codes: FloatArray
+    """(k, 2): what to do, and with which number, signal or place in the memory."""
+    free: tuple[tuple[int, int], ...]
+    """Rows whose number is free, and which free number."""
+    memory: int
+    """How many numbers are remembered; the first says whether it has begun."""
+
+    def with_numbers(self, numbers: Sequence[float]) -> FloatArray:
+        """(2 k,): flat, with the free numbers written in."""
+        codes = self.codes.copy()
+        for row, place in self.free:
+            codes[row, 1] = numbers[place]
+        return codes.ravel()
+
+
+def program_of(tree: Node, signals: Mapping[str, int]) -> Program:
+    """signals: column of each. Raises LawError for one that is not there, and for a formula that is too deep."""
+    program = _added(tree, Program(np.empty((0, 2)), (), 1), signals)
+    _check_depth(program.codes[:, 0])
+    return program
+
+
+def _added(tree: Node, to: Program, signals: Mapping[str, int]) -> Program:
+    match tree:
+        case Number(value):
+            return _with(to, "number", value)
+        case Free(place):
+            return replace(_with(to, "number", np.nan), free=(*to.free, (len(to.codes), place)))
+        case Variable("pi"):
+            return _with(to, "number", np.pi)
+        case Variable(name):
+            if name not in signals:
+                raise LawError(f"the law needs the signal '{name}'; there are {', '.join(signals) or 'none'}")
+            return _with(to, "variable", signals[name])
+        case Apply(name, parts):
+            for part in parts:
+                to = _added(part, to, signals)
+            kept = KEPT.get(name, 0)
+            return replace(_with(to, name, to.memory if kept else 0), memory=to.memory + kept)
+
+
+def _with(program: Program, name: str, operand: float) -> Program:
+    return replace(program, codes=np.vstack([program.codes, [CODE[name], operand]]))
+
+
+def _check_depth(codes: FloatArray) -> None:
+    taken = np.ones(len(codes))
+    taken[(codes >= CODE["+"]) & (codes <= CODE["maximum"])] = -1
+    taken[codes >= CODE["neg"]] = 0
+    taken[(codes >= CODE["lag"]) & (codes <= CODE["delay"])] = -1
+    if np.cumsum(taken).max() > DEEPEST:
+        raise LawError(f"the law keeps more than {DEEPEST} numbers at once; write it less nested")
