@@ -19,7 +19,10 @@ from math import log
 LEAST_SAMPLES = 256  # with a response, in all recordings: fewer carry neither a fit nor a test
 SHORTEST_S, SHORTEST_SAMPLES = 1.5, 2000  # what lasts less and holds fewer is explained as well by any effect
 LEAST_SAMPLES_TO_FIT = 64  # with a response, of what may be fitted to
-LEAST_CYCLES = 3.0  # of the commands' middle frequency, in all recordings
+LEAST_CYCLES = 3.0  # in all recordings, of the frequency below which three quarters of the commands' power lie
+CYCLES_SHARE = 0.75  # a step is no cycle: 0.81 of its power lies in a single line; random levels that drift are many
+BRIDGED = 0.02  # of the command's spread, by which straight lines may miss it over a gap of that length; by hand
+LEAST_KEPT = 0.5  # of the samples with a command that must lie in stretches worth comparing; principle: the main part
 LARGEST_VALUE = 1e12  # SI; principle: far beyond any device, and its powers are still numbers
 MOST_GROWTH = 1.0  # e-foldings of a model by itself over the longest recording; principle: rounding stays far below
 ANSWER_DEVIATIONS = 5.0  # standard deviations of coherence above noise alone, from which the device answers

@@ -9,6 +9,7 @@ import numpy as np
 from analysis.diagnosis.balance.plain_form import plain_form
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of, require_something
+from analysis.diagnosis.data.command_gaps import across_gaps
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.played_errors import PlayedError, played_error
@@ -108,7 +109,8 @@ def _read(wanted: RealRecording, patient: Patience, on_progress: Progress) -> _R
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
         raise nothing_to_diagnose((why,))
-    (recording,), formed = _formed(wanted, imported(wanted.found))
+    driven, formed = _formed(wanted, imported(wanted.found))
+    (recording,), gaps = across_gaps(driven, (wanted.name,))
     remarks: tuple[str, ...] = ()
     try:
         require_something((recording,), (wanted.name,))
@@ -118,7 +120,7 @@ def _read(wanted: RealRecording, patient: Patience, on_progress: Progress) -> _R
         remarks = tuple(f"{problem}." for problem in refusal.problems)
     before = None if wanted.before is None else imported(wanted.before)
     first = _model(wanted, recording, patient, on_progress)
-    return _Read(recording, first.model, first.balances, (*formed, *remarks, *first.remarks), before)
+    return _Read(recording, first.model, first.balances, (*formed, *gaps, *remarks, *first.remarks), before)
 
 
 def _formed(wanted: RealRecording, recording: Recording) -> tuple[tuple[Recording, ...], tuple[str, ...]]:

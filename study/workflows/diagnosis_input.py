@@ -17,6 +17,7 @@ from analysis.diagnosis.data.belonging import (
     require_something,
 )
 from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.data.command_gaps import across_gaps
 from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.search.by_balance import balances_of
@@ -74,7 +75,8 @@ def read_input(sources: Sequence[Path], seed: int, plain: bool = False) -> Diagn
     else:
         read = tuple(read_recording(source) for source in sources)
         formed, said = plain_form(read) if plain else (read, ())
-        found = DiagnosisInput(all_force_driven(formed), _names(sources), tuple(sources), said)
+        driven, gaps = across_gaps(all_force_driven(formed), _names(sources))
+        found = DiagnosisInput(driven, _names(sources), tuple(sources), (*said, *gaps))
     try:
         require_alike(found.recordings, found.names)
         require_something(found.recordings, found.names)

@@ -12,6 +12,7 @@ from analysis.diagnosis.data.growth import growth_rate, motions
 from analysis.diagnosis.data.observed_parts import samples_to_fit
 from analysis.diagnosis.settings import (
     ANSWER_DEVIATIONS,
+    CYCLES_SHARE,
     LARGEST_VALUE,
     LEAST_CYCLES,
     LEAST_SAMPLES,
@@ -153,10 +154,10 @@ def _never(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def _cycles(recording: Recording) -> float:
-    """Cycles of the median frequency of the command's power; constant parts excite nothing."""
+    """Of the frequency below which most of the command's power lies; constant parts excite nothing."""
     power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
     power[0] = 0.0
-    return float(np.searchsorted(np.cumsum(power), power.sum() / 2)) if power.any() else 0.0
+    return float(np.searchsorted(np.cumsum(power), CYCLES_SHARE * power.sum())) if power.any() else 0.0
 
 
 def _size(model: MechanicalModel, recording: Recording) -> Iterator[str]:

@@ -96,6 +96,15 @@ def test_too_few_samples_and_too_few_cycles_are_too_short():
     assert "cycles of what was commanded, which is too short" in refusal(require_something, [slow], ["a"])
 
 
+def test_random_levels_that_change_their_side_once_hold_many_cycles_and_a_step_holds_none():
+    levels = np.repeat(np.random.default_rng(3).uniform(0.0, 1.0, 50), 100)
+    levels[2500:] *= -1
+    answered = with_samples(recording(), "response", 4 * levels[:, None])
+    require_something([with_samples(answered, "command", levels[:, None])], ["a"])
+    step = with_samples(recording(), "command", (np.arange(5000) > 2000.0)[:, None].astype(float))
+    assert "cycles of what was commanded, which is too short" in refusal(require_something, [step], ["a"])
+
+
 def test_where_only_the_test_holds_a_response_nothing_can_be_fitted():
     whole = recording()
     roles = (Segment(0, 4000, "noise", 1.0, 0, "fit"), Segment(4000, 5000, "noise", 1.0, 0, "test"))
