@@ -145,11 +145,12 @@ LAW_WORDS: Mapping[str, LawWords] = {
         EffectWords("an actuator that pushes more to one side than to the other"), place="actuator"
     ),
     "added_stiffness": LawWords(EffectWords("a spring that came in", {"stiffness": "{}"}), {"stiffness": _STIFFNESS}),
-    "force_offset": LawWords(EffectWords("an offset of the force", {"offset": "{}"}), {"offset": _FORCE}),
+    "force_offset": LawWords(EffectWords("an offset of the force", {"offset": "{}"}), {"offset": _FORCE}, "actuator"),
     "force_gain_drift": LawWords(
-        EffectWords("a force gain that drifts", {"change": "by {} from beginning to end"}, shares=("change",)), {}
+        EffectWords("a force gain that drifts", {"change": "by {} from beginning to end"}, shares=("change",)),
+        place="actuator",
     ),
-    "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), {}),
+    "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), place="sensor"),
 }
 """Laws of the force balance, and faults beside clean recordings, that no simulation plays."""
 

@@ -38,13 +38,13 @@ class _Axis:
         return undo
 
 
-def actuator_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fault]:
-    """parts: of all that is compared, which the grids span."""
+def actuator_faults(number: int, name: str, parts: Sequence[Taken], by_force: bool) -> Iterator[Fault]:
+    """parts: of all that is compared, which the grids span. by_force: the command is what is told."""
     axis = _Axis(number, name)
     whole = np.concatenate([part.command[:, number] for part in parts])
     top = float(np.abs(whole).max(initial=0.0)) or 1.0
     rms = float(np.std(whole)) or top
-    yield from _gains(axis)
+    yield from _gains(axis, by_force)
     yield axis.fault("force_offset", [Variant((axis.of(lambda u, rate: u + rms),), sized("offset", rms))])
     cubed = Variant((axis.of(lambda u, rate: u + u**3 / top**2),), sized("cubic", 1 / top**2))
     yield axis.fault("actuator_cubic", [cubed])
@@ -58,14 +58,19 @@ def actuator_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[
     yield axis.fault("force_deadband", [_dead(axis, float(width)) for width in rms * np.geomspace(0.02, 1.5, GRID)])
 
 
-def _gains(axis: _Axis) -> Iterator[Fault]:
+def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
+    """A size grows the command that is told where forces are balanced, and else the force that is made of it."""
+
+    def gain(size: float) -> float:
+        return 1 / (1 + size) if by_force else 1 + size
+
     yield axis.fault("force_gain", [
-        Variant((axis.of(lambda u, rate: 2 * u),), lambda s: {"gain": 1 / (1 + float(s[0]))}, -0.9, 20.0,
+        Variant((axis.of(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
                 told=lambda x, rate: 2 * x),
     ])  # fmt: skip
     drift = axis.fault("force_gain_drift", [
         Variant((axis.of(lambda u, rate: u * (1 + np.linspace(0.0, 1.0, len(u)))),),
-                lambda s: {"change": 1 / (1 + float(s[0])) - 1}, -0.9, 20.0,
+                lambda s: {"change": gain(float(s[0])) - 1}, -0.9, 20.0,
                 told=lambda x, rate: x * (1 + np.linspace(0.0, 1.0, len(x)))[:, None]),
     ])  # fmt: skip
     yield replace(drift, varies=True)

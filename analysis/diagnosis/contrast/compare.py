@@ -67,7 +67,9 @@ class Compared:
     plain: FloatArray
     """(blocks,): what is left with nothing undone, as `Weighed.errors`."""
     samples: int
-    """What would be left where each set had a base of its own."""
+    """What would be left where each set had a base of its own,"""
+    faulty_samples: int
+    """and what of the faulty set."""
     held_out: float
     """As `Weighed.held_out`, with nothing undone."""
     faulty_share: float
@@ -112,7 +114,7 @@ def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[
         if timed:
             faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], _turning(recording))
         if not recording.meta.get("imposed"):
-            faults += actuator_faults(axis, name, (*clean, *faulty))
+            faults += actuator_faults(axis, name, (*clean, *faulty), by_force)
     for channel, name in enumerate(recording.response.channels):
         faults += sensor_faults(channel, name, (*clean, *faulty))
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
@@ -157,7 +159,8 @@ def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience
     clean = [stream.grams(stream.clean, []).blocks for stream in streams]
     bare = [Pair(stream.grams(stream.other, []), ALL, tuple(own)) for stream, own in zip(streams, clean, strict=True)]
     plain = fitted(bare, None)
-    samples = sum(stream.clean.count + stream.other.count for stream in streams)
+    own = sum(stream.other.count for stream in streams)
+    samples = own + sum(stream.clean.count for stream in streams)
     best: list[tuple[Fit, Fault, Variant, list[Pair]]] = []
     for fault in faults:
         if not patient():
@@ -178,7 +181,7 @@ def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience
     )
     held = sum(foretold(kept, np.zeros(0), block) for block, kept in enumerate(_apart(bare)))
     usual = max(max(_excesses(each)) for each in (clean, [pair.with_it.blocks for pair in bare]))
-    return Compared(tuple(weighed), plain.errors, samples, held, 0.0, usual, True, 0.0)
+    return Compared(tuple(weighed), plain.errors, samples, own, held, 0.0, usual, True, 0.0)
 
 
 def _excesses(sides: Sequence[FloatArray]) -> Iterator[float]:

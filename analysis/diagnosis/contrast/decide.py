@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t
 
 from analysis.diagnosis.balance.weighed import DRAWS, LEVEL, drawn_of
 from analysis.diagnosis.contrast.compare import LEAST, Compared, Weighed
+from analysis.diagnosis.contrast.stream import FOLDS
 
 BEYOND = 5.0
 """Times the largest gain between stretches of one set that a fault must gain. By hand: of six public
@@ -17,8 +19,8 @@ ALMOST = 0.1
 """Share of a fault's gain by which a rival must stay behind to be told from it."""
 MOST_ALIKE = 4
 """Faults of a class; more of them tell nothing."""
-VAGUE = 1.96
-"""Standard errors from which a number may be none."""
+BOUND = float(t.ppf(0.975, FOLDS - 1))
+"""Standard errors, from so few blocks, of a 95 % interval: within it, a number may be none."""
 SAME = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
@@ -46,27 +48,36 @@ def decide(found: Compared, responses: int) -> Decided:
         return Decided(None, (), 0.0, others)
     best = _plainest(sure)
     rivals = [law for law in sure if law is not best]
-    alike = tuple(rival for rival in rivals if _alike(best, rival, found))
+    told_apart_from = [rival for rival in rivals if not _refines(rival, best)]
+    alike = tuple(rival for rival in told_apart_from if _alike(best, rival, found))
     same = SAME.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
-    names = tuple(dict.fromkeys((*(rival.fault.effect for rival in alike), *same)))
+    names = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in alike), *same))
+                  if name != best.fault.effect)  # fmt: skip
+    elsewhere = [rival.fault.axis for rival in alike if rival.fault.effect == best.fault.effect]
     why_not = ""
     if best.share < MAIN:
         why_not = f"it explains {100 * best.share:.0f} % of what sets these recordings apart: the main part is another"
     elif len(names) >= MOST_ALIKE:
         why_not = "these data cannot tell it from " + ", ".join(names)
+    elif elsewhere:
+        why_not = f"these data cannot tell whether it is on {best.fault.axis} or on {', '.join(elsewhere)}"
     behind = tuple((rival, "another explains more of what sets these recordings apart") for rival in rivals)
     if why_not:
         return Decided(None, (), 0.0, ((best, why_not), *behind, *others))
     left = tuple(item for item in behind if item[0] not in alike)
-    return Decided(best, names, _first(best, rivals), (*left, *others))
+    return Decided(best, names, _first(best, told_apart_from), (*left, *others))
+
+
+def _refines(other: Weighed, best: Weighed) -> bool:
+    """Whether it holds the best as a special case, and so always leaves less."""
+    return best.fault.effect in other.fault.simpler and best.fault.axis == other.fault.axis
 
 
 def _plainest(sure: Sequence[Weighed]) -> Weighed:
     """The one that leaves least; of those that do nearly as well, one that it holds as a special case."""
     best = min(sure, key=lambda each: float(each.errors.sum()))
     for law in sure:
-        plainer = law.fault.effect in best.fault.simpler and law.fault.axis == best.fault.axis
-        if plainer and law.gain >= (1 - ALMOST) * best.gain:
+        if _refines(best, law) and law.gain >= (1 - ALMOST) * best.gain:
             return law
     return best
 
@@ -77,7 +88,7 @@ def _why_not(weighed: Weighed) -> str:
     if weighed.gain <= BEYOND * weighed.usual:
         return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
     main = next(iter(weighed.values))
-    if abs(_distance(weighed, main)) <= VAGUE * weighed.spread[main]:
+    if abs(_distance(weighed, main)) <= BOUND * weighed.spread[main]:
         return "the interval of its number holds none"
     return ""
 

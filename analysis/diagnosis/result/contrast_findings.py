@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.contrast.compare import Compared, Weighed
-from analysis.diagnosis.contrast.decide import Decided
+from analysis.diagnosis.contrast.decide import BOUND, Decided
+from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import si_unit
@@ -76,16 +77,13 @@ def _compared(
 
 def _errors(found: Compared, before: float, after: float) -> Errors:
     """Of the faulty set, as shares of its signal."""
-    own = found.samples / 2
-    sizes = [float(np.sqrt(left / own)) * found.faulty_share for left in (before, after)]
+    sizes = [float(np.sqrt(left / found.faulty_samples)) * found.faulty_share for left in (before, after)]
     return Errors(sizes[0], sizes[0], sizes[1], None)
 
 
 def _named(best: Weighed, decided: Decided, recording: Recording, rotational: bool) -> NamedEffect:
     effect = best.fault.effect
-    rivals = tuple(
-        Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike if name != effect
-    )
+    rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
     return NamedEffect(
         effect=effect,
         place=best.fault.place,
@@ -104,21 +102,24 @@ def _axis(weighed: Weighed, recording: Recording) -> str | None:
 
 
 def _estimates(weighed: Weighed, recording: Recording, rotational: bool) -> dict[str, Estimate]:
-    units = _units(weighed.fault.effect, weighed.fault.site, recording, rotational)
+    units = _units(weighed.fault, recording, rotational)
     return {
-        name: Estimate(value, units.get(name, "1"), (value - 1.96 * spread, value + 1.96 * spread) if spread else None)
+        name: Estimate(
+            value, units.get(name, "1"), (value - BOUND * spread, value + BOUND * spread) if spread else None
+        )
         for (name, value), spread in zip(weighed.values.items(), weighed.spread.values(), strict=True)
     }
 
 
-def _units(effect: str, site: int, recording: Recording, rotational: bool) -> Mapping[str, str]:
-    known = EFFECTS_BY_NAME.get(effect)
-    read = recording.response.units[max(site, 0)]
-    if known is None:
-        return {
-            name: si_unit(effect, name, rotational) for name in ("stiffness", "offset", "cubic", "change", "square")
-        }
-    return {parameter.name: parameter.unit_in(rotational, read) for parameter in known.parameters}
+def _units(fault: Fault, recording: Recording, rotational: bool) -> Mapping[str, str]:
+    """By number. A fault of the sensor counts in what it reads, an offset of the command in what was commanded."""
+    if fault.effect in EFFECTS_BY_NAME:
+        read = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
+        return {each.name: each.unit_in(rotational, read) for each in EFFECTS_BY_NAME[fault.effect].parameters}
+    signal = recording.response if fault.place == "sensor" else recording.command
+    unit = signal.units[max(fault.site, 0)]
+    stiffness = si_unit(fault.effect, "stiffness", rotational)
+    return {"stiffness": stiffness, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
 
 
 def _candidate(weighed: Weighed, why: str, recording: Recording) -> Candidate:

@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from analysis.diagnosis import diagnose as engine
 from analysis.diagnosis.contrast.compare import compared
 from analysis.diagnosis.contrast.decide import Decided, decide
 from analysis.diagnosis.contrast.lines import hum_of
+from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.rigid_model import rigid_model
+from analysis.diagnosis.result.contrast_findings import _named
 from analysis.diagnosis.search.by_contrast import Contrast, contrast_of
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from analysis.diagnosis.types import Patience
@@ -88,6 +91,70 @@ def test_what_came_since_is_named_with_its_place_and_number(change, level, numbe
     assert found.named is not None
     assert (found.named.fault.effect, found.named.fault.place) == (change, place)
     assert found.named.values[number] == pytest.approx(level, rel=0.15)
+
+
+def two_drives(seed: int, gain: float = 1.0) -> Recording:
+    """Two drives push one body; the second gives `gain` of what it is commanded."""
+    random, count, dt = np.random.default_rng(seed), 3000, 1 / RATE_HZ / 4
+    drives = lfilter([0.05], [1.0, -0.95], random.standard_normal((count, 2)), axis=0)
+    position, q, v = np.zeros(count), 0.0, 0.0
+    for k, push in enumerate(drives @ [1.0, 0.7 * gain]):
+        position[k] = q
+        for _ in range(4):
+            v += dt * (push - 2 * v - 100 * q) / 0.3
+            q += dt * v
+    position += 1e-4 * position.std() * random.standard_normal(count)
+    return Recording(
+        "rig",
+        Signal(drives, RATE_HZ, "force", "N", ("fx", "fy")),
+        Signal(position[:, None], RATE_HZ, "position", "m", ("x",)),
+    )
+
+
+@pytest.mark.parametrize("gain", [0.6, 1.4])
+def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(gain):
+    faulty = two_drives(3, gain)
+    found = compared([faulty], [two_drives(4)], frozenset(), patient)
+    assert found is not None and not found.by_force
+    answer = decide(found, 1)
+    assert answer.named is not None
+    named = _named(answer.named, answer, faulty, False)
+    assert (named.effect, named.axis) == ("force_gain", "y")
+    assert named.parameters["gain"].value == pytest.approx(gain, rel=0.05)
+
+
+def test_two_drives_of_one_body_in_order_name_nothing():
+    found = compared([two_drives(5)], [two_drives(4)], frozenset(), patient)
+    assert found is not None
+    assert decide(found, 1).named is None
+
+
+def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there_are():
+    """Scaled by its own error, what is left of a set is at least as much as a description of its own leaves."""
+    only = frozenset(UNDONE) - {"viscous_damping"}
+    for clean in ([recording(1)], [recording(seed) for seed in (1, 3, 4, 5)]):
+        found = compared([recording(2, "viscous_damping", 2.0)], clean, only, patient)
+        assert found is not None
+        assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
+        assert 1.0 <= found.plain[:FOLDS].sum() / found.faulty_samples < 2.0
+
+
+def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability():
+    found = decided(recording(2, "coulomb_friction", 0.6))
+    assert found.named is not None and found.named.fault.effect == "coulomb_friction"
+    assert "asymmetric_friction" not in found.alike
+    assert found.probability > 0.9
+
+
+def test_a_fault_that_may_sit_on_either_of_two_axes_is_not_named():
+    found = compared([recording(2, "added_mass", 0.3)], [recording(1)], frozenset(), patient)
+    assert found is not None
+    best = decide(found, 1).named
+    assert best is not None
+    twin = replace(best, fault=replace(best.fault, axis="fy", site=1))
+    answer = decide(replace(found, weighed=(best, twin)), 1)
+    assert answer.named is None
+    assert "fy" in answer.others[0][1]
 
 
 @pytest.mark.parametrize("seed", [2, 3])
