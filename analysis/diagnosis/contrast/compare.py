@@ -78,6 +78,8 @@ class Compared:
     """The largest excess between stretches of one set; see `excess`."""
     by_force: bool
     step_s: float
+    complete: bool
+    """All faults were weighed: the time did not run out before."""
 
     @property
     def excess(self) -> float:
@@ -162,6 +164,7 @@ def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience
     own = sum(stream.other.count for stream in streams)
     samples = own + sum(stream.clean.count for stream in streams)
     best: list[tuple[Fit, Fault, Variant, list[Pair]]] = []
+    complete = False
     for fault in faults:
         if not patient():
             break
@@ -175,13 +178,15 @@ def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience
                 tried.append((fitted(pairs, variant), fault, variant, pairs))
         if tried:
             best.append(min(tried, key=lambda each: each[0].error))
+    else:
+        complete = True
     best.sort(key=lambda each: each[0].error)
     weighed = sorted(
         (_weighed(streams, found, plain, samples) for found in best), key=lambda each: float(each.errors.sum())
     )
     held = sum(foretold(kept, np.zeros(0), block) for block, kept in enumerate(_apart(bare)))
     usual = max(max(_excesses(each)) for each in (clean, [pair.with_it.blocks for pair in bare]))
-    return Compared(tuple(weighed), plain.errors, samples, own, held, 0.0, usual, True, 0.0)
+    return Compared(tuple(weighed), plain.errors, samples, own, held, 0.0, usual, True, 0.0, complete)
 
 
 def _excesses(sides: Sequence[FloatArray]) -> Iterator[float]:

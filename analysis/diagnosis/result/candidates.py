@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.reduced_recordings import linear_laws
 from analysis.diagnosis.balance.weigh import SMALL, Balance
 from analysis.diagnosis.balance.weighed import Weighed
@@ -23,7 +24,7 @@ def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: t
     if not balances:
         return diagnosis
     weighed = {
-        (law.law.effect, axis_letter(channels[axis], channels)): law
+        (law.law.effect, axis_letter(channels[axis], channels)): (law, _taken(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
     }
@@ -100,10 +101,18 @@ def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(first.values())
 
 
-def _with_class(effect: NamedEffect, weighed: Weighed | None) -> NamedEffect:
-    if weighed is None:
+def _taken(balance: Balance, law: Weighed) -> float:
+    """Share of the linear model's held-out error power that goes with a law; its own is of what all laws take."""
+    whole = 1.0 if law.place == NO_COLUMN else 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2
+    return min(max(whole * law.share, 0.0), 1.0)
+
+
+def _with_class(effect: NamedEffect, found: tuple[Weighed, float] | None) -> NamedEffect:
+    """found: the law as it was weighed, and its share of the mismatch."""
+    if found is None:
         late = effect.effect in LATE
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
+    weighed, share = found
     rivals = tuple(
         Rival(name, 0.0, True, "as good in its place on held-out data")
         for name in weighed.alike
@@ -112,7 +121,7 @@ def _with_class(effect: NamedEffect, weighed: Weighed | None) -> NamedEffect:
     alike = (effect.effect, *weighed.alike) if weighed.alike else ()
     return replace(
         effect,
-        share=min(max(weighed.share, 0.0), 1.0),
+        share=share,
         probability=weighed.probability,
         rivals=(*effect.rivals, *rivals),
         class_=alike,

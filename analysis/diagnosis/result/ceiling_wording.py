@@ -7,6 +7,9 @@ from analysis.diagnosis.settings import SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, share_text
 from analysis.wording import capital
 
+SAME = 1e-9
+"""Share by which two errors of the same numbers may differ by rounding."""
+
 
 def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     if box is None:
@@ -32,10 +35,15 @@ def ceiling_sentences(reached: Sequence[Reached]) -> tuple[str, ...]:
 
 def _ceiling(one: Reached, single: bool) -> str:
     along = "" if single else f" along {one.axis}"
-    share = f"; that is {share_text(one.share)} of the way" if one.named < one.linear else ""
-    named = f"what is named leaves {error_text(one.named)}" if one.any_named else "no law is named"
-    return (
+    alone = (
         f"In the force balance{along}, on held-out data, mass, damping and stiffness alone leave "
-        f"{error_text(one.linear)} of the force, and all laws together {error_text(one.ceiling)}, which no sum of a "
-        f"few laws should be expected to beat: {named}{share}."
+        f"{error_text(one.linear)} of the force"
+    )
+    named = f"what is named leaves {error_text(one.named)}" if one.any_named else "no law is named"
+    if one.any_named and one.named <= one.ceiling * (1 + SAME):
+        return f"{alone}, {named}, and all laws together leave no less."
+    share = f"; that is {share_text(one.share)} of the way" if one.named < one.linear else ""
+    return (
+        f"{alone}, and all laws together {error_text(one.ceiling)}, which no sum of a few laws should be expected to "
+        f"beat: {named}{share}."
     )

@@ -13,6 +13,7 @@ from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, 
 from analysis.diagnosis.effect_words import si_unit
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.by_contrast import AS_ONE, Contrast
+from analysis.diagnosis.search.patience import OUT_OF_TIME
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -25,6 +26,10 @@ BESIDE = (
     "laws they ask for: a fault is what the clean ones lack. It counts beyond {:.3g} times what it would gain between "
     "stretches of either."
 )
+NOT_COMPARED = (
+    "The recordings could not be compared with the clean ones: too little was recorded without gaps, or the fits broke "
+    "down. What is said here is of the model alone."
+)
 BY_ITSELF = "This is seen in the readings themselves, and not in those of the clean recordings; no model was asked."
 
 
@@ -32,12 +37,12 @@ def with_contrast(whole: Findings, found: Contrast, recording: Recording, beyond
     if found.compared is None or found.decided is None:
         named = _shown(found, recording)
         if named is None:
-            return whole
+            return replace(whole, remarks=(NOT_COMPARED, *whole.remarks))
         diagnosis = _with(whole.diagnosis, "partly_explained", (named,), ())
         remarks: tuple[str, ...] = (BY_ITSELF,)
     else:
         diagnosis = _compared(whole.diagnosis, found.compared, found.decided, recording, whole.given.rotational)
-        remarks = (BESIDE.format(beyond),)
+        remarks = (BESIDE.format(beyond), *(() if found.compared.complete else (OUT_OF_TIME,)))
     improved = _improved(whole.given, diagnosis.effects)
     return replace(
         whole, diagnosis=diagnosis, improved=improved, remarks=(*remarks, *whole.remarks), proposal=None, black_box=None

@@ -14,10 +14,10 @@ from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.rigid_model import rigid_model
-from analysis.diagnosis.result.contrast_findings import _named
+from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, _named, with_contrast
 from analysis.diagnosis.search.by_contrast import Contrast, contrast_of
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.search.patience import OUT_OF_TIME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -70,8 +70,8 @@ def patient() -> bool:
     return True
 
 
-def decided(faulty: Recording, without: frozenset[str] = frozenset(), wait: Patience = patient) -> Decided:
-    found = compared([faulty], [recording(1)], without, wait)
+def decided(faulty: Recording, without: frozenset[str] = frozenset()) -> Decided:
+    found = compared([faulty], [recording(1)], without, patient)
     assert found is not None
     return decide(found, 1)
 
@@ -193,7 +193,9 @@ def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none():
 
 
 def test_what_is_cut_short_ends_with_what_it_has():
-    assert decided(recording(2, "added_mass", 0.3), wait=lambda: False).named is None
+    found = compared([recording(2, "added_mass", 0.3)], [recording(1)], frozenset(), lambda: False)
+    assert found is not None and not found.complete
+    assert decide(found, 1).named is None
 
 
 def contrast(change: str = "", level: float = 0.0, without: tuple[str, ...] = (), seed: int = 2) -> Contrast:
@@ -208,7 +210,9 @@ def test_a_fault_that_the_comparison_cannot_undo_is_left_open():
 
 
 def test_nothing_is_left_open_where_a_fault_is_named():
-    assert not contrast("coulomb_friction", 0.6).left_open
+    found = contrast("coulomb_friction", 0.6)
+    assert not found.left_open
+    assert found.compared is not None and found.compared.complete
 
 
 @pytest.mark.parametrize("seed", [2, 3])
@@ -232,3 +236,7 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
     assert found.diagnosis.verdict == "unexplained"
     assert found.diagnosis.candidates
     assert not found.diagnosis.effects
+    assert not {NOT_COMPARED, OUT_OF_TIME} & set(found.remarks)
+    assert NOT_COMPARED in with_contrast(found, Contrast(None, None, None, None), faulty, 5.0).remarks
+    part = contrast_of([faulty], [clean], frozenset(), lambda: False)
+    assert OUT_OF_TIME in with_contrast(found, part, faulty, 5.0).remarks

@@ -108,4 +108,6 @@ def test_the_share_of_the_ceiling_is_one_of_powers():
     assert said.endswith("what is named leaves 30 %; that is 67 % of the way.")
     (nothing,) = ceiling_sentences((Reached("x", 0.5, 0.5, 0.1, False),))
     assert nothing.endswith("no law is named.")
+    (best,) = ceiling_sentences((Reached("x", 0.5, 0.1, 0.1, True),))
+    assert best.endswith("what is named leaves 10 %, and all laws together leave no less.")
     assert ceiling_sentences((Reached("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith("In the force balance along x,")

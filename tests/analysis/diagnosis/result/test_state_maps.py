@@ -121,5 +121,18 @@ def test_what_stands_in_a_class_is_no_candidate_beside_it(with_friction):
     ]
 
 
+def test_a_law_that_leaves_a_remainder_explains_less_than_all(with_friction):
+    """It takes all that all laws together take; these leave half of the linear model's error."""
+    balance, _, recording = with_friction
+    (weighed, *_) = balance.laws
+    level = {name: Estimate(value, "N") for name, value in weighed.values.items()}
+    effect = NamedEffect(weighed.law.effect, "mechanism", "force", 0.9, 0.9, level)
+    named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
+    half = replace(balance, laws=(replace(weighed, share=1.0),), linear=0.2, error=0.1, ceiling=0.1)
+    assert with_balances(named, (half,), recording.command.channels).effects[0].share == pytest.approx(0.75)
+    whole = replace(half, ceiling=0.0)
+    assert with_balances(named, (whole,), recording.command.channels).effects[0].share == pytest.approx(1.0)
+
+
 def _rival(weighed):
     return replace(weighed, law=replace(weighed.law, effect="stribeck_friction"), why_not="too little")
