@@ -5,9 +5,11 @@ from typing import Annotated
 
 import typer
 
+from study.cli.command_groups import CommandGroups
 from study.cli.seed import checked_seed
 
 app = typer.Typer(
+    cls=CommandGroups,
     help="A blind test on your own device: draw what is changed, seal it, score it (docs/kit.md).",
     no_args_is_help=True,
     rich_markup_mode=None,

@@ -21,7 +21,9 @@ def real(
     inject: Annotated[
         int,
         typer.Option(
-            min=0, max=10_000, help="So many draws of faults, half of them of none, are injected under a seal, and looked for."
+            min=0,
+            max=10_000,
+            help="So many draws of faults, half of them of none, are injected under a seal, and looked for.",
         ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Of the draws of these faults.")] = 1,

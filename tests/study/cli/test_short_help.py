@@ -19,3 +19,26 @@ def test_the_short_option_says_what_the_long_one_says(path):
     assert short.exit_code == 0
     assert short.output == long.output
     assert "-h, --help" in short.output
+
+
+GROUPS = [command for command in commands(typer.main.get_command(app)) if command in ((), ("kit",), ("protocol",))]
+
+
+@pytest.mark.parametrize("path", GROUPS, ids=lambda path: " ".join(path) or "hapteq")
+def test_lists_of_commands_are_whole_at_80_columns(path):
+    usage, *lines = CliRunner().invoke(app, [*path, "-h"], env={"COLUMNS": "80"}).output.splitlines()
+    assert usage.startswith("Usage:")
+    assert max(map(len, lines)) <= 80
+    assert not [line for line in lines if "..." in line]
+
+
+def test_every_command_stands_under_a_heading():
+    said = CliRunner().invoke(app, ["-h"]).output
+    assert [line for line in said.splitlines() if line.endswith(":") and not line.startswith(" ")] == [
+        "Options:", "Study:", "Analysis:", "Device:", "Diagnosis:", "Evaluation:",
+    ]  # fmt: skip
+
+
+def test_a_shell_can_complete_commands():
+    said = CliRunner().invoke(app, ["--show-completion", "bash"]).output
+    assert "_HAPTEQ_COMPLETE" in said
