@@ -29,15 +29,17 @@ def entered_force(
 
 
 def force_along(
-    model: MechanicalModel, effects: Sequence[PlacedEffect], motion: Motion, pushing: FloatArray, sample_rate_hz: float
-) -> FloatArray:
-    """(n, m): what the effects' forces at the driven axes add along the motion. pushing: (n, m), the force over each
-    step that the motion takes beside the linear model; what sticks answers to it."""
+    model: MechanicalModel, effects: Sequence[PlacedEffect], motion: Motion, forces: tuple[FloatArray, FloatArray],
+    sample_rate_hz: float,
+) -> FloatArray:  # fmt: skip
+    """(n, m): what the effects' forces at the driven axes add along the motion. forces: (n, m) each, the commands, and
+    the force over each step that the motion takes beside the linear model; what sticks answers to it."""
+    commands, pushing = forces
     bodies = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, AxisForce)])
     if not bodies.acts:
         return np.zeros_like(pushing)
     axes = tuple(range(model.inputs))
-    forces = forces_of(bodies, axes)
+    acting = forces_of(bodies, axes)
     steps = linear_steps(model, 1 / sample_rate_hz)
     per_newton = np.vstack(
         [_own(steps.motion[: 2 * len(axes)] @ steps.by_axis_force), _own(steps.motion_by_axis_force[2 * len(axes) :])]
@@ -48,7 +50,8 @@ def force_along(
         # numba calls functions that are passed as values an experimental feature.
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         follow(
-            forces.laws, forces.places, forces.of, forces.memory, (position, velocity, acceleration),
+            acting.laws, acting.places, acting.of, acting.memory, (position, velocity, acceleration),
+            np.ascontiguousarray(commands, dtype=np.float64) if acting.sees else np.empty((0, 0)),
             per_newton, force, 1 / sample_rate_hz,
         )  # fmt: skip
     return force

@@ -12,6 +12,16 @@ from equalizer.effects.instant import (
     A_PER_N,
     F_END,
     LENGTH,
+    SEEN,
+    SEEN_A,
+    SEEN_A_PER_N,
+    SEEN_COMMAND,
+    SEEN_V,
+    SEEN_V_END,
+    SEEN_V_PER_N,
+    SEEN_X,
+    SEEN_X_END,
+    SEEN_X_PER_N,
     STEP_S,
     TIME_S,
     V_FREE,
@@ -29,26 +39,43 @@ _MATRIX = types.float64[:, ::1]
 _THREE = types.UniTuple(_MATRIX, 3)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
 
+Motion = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@njit(inline="always")
+def _see(k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: FloatArray, at: FloatArray) -> None:
+    """How all axes move. What a force at one of them does to the others is in their motion already."""
+    for other in range(commands.shape[1]):
+        begin, own = LENGTH + SEEN * other, 1.0 if other == axis else 0.0
+        at[begin + SEEN_X], at[begin + SEEN_V] = motion[0][k, other], motion[1][k, other]
+        at[begin + SEEN_X_END], at[begin + SEEN_V_END] = motion[0][k + 1, other], motion[1][k + 1, other]
+        at[begin + SEEN_X_PER_N], at[begin + SEEN_V_PER_N] = own * per_newton[0, other], own * per_newton[1, other]
+        at[begin + SEEN_A], at[begin + SEEN_A_PER_N] = motion[2][k, other], own * per_newton[2, other]
+        at[begin + SEEN_COMMAND] = commands[k, other]
+
+
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
 
     @njit(
-        types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, _MATRIX, _MATRIX, types.float64),
+        types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, _MATRIX, _MATRIX, _MATRIX, types.float64),
         cache=True, nogil=True, error_model="numpy",
     )  # fmt: skip
     def follow(  # noqa: PLR0913 - a kernel takes flat arrays
         laws: Any, places: Integers, of: FloatArray, memory: FloatArray,
-        motion: tuple[FloatArray, FloatArray, FloatArray], per_newton: FloatArray, force: FloatArray, step_s: float,
+        motion: Motion, commands: FloatArray, per_newton: FloatArray,
+        force: FloatArray, step_s: float,
     ) -> None:  # fmt: skip
-        """motion: positions, velocities and accelerations, (n, m) each. per_newton: (3, m), what 1 N over a step adds
-        to them. force: (n, m), what pushes beside the linear model, known from the motion, each over the step that
-        begins there; becomes the sum of the laws' forces. Friction at rest does not follow from the motion, but from
-        what pushes against it.
+        """motion: positions, velocities and accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law sees
+        them. per_newton: (3, m), what 1 N over a step adds to the motion. force: (n, m), what pushes beside the linear
+        model, known from the motion, each over the step that begins there; becomes the sum of the laws' forces.
+        Friction at rest does not follow from the motion, but from what pushes against it.
 
         places: (items, 6) law, axis, begin and end in `of`, begin and end in `memory`.
         """
         position, velocity, acceleration = motion
-        at = np.zeros(LENGTH)
+        sees = commands.shape[0] > 0
+        at = np.zeros(LENGTH + SEEN * force.shape[1] if sees else LENGTH)
         at[STEP_S] = step_s
         for k in range(len(position) - 1):
             at[TIME_S] = k * step_s
@@ -62,6 +89,11 @@ with warnings.catch_warnings():
                 at[V_FREE] = velocity[k + 1, axis] + at[V_PER_N] * pushing[axis]
                 at[A_FREE] = acceleration[k, axis] + at[A_PER_N] * pushing[axis]
                 at[F_END] = np.nan
+                if sees:
+                    _see(k, axis, motion, commands, per_newton, at)
+                    at[LENGTH + SEEN * axis + SEEN_X_END] = at[X_FREE]
+                    at[LENGTH + SEEN * axis + SEEN_V_END] = at[V_FREE]
+                    at[LENGTH + SEEN * axis + SEEN_A] = at[A_FREE]
                 kept = memory[places[item, 4] : places[item, 5]]
                 added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], kept, at)
                 force[k, axis] += added

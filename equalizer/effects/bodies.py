@@ -29,6 +29,11 @@ class Bodies:
     numbers: tuple[FloatArray, ...]
     """What each force's law finds in `of`."""
 
+    @property
+    def sees(self) -> bool:
+        """Whether some law asks for all axes and commands."""
+        return any(isinstance(act, AxisForce) and act.sees for act in self.acts)
+
 
 def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
     """Raises ValueError where an effect befalls an axis that is not there."""
@@ -79,9 +84,12 @@ def moved(
     (n, r), the forces. Without the motion (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps. From rest where
     there are no restarts."""
     linear = linear_steps(bodies.structure, step_s, bodies.ports)
-    ports = tuple(sorted(set(bodies.port)))
+    ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
     steps, stride = size[1], len(driven.mean) // size[0]
-    stepping = pushed(linear, forces_of(bodies, ports), steps, stride) if ports else coasting(linear, steps, stride)
+    commanded = driven.mean if driven.commanded is None else driven.commanded
+    stepping = (
+        pushed(linear, forces_of(bodies, ports), steps, stride, commanded) if ports else coasting(linear, steps, stride)
+    )
     look = _looked_at(linear, stepping.outward, ports, motion)
     looked, added = np.empty((size[0], look.shape[1])), np.zeros((size[0], bodies.ports.shape[1] if motion else 0))
     inner, rows = len(look) - driven.end.shape[1], stepping.rows
@@ -150,4 +158,5 @@ def forces_of(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
         np.concatenate([*bodies.numbers, [0.0]]),
         np.zeros(kept + 1),
         any(act.acceleration for act in bodies.acts),
+        bodies.sees,
     )

@@ -19,6 +19,8 @@ class Driven:
     """(n steps, m): over each step."""
     end: FloatArray
     """(n steps, m): just before the next one."""
+    commanded: FloatArray | None = None
+    """(n steps, m): before effects and actuator; None: the same as `mean`."""
 
 
 def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
@@ -37,10 +39,14 @@ def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: 
         mean, end = mean.copy(), end.copy()
     for placed in effects:
         acts, values = placed.effect.acts, placed.values
+        before = mean.copy() if isinstance(acts, OnCommand) and acts.of_all is not None else mean
         for site in placed.sites if isinstance(acts, OnCommand) else ():
             assert isinstance(acts, OnCommand)
             if not 0 <= site < mean.shape[1]:
                 raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; there are {mean.shape[1]}")
+            if acts.of_all is not None:
+                mean[:, site], end[:, site] = acts.of_all(before, site, step_s, values)
+                continue
             at_end = acts.change if acts.at_end is None else acts.at_end
             last = at_end(end[:, site] if acts.at_end is None else mean[:, site], step_s, values)
             mean[:, site], end[:, site] = acts.change(mean[:, site], step_s, values), last
@@ -52,7 +58,7 @@ def driven_by(model: MechanicalModel, commands: Driven, step_s: float, effects: 
         mean, end = delayed(mean, step_s, known.delay_s), delayed_at_end(end, step_s, known.delay_s)
     if known.limit > 0:
         mean, end = np.clip(mean, -known.limit, known.limit), np.clip(end, -known.limit, known.limit)
-    return Driven(mean, end)
+    return Driven(mean, end, commands.mean)
 
 
 def finer(commands: FloatArray, steps: int, hold: Hold) -> Driven:

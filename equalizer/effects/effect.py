@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from equalizer.effects.evidence import Evidence
+from equalizer.laws.law import Law
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -62,6 +63,8 @@ class AxisForce:
     """At least so many per sample."""
     acceleration: bool = False
     """The law asks for accelerations, which are not computed otherwise."""
+    sees: bool = False
+    """The law asks for the motion of all driven axes and for the commands, which it is not shown otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +92,9 @@ class OnCommand:
     """It moves between samples, so that it must be followed more finely than they come."""
     at_end: Callable[[FloatArray, float, Values], FloatArray] | None = None
     """Such a one's force at the end of each step, from the same means; else `change` does for both."""
+    of_all: Callable[[FloatArray, int, float, Values], tuple[FloatArray, FloatArray]] | None = None
+    """In place of the above where it hangs on other channels too: samples (n, m), channel, seconds, values; the force
+    (n,) over each step and at its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +146,8 @@ class Effect:
     """The vocabulary's numbers from the fitted ones, where these say more than a reader wants."""
     alike: Callable[[Values], tuple[Values, ...]] = lambda values: ()
     """Other numbers that do almost the same as given ones, so that a fit may have ended at the wrong of them."""
+    law: Law | None = None
+    """Of an effect that has no name of its own: its formula."""
     of_time: bool = False
     """It hangs on when in a recording a sample was taken, or on rare events: no part of a recording stands for all."""
 

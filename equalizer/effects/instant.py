@@ -18,3 +18,8 @@ F_END = 10
 """For the law to fill: its force at the step's very end, which an acceleration shows. Where it leaves that as it is,
 not a number, the mean over the step is taken."""
 LENGTH = 11
+SEEN_X, SEEN_V, SEEN_X_END, SEEN_V_END, SEEN_X_PER_N, SEEN_V_PER_N, SEEN_A, SEEN_A_PER_N, SEEN_COMMAND = range(9)
+"""Of every driven axis, for effects that say that their law sees them: position and velocity at the start and, without
+this force, at the end of the step, what 1 N of this force adds to these; the acceleration likewise; and the command.
+Axis by axis from LENGTH on, SEEN numbers each."""
+SEEN = 9

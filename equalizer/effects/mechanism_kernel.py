@@ -17,6 +17,16 @@ from equalizer.effects.instant import (
     A_PER_N,
     F_END,
     LENGTH,
+    SEEN,
+    SEEN_A,
+    SEEN_A_PER_N,
+    SEEN_COMMAND,
+    SEEN_V,
+    SEEN_V_END,
+    SEEN_V_PER_N,
+    SEEN_X,
+    SEEN_X_END,
+    SEEN_X_PER_N,
     STEP_S,
     TIME_S,
     V_FREE,
@@ -26,6 +36,7 @@ from equalizer.effects.instant import (
     V,
     X,
 )
+from equalizer.effects.linear_step_kernel import FAST, go
 from equalizer.signals.signal import FloatArray
 
 LAWS = 6
@@ -44,7 +55,6 @@ Four = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 _FOUR = types.UniTuple(_MATRIX, 4)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), LAWS)  # type: ignore[no-untyped-call]
 _COUNT = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
-_FAST = {"reassoc", "contract"}
 _NOW_X, _NOW_V, _NEXT_X, _NEXT_V, _A, _FORCE, _FORCE_END = range(7)
 PORT_ROWS = 7
 """Rows of what is known of each port: position and velocity at a step's start and, so far, end; acceleration at its
@@ -56,42 +66,6 @@ def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         return njit(LAW, cache=True, error_model="numpy")(law)
-
-
-@njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=_FAST)
-def _go_together(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step, of coordinates that do not come apart. advance: (s, s), transposed."""
-    before = state.copy()
-    state[:] = added[: state.shape[0]]
-    for j in range(state.shape[0]):
-        for i in range(state.shape[0]):
-            state[i] += advance[j, i] * before[j]
-
-
-@njit(inline="always")
-def _go(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step. advance: (4, s / 2) or (s, s), see `equalizer.effects.modal_form`. added: (s, ...), by commands."""
-    half = state.shape[0] // 2
-    if advance.shape[1] != half:
-        _go_together(advance, added, state)
-        return
-    for i in range(half):
-        first, second = state[i], state[half + i]
-        state[i] = advance[0, i] * first + advance[1, i] * second + added[i]
-        state[half + i] = advance[2, i] * first + advance[3, i] * second + added[half + i]
-
-
-@njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=_FAST)
-def coast(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
-    """Motion without further forces. rows: (n, s ...), what the commands add over each step; becomes the state before
-    each. state: (s,), becomes that of the end."""
-    size = state.shape[0]
-    added = np.empty(size)
-    for k in range(rows.shape[0]):
-        for i in range(size):
-            added[i] = rows[k, i]
-            rows[k, i] = state[i]
-        _go(advance, added, state)
 
 
 @njit(inline="always")
@@ -148,6 +122,19 @@ def _act(per_newton: FloatArray, port: int, mean: float, end: float, ports: Floa
         ports[_A, other] += per_newton[port, 2 * count + other] * mean
 
 
+@njit(inline="always")
+def _see(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
+    """How all ports move, for the force at one of them."""
+    count = ports.shape[1]
+    for other in range(count):
+        begin = LENGTH + SEEN * other
+        at[begin + SEEN_X], at[begin + SEEN_V] = ports[_NOW_X, other], ports[_NOW_V, other]
+        at[begin + SEEN_X_END], at[begin + SEEN_V_END] = ports[_NEXT_X, other], ports[_NEXT_V, other]
+        at[begin + SEEN_X_PER_N] = per_newton[port, other]
+        at[begin + SEEN_V_PER_N] = per_newton[port, count + other]
+        at[begin + SEEN_A], at[begin + SEEN_A_PER_N] = ports[_A, other], per_newton[port, 2 * count + other]
+
+
 with warnings.catch_warnings():
     # Laws are passed as values, so that a changed law never runs as it was in a kept kernel.
     warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
@@ -168,6 +155,8 @@ with warnings.catch_warnings():
         at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
         at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
         at[F_END] = np.nan
+        if at.shape[0] > LENGTH:
+            _see(per_newton, port, ports, at)
         mean = law(of, memory, at)
         end = mean if np.isnan(at[F_END]) else at[F_END]
         _act(per_newton, port, mean, end, ports)
@@ -175,7 +164,7 @@ with warnings.catch_warnings():
 
     @njit(
         types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR),
-        cache=True, nogil=True, error_model="numpy", fastmath=_FAST,
+        cache=True, nogil=True, error_model="numpy", fastmath=FAST,
     )  # fmt: skip
     def _push(  # noqa: PLR0913 - a kernel takes flat arrays
         laws: Any, places: Integers, of: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
@@ -196,16 +185,17 @@ with warnings.catch_warnings():
                 )
 
     @njit(
-        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, _MATRIX, _VECTOR, _COUNT, types.float64),
-        cache=True, nogil=True, error_model="numpy", fastmath=_FAST,
+        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _COUNT, types.float64),
+        cache=True, nogil=True, error_model="numpy", fastmath=FAST,
     )  # fmt: skip
     def play(  # noqa: PLR0913 - a kernel takes flat arrays
         laws: Any, places: Integers, of: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
-        ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
+        commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
     ) -> None:  # fmt: skip
         """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
         ports' accelerations at its start; a sample's first row becomes the state before it and the forces (r,) just
-        then. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
+        then. commands: (n stride, m), or (0, 0) where no law sees them. ports: (PORT_ROWS, r) and state: (s,) become
+        those of the end.
 
         places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. step: how the state advances,
         the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
@@ -215,7 +205,8 @@ with warnings.catch_warnings():
         advance, look, by_force, per_newton = step
         steps, stride, begun = count
         size, r = state.shape[0], ports.shape[1]
-        added, at = np.empty(size + r), np.zeros(LENGTH)
+        sees = commands.shape[0] > 0
+        added, at = np.empty(size + r), np.zeros(LENGTH + SEEN * r if sees else LENGTH)
         own, law = np.zeros((2, places.shape[0])), laws[places[0, 0]]
         its, its_memory = of[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
         at[STEP_S], ports[_A] = step_s, np.nan
@@ -224,15 +215,17 @@ with warnings.catch_warnings():
                 if now == 0 or stride > 1:
                     for i in range(size + r):
                         added[i] = rows[k * stride + now, i]
+                    for axis in range(commands.shape[1]):
+                        at[LENGTH + SEEN * axis + SEEN_COMMAND] = commands[k * stride + now, axis]
                 if now == 0:
                     _keep(state, ports, rows[k * stride])
                 if look.shape[0] > 2 * r:
                     _feel(look, added, state, ports)
-                _go(advance, added, state)
+                go(advance, added, state)
                 _aim(look, state, ports)
                 at[TIME_S] = ((begun + k) * steps + now) * step_s
                 if places.shape[0] == 1:
-                    _push_at(law, its, its_memory, 0, per_newton, ports, at)
+                    _push_at(law, its, its_memory, places[0, 1], per_newton, ports, at)
                 else:
                     _push(laws, places, of, memory, per_newton, ports, own, at)
                 _land(by_force, state, ports)

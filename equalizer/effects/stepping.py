@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from equalizer.effects.mechanism_kernel import PORT_ROWS, Integers, coast, play
+from equalizer.effects.linear_step_kernel import coast
+from equalizer.effects.mechanism_kernel import PORT_ROWS, Integers, play
 from equalizer.effects.modal_form import step_form
 from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
@@ -29,6 +30,8 @@ class Forces:
     memory: FloatArray
     acceleration: bool
     """Some law asks for it."""
+    sees: bool
+    """Some law asks for all axes and commands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +70,8 @@ def coasting(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, begin)
 
 
-def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int) -> Stepping:
+def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
+    """commanded: (n stride, m)"""
     form = step_form(linear.advance)
     where, r = np.array(forces.ports), linear.by_axis_force.shape[1]
     look = linear.motion[np.concatenate([where, r + where, 2 * r + where])]
@@ -78,6 +82,7 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int) -> Step
     outward, inward = asked @ form.outward, (form.inward @ by_force).T
     step = (form.advance, _whole(outward), _whole(inward), _whole(per_newton.T))
     into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
+    seen = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
     def run(course: FloatArray, first: int) -> None:
@@ -85,7 +90,8 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int) -> Step
             # numba calls functions that are passed as values an experimental feature.
             warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
             play(
-                forces.laws, forces.places, forces.of, memory, step, course, ports, state, (steps, stride, first),
+                forces.laws, forces.places, forces.of, memory, step, course,
+                seen[first * stride : first * stride + len(course)], ports, state, (steps, stride, first),
                 linear.step_s,
             )  # fmt: skip
 

@@ -155,4 +155,8 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
     EffectName("lost_samples", "sensor", (_number("fraction", "1"),)),
 )
 
+DISCOVERED_LAW = "discovered_law"
+"""A law that has no name: a formula, whose numbers p0, p1, … are its own; see `equalizer.laws`. Not one of those above:
+where it acts, the law says."""
+
 EFFECTS_BY_NAME: dict[str, EffectName] = {effect.name: effect for effect in EFFECT_NAMES}

@@ -97,7 +97,8 @@ class PredictedForce:
         within = band_limited(entered, rate_hz, self.band_hz)
         ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
         course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
-        added = force_along(structure, effects, course, within - (needed.force + ahead) / 2, rate_hz)
+        pushing = within - (needed.force + ahead) / 2
+        added = force_along(structure, effects, course, (record.command, pushing), rate_hz)
         # Both are means over the step that begins at a sample; the needed force is that around it.
         total = band_limited(entered + added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
         # A weaker actuator must not make every error smaller.

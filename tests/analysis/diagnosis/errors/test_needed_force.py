@@ -65,7 +65,7 @@ def test_friction_along_a_motion_is_that_of_the_simulation() -> None:
     played = simulate_mechanism(body(), force, RATE_HZ, rubbing)
     velocity = played.axis_velocity
     motion = played.axis_position, velocity, np.gradient(velocity, 1 / RATE_HZ, axis=0)
-    along = force_along(body(), rubbing, motion, played.axis_force, RATE_HZ)
+    along = force_along(body(), rubbing, motion, (force, played.axis_force), RATE_HZ)
     sliding = np.abs(velocity[:, 0]) > 0.02
     assert np.allclose(along[sliding], played.axis_force[sliding], atol=1e-3)
 
@@ -74,7 +74,7 @@ def test_what_sticks_answers_to_what_pushes_against_it() -> None:
     rubbing = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 1.5}),)
     still = np.zeros((400, 1))
     pushing = np.linspace(0.0, 3.0, 400)[:, None]
-    along = force_along(body(), rubbing, (still, still, still), pushing, RATE_HZ)
+    along = force_along(body(), rubbing, (still, still, still), (pushing, pushing), RATE_HZ)
     settled = slice(50, None)
     assert np.allclose(along[settled], -np.minimum(pushing, 1.5)[settled], atol=0.05)
 

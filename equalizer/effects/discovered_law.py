@@ -1,0 +1,163 @@
+"""A law that has no name, as an effect: a formula that is added to the force, or replaces command or response."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.effects.effect import Acts, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
+from equalizer.effects.law_kernel import PER_AXIS, law_force
+from equalizer.laws.evaluate import evaluate, evaluate_held
+from equalizer.laws.law import Law
+from equalizer.laws.parse import MEMORY
+from equalizer.laws.program import DEEPEST, program_of
+from equalizer.laws.roles import Role, roles
+from equalizer.laws.tree import Apply, nodes
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+LETTERS, DERIVATIVES, COMMAND = "xyz", ("", "v", "a"), "f"
+LARGEST, STEEPEST = 1e15, 20.0
+"""Of a free number; of an exponent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Channels:
+    """What a recording calls its commands and responses."""
+
+    inputs: tuple[str, ...] = ("fx", "fy", "fz")
+    outputs: tuple[str, ...] = ("ax", "ay", "az")
+    quantity: str = "acceleration"
+    """Of the response."""
+
+
+def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
+    """To be placed at the axis (force, command) or channel (response) that `law.axis` names. Its values are p0, p1, …
+
+    Signals are called by axis and quantity (x, vx, ax, fx; y, …) or as the recording's channels are. Where these do not
+    end in x, y, z, the axes are called so in their order. Raises LawError for a signal that is not there.
+    """
+    make: dict[str, Callable[[Law, Channels], Acts]] = {
+        "force": _on_force, "command": _on_command, "response": _on_response
+    }  # fmt: skip
+    return Effect(
+        name=DISCOVERED_LAW,
+        equation=f"{_replaced(law)} {law.text}",
+        source="found in these recordings",
+        signature=f"it follows {', '.join(law.variables) or 'nothing'} as the formula says",
+        parameters=law_parameters(law),
+        acts=make[law.acts_on](law, channels),
+        starts=lambda evidence, axis: (),
+        law=law,
+        of_time="t" in law.variables,
+    )
+
+
+def law_values(law: Law) -> Values:
+    return {f"p{place}": number for place, number in enumerate(law.numbers)}
+
+
+def law_with(law: Law, values: Values) -> Law:
+    return law.with_numbers([values[f"p{place}"] for place in range(len(law.numbers))])
+
+
+def law_parameters(law: Law) -> tuple[Parameter, ...]:
+    found = roles(law.tree)
+    none = 0.0 if law.acts_on == "force" else None
+    return tuple(_parameter(f"p{place}", number, found[place], none) for place, number in enumerate(law.numbers))
+
+
+def _parameter(name: str, number: float, role: Role, none: float | None) -> Parameter:
+    if role == "factor":
+        return Parameter(name, -LARGEST, LARGEST, none, scale="signed")
+    if role == "phase":
+        return Parameter(name, -1e3, 1e3, None, scale="linear", step=0.02)
+    if role == "exponent":
+        return (
+            Parameter(name, 1e-3, STEEPEST, None)
+            if number > 0
+            else Parameter(name, -STEEPEST, STEEPEST, None, "linear")
+        )
+    if role == "positive" and number > 0:
+        return Parameter(name, 1 / LARGEST, LARGEST, None)
+    return Parameter(name, -LARGEST, LARGEST, None, scale="signed")
+
+
+def _replaced(law: Law) -> str:
+    return {"force": "F =", "command": f"command on {law.axis} =", "response": f"response {law.axis} ="}[law.acts_on]
+
+
+def _remembers(law: Law) -> bool:
+    return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))
+
+
+def _axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
+    ends = tuple(channel[-1:] for channel in channels)
+    if len(set(ends)) == len(ends) and set(ends) <= set(LETTERS):
+        return ends
+    return tuple(LETTERS[: len(channels)])
+
+
+def force_signals(channels: Channels) -> dict[str, int]:
+    """Where the compiled law finds each signal."""
+    return {"t": 0, **{name: 1 + place for name, place in _motion_signals(channels)}}
+
+
+def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
+    order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
+    for axis, letter in enumerate(_axis_names(channels.inputs)):
+        for number, prefix in enumerate((*DERIVATIVES, COMMAND)):
+            yield prefix + letter, PER_AXIS * axis + number
+    for axis, name in enumerate(channels.outputs if len(channels.outputs) == len(channels.inputs) else ()):
+        if order is not None:
+            yield name, PER_AXIS * axis + order
+    for axis, name in enumerate(channels.inputs):
+        yield name, PER_AXIS * axis + len(DERIVATIVES)
+
+
+def _on_force(law: Law, channels: Channels) -> AxisForce:
+    signals = force_signals(channels)
+    program, axes = program_of(law.tree, signals), len(channels.inputs)
+    heavy = any((signals[name] - 1) % PER_AXIS == 2 for name in law.variables if name != "t")
+
+    def pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+        if model.inputs != axes:
+            raise ValueError(f"the law {law.text} is for {axes} axes; the model has {model.inputs}")
+        return np.concatenate([[axes, heavy], program.with_numbers(law_with(law, values).numbers)])
+
+    memory = DEEPEST + 1 + PER_AXIS * axes + program.memory
+    return AxisForce(law_force, pack, memory=memory, acceleration=heavy, sees=True)
+
+
+def _on_command(law: Law, channels: Channels) -> OnCommand:
+    signals = {COMMAND + letter: axis for axis, letter in enumerate(_axis_names(channels.inputs))}
+    signals |= {name: axis for axis, name in enumerate(channels.inputs)}
+    program_of(law.tree, {**signals, "t": -1})
+
+    def of_all(commands: FloatArray, channel: int, step_s: float, values: Values) -> tuple[FloatArray, FloatArray]:
+        of = {name: commands[:, number] for name, number in signals.items()}
+        held = evaluate_held(law_with(law, values), of, 1 / step_s)
+        return np.asarray(held.mean(axis=0)), held[1]
+
+    return OnCommand(lambda commands, step_s, values: commands, fine=_remembers(law), of_all=of_all)
+
+
+def _on_response(law: Law, channels: Channels) -> OnResponse:
+    signals = _response_signals(channels)
+    program_of(law.tree, {**signals, "t": -1})
+
+    def change(response: FloatArray, sample_rate_hz: float, sites: tuple[int, ...], values: Values) -> FloatArray:
+        read = response.copy()
+        of = {name: response[:, number] for name, number in signals.items()}
+        read[:, list(sites)] = evaluate(law_with(law, values), of, sample_rate_hz)[:, None]
+        return read
+
+    return OnResponse(change)
+
+
+def _response_signals(channels: Channels) -> Mapping[str, int]:
+    order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
+    letters = _axis_names(channels.outputs) if order is not None else ()
+    named = {DERIVATIVES[order or 0] + letter: number for number, letter in enumerate(letters)}
+    return {**named, **{name: number for number, name in enumerate(channels.outputs)}}

@@ -1,0 +1,46 @@
+"""One step of a linear structure, and many of them without forces, compiled."""
+
+import numpy as np
+from numba import njit, types
+
+from equalizer.signals.signal import FloatArray
+
+FAST = {"reassoc", "contract"}
+_VECTOR = types.float64[::1]
+_MATRIX = types.float64[:, ::1]
+
+
+@njit(types.void(_MATRIX, _VECTOR, _VECTOR), cache=True, nogil=True, fastmath=FAST)
+def _go_together(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
+    """One step, of coordinates that do not come apart. advance: (s, s), transposed."""
+    before = state.copy()
+    state[:] = added[: state.shape[0]]
+    for j in range(state.shape[0]):
+        for i in range(state.shape[0]):
+            state[i] += advance[j, i] * before[j]
+
+
+@njit(inline="always")
+def go(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
+    """One step. advance: (4, s / 2) or (s, s), see `equalizer.effects.modal_form`. added: (s, ...), by commands."""
+    half = state.shape[0] // 2
+    if advance.shape[1] != half:
+        _go_together(advance, added, state)
+        return
+    for i in range(half):
+        first, second = state[i], state[half + i]
+        state[i] = advance[0, i] * first + advance[1, i] * second + added[i]
+        state[half + i] = advance[2, i] * first + advance[3, i] * second + added[half + i]
+
+
+@njit(types.void(_MATRIX, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath=FAST)
+def coast(advance: FloatArray, rows: FloatArray, state: FloatArray) -> None:
+    """Motion without further forces. rows: (n, s ...), what the commands add over each step; becomes the state before
+    each. state: (s,), becomes that of the end."""
+    size = state.shape[0]
+    added = np.empty(size)
+    for k in range(rows.shape[0]):
+        for i in range(size):
+            added[i] = rows[k, i]
+            rows[k, i] = state[i]
+        go(advance, added, state)
