@@ -12,6 +12,7 @@ from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import sliding
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.balance.rectified import restored
+from analysis.diagnosis.balance.unnamed_motion import with_named_motion
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -30,7 +31,10 @@ Step = Callable[[Recordings], tuple[Recordings, str]]
 def plain_form(recordings: Sequence[Recording]) -> tuple[Recordings, tuple[str, ...]]:
     """recordings: alike in channels, units and rate. And a sentence for each change."""
     found, said = tuple(recordings), []
-    for step in (_conditions, _moving_commands, _moving_responses, _pushing_responses, restored, _summed):
+    steps = (
+        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses, restored, _summed,
+    )  # fmt: skip
+    for step in steps:
         found, sentence = step(found)
         said.append(sentence)
     return found, tuple(filter(None, said))

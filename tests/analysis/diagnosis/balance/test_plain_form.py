@@ -143,3 +143,42 @@ def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
     assert sure is None or sure >= ANSWER_DEVIATIONS
     assert unsure is not None
     assert unsure < ANSWER_DEVIATIONS
+
+
+def position_of(push, mass=0.05, damping=0.3, stiffness=20.0):
+    """(n,): of a body on a spring, in fine steps."""
+    place = speed = 0.0
+    found = []
+    for force in push:
+        found.append(place)
+        for _ in range(10):
+            speed += (force - damping * speed - stiffness * place) / mass / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("course", "quantity"), [(speed_of, "velocity"), (position_of, "position")], ids=["motor", "body on a spring"]
+)
+@pytest.mark.parametrize("unit", ["1", "V"])
+def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_course_suggests(course, quantity, unit):
+    push = smooth(4000, 3, width=9)
+    own = "voltage" if unit == "V" else "1"
+    recording = of([("u", own, unit, push)], [("y", own, unit, course(push))])
+
+    (found,), said = plain_form((recording,))
+
+    if (quantity, unit) == ("position", "V"):  # a voltage counts as a position already
+        assert (found, said) == (recording, ())
+    else:
+        assert found.response.quantities == (quantity,)
+        assert "Nothing says what y measures" in said[0]
+
+
+def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
+    place = smooth(2000, 5)
+    recording = of([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
+
+    (found,), _ = plain_form((recording,))
+
+    assert found.response.quantities == ("force",)

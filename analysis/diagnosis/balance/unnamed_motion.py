@@ -1,0 +1,65 @@
+"""Responses of which nothing says what they are: as a motion or force that their course agrees with.
+
+Along a measured position forces need its second derivative, unless no mass moves; along a velocity they do not, for
+the mass then goes with the first. So a response is taken as a position, or as a velocity where it is of use by itself
+and its second derivative is not. A sensor's voltage says as little.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import NoMotionError, motions_of
+from analysis.diagnosis.balance.regression import regression_of
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.wording import listed
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.recording import Recording
+
+KNOWN = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) - {"voltage"}
+NEEDED = 0.02
+"""Share of the force's power, held out, from which a derivative of the response is of use."""
+
+
+def with_named_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+    """recordings: alike in channels, units and rate. And what was taken for what; empty where all was said."""
+    first = recordings[0]
+    if set(first.response.quantities) & KNOWN:
+        return recordings, ""
+    moved = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+    quantity = "force" if moved else _derivative(recordings)
+    if quantity == "position" and set(first.response.quantities) == {"voltage"}:
+        return recordings, ""
+    names = listed(list(first.response.channels))
+    return tuple(_with(each, quantity) for each in recordings), (
+        f"Nothing says what {names} measures: it was taken for a {quantity}, as its course suggests; if it is another, "
+        "say so in the map (quantity)."
+    )
+
+
+def _derivative(recordings: Sequence[Recording]) -> str:
+    """Of the first response, against the first command; a position where nothing tells."""
+    count = len(recordings[0].response.channels)
+    taken = [replace(_with(each, "position"), position=None) for each in recordings]
+    try:
+        motions = motions_of(observed_parts(taken, count))
+        regression = regression_of(motions, 0, (), turns=False)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return "position"
+    whole = regression.chosen(())
+    power = max(sum(block.signal for block in regression.fit), 1e-300)
+    if not np.isfinite(motions[0].band_hz):
+        return "position"
+
+    def use(columns: Sequence[int]) -> float:
+        without = regression.crossed([k for k in whole if k not in columns])
+        return float((without - regression.crossed(whole)).sum()) / power
+
+    d = len(motions[0].channels)
+    twice, itself = use(range(d)), use(range(2 * d, 3 * d))
+    return "velocity" if twice < NEEDED <= itself else "position"
+
+
+def _with(recording: Recording, quantity: str) -> Recording:
+    return replace(recording, response=replace(recording.response, quantity=quantity))
