@@ -25,7 +25,7 @@ from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.impacts import rattling
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned, learned_from
-from analysis.diagnosis.search.looks import Look, looks_of
+from analysis.diagnosis.search.looks import Look, look_of, looks_of
 from analysis.diagnosis.search.patience import OUT_OF_TIME, always
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.search import Searched, searched
@@ -87,7 +87,7 @@ def diagnose(
     progress("measuring the noise", 0.3 if balances else 0.0)
     if settings.clean and (beside := _beside_clean(recordings, model, settings, map_, progress)) is not None:
         return beside
-    look = _look_of(recordings, model, settings)
+    look = look_of(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     seen = _by_search(recordings, look, settings, map_, progress, balances)
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
@@ -132,7 +132,7 @@ def _by_given_model(
 ) -> Findings | None:
     """weighed: effects that a comparison weighed, and did not find. None where the search beside clean recordings names
     nothing else, or cannot be done."""
-    look = _look_of(recordings, model, settings)
+    look = look_of(recordings, model, settings.clean, settings.compared)
     rest = replace(settings, without=(*settings.without, *weighed))
     try:
         seen = _by_search(recordings, look, rest, map_, progress, ())
@@ -144,10 +144,6 @@ def _by_given_model(
     if not (searched.judged.named and searched.found.steps):
         return None
     return _assembled(recordings, settings, look, replace(seen, searched=searched), ())
-
-
-def _look_of(recordings: Sequence[Recording], model: MechanicalModel, settings: DiagnosisSettings) -> Look:
-    return Look(model, measure_of(recordings, model, settings.clean, settings.compared))
 
 
 def _floor(

@@ -1,18 +1,31 @@
 """How errors are measured of what a force balance named: in which measures its laws are fitted, one after the other."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.diagnosis.balance.first_model import first_model, share_within
 from analysis.diagnosis.balance.reduced_recordings import is_reduced, reduced_recordings
 from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.data.operating_point import about_operating_point
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.predicted_force import PredictedForce
+from analysis.diagnosis.errors.standing import standing
+from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.settings import LAWS_WITHIN
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
+
+MENDED = 0.9
+"""Times the error that a constant may leave at most to be worth saying; principle: as a named law, `by_balance`.
+"""
+ABOUT_MEAN = (
+    "The fitted model holds no constants: one was added to the command, with which it keeps the mean position of what "
+    "was fitted to. Weights, offsets of sensor and amplifier, and the point that the device works at are all in it."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +36,32 @@ class Look:
     chosen: Chosen
     narrow: bool = False
     """Only up to where noise is small in the force, which may leave numbers of laws open."""
+
+
+def look_of(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    clean: Sequence[Recording],
+    compared: Compared,
+    about_mean: bool = False,
+) -> Look:
+    """about_mean: the model was fitted to what changes, and is played about the mean where that leaves less."""
+    look = Look(model, measure_of(recordings, model, clean, compared))
+    moved = about_operating_point(recordings, model) if about_mean and not clean else None
+    if moved is None or look.chosen.measure.name != "free simulation":
+        return look
+    other = measure_of(moved, model, clean, compared)
+    if other.measure.name != "free simulation" or _left(model, other) > MENDED * _left(model, look.chosen):
+        return look
+    return Look(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
+
+
+def _left(model: MechanicalModel, chosen: Chosen) -> float:
+    """As the model is, on what may be fitted to: the error over the noise."""
+    measure = chosen.measure
+    tuning = tuning_of(model, measure.records[0].recording.command.channels)
+    given = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    return standing(measure, given.residuals).seen
 
 
 def looks_of(

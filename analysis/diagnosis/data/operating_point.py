@@ -1,0 +1,43 @@
+"""Recordings about the point that a device works at.
+
+A linear model that was fitted to what changes holds no constants: the level that a constant command keeps, or the zero
+of a sensor. Played from the command as it is, it misses by far more than by its dynamics.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.observed_parts import observed_parts
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+SOFTEST = 1e-6
+"""Of the largest, the smallest stiffness that a position is held by at all."""
+
+
+def about_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:
+    """With the constant added to the commands with which the model keeps the mean position of what may be fitted to;
+    None where the response is no position, or nothing holds it."""
+    if DERIVATIVE_OF_QUANTITY[model.quantity] != 0:
+        return None
+    size = np.linalg.svd(model.stiffness, compute_uv=False)
+    if size[-1] <= SOFTEST * size[0]:
+        return None
+    gain = model.output @ np.linalg.solve(model.stiffness, model.input)
+    pushed, stood = _means(recordings, model.outputs)
+    constant = np.linalg.pinv(gain) @ stood - pushed
+    return tuple(
+        replace(each, command=replace(each.command, samples=each.command.samples + constant)) for each in recordings
+    )
+
+
+def _means(recordings: Sequence[Recording], responses: int) -> tuple[FloatArray, FloatArray]:
+    """Of commands and responses, over what may be fitted to."""
+    records = observed_parts(recordings, responses)
+    masks = [record.fit | record.choose for record in records]
+    pushed = np.vstack([record.command[mask] for record, mask in zip(records, masks, strict=True)])
+    stood = np.vstack([record.recording.response.samples[mask] for record, mask in zip(records, masks, strict=True)])
+    return np.nanmean(pushed, axis=0), np.nanmean(stood, axis=0)

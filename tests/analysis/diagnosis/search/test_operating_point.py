@@ -1,0 +1,56 @@
+"""A model that was fitted to what changes is played about the point that the device works at."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.operating_point import about_operating_point
+from analysis.diagnosis.search.looks import ABOUT_MEAN, look_of
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ, STIFFNESS = 200.0, 50.0
+
+
+def model(quantity="position", stiffness=STIFFNESS):
+    one = np.eye(1)
+    return MechanicalModel("m", quantity, 0.5 * one, 4.0 * one, stiffness * one, one, one)
+
+
+def recording(weight=0.0, seed=1):
+    """A body on a spring that a constant force pushes, too, from where that keeps it."""
+    push = np.convolve(np.random.default_rng(seed).standard_normal(4000), np.hanning(30), "same")
+    place, speed, found = weight / STIFFNESS, 0.0, []
+    for force in push:
+        found.append(place)
+        for _ in range(10):
+            speed += (force + weight - 4.0 * speed - STIFFNESS * place) / 0.5 / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    noisy = np.array(found) + 1e-4 * np.random.default_rng(seed + 1).standard_normal(len(found))
+    return Recording(
+        "bench",
+        Signal(push[:, None], RATE_HZ, "force", "N", ("fx",)),
+        Signal(noisy[:, None], RATE_HZ, "position", "m", ("x",)),
+    )
+
+
+def test_the_constant_that_keeps_the_mean_position_is_found_and_said():
+    one = recording(weight=20.0)
+    (moved,) = about_operating_point((one,), model()) or ()
+    assert np.allclose(moved.command.samples - one.command.samples, 20.0, rtol=0.05)
+    look = look_of((one,), model(), (), "auto", about_mean=True)
+    assert ABOUT_MEAN in look.chosen.remarks
+
+
+def test_a_device_without_a_constant_and_a_calibrated_model_are_played_from_the_command_as_it_is():
+    plain = look_of((recording(),), model(), (), "auto", about_mean=True)
+    assert ABOUT_MEAN not in plain.chosen.remarks
+    given = look_of((recording(weight=20.0),), model(), (), "auto")
+    assert ABOUT_MEAN not in given.chosen.remarks
+
+
+def test_what_no_spring_holds_and_what_is_no_position_has_no_such_point():
+    assert about_operating_point((recording(),), model(stiffness=0.0)) is None
+    moving = replace(recording(), response=replace(recording().response, quantity="velocity", unit="m/s"))
+    assert about_operating_point((moving,), model("velocity")) is None
