@@ -122,7 +122,7 @@ def _gaps(command: Signal, name: str) -> Iterator[str]:
         first = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
         yield (
             f"{name} misses the command in {missing} samples (the first is {first}), so it is not known what "
-            "the device was told; cut the recording there"
+            "the device was told; cut the recording there, or let its import bridge them (gap_s of the clock)"
         )
 
 

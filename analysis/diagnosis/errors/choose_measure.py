@@ -6,8 +6,8 @@ Free simulation, from rest by the commands alone, is the strictest: nothing meas
   physics that is missing. Where positions or velocities were measured, forces are compared instead: the one that
   entered against the one that the model needs along the measured motion; where only accelerations were, windows;
 * a plant that integrates freely, whose slowest motion takes longer to die out than a third of the recording: any small
-  error grows without end. It is simulated in windows of 1 s, each from a state estimated from the measured motion, or,
-  where no state can be estimated, compared by forces;
+  error grows without end. It is simulated in windows of 1 s or longer, each from a state estimated from the measured
+  motion, or, where no state can be estimated, compared by forces;
 * a recording that does not begin at rest: what its beginning left behind dies out, so its first seconds are left out;
   where that would be more than a quarter of it, windows, too.
 """
@@ -189,7 +189,7 @@ BY_FORCE = (
     "measured, and small errors of a model that was fitted to it would grow in a simulation."
 )
 ASKED_MOTION = (
-    "The motion is compared, as was asked, in windows of 1 s, each from a state estimated from the measured motion; by "
+    "The motion is compared, as was asked, in short windows, each from a state estimated from the measured motion; by "
     "itself the rule would have compared forces."
 )
 CLOSED_LOOP = (
@@ -197,15 +197,15 @@ CLOSED_LOOP = (
     "drift; the force that the model needs along the measured motion is compared with the one that entered."
 )
 CLOSED_LOOP_WINDOWS = (
-    "The command hangs on the response and the model does not hold itself; it is simulated in windows of 1 s, each "
+    "The command hangs on the response and the model does not hold itself; it is simulated in short windows, each "
     "from a state estimated from the measured motion."
 )
 DRIFTS = (
-    "The model integrates freely, so that small errors would grow without end; it is simulated in windows of 1 s, each "
+    "The model integrates freely, so that small errors would grow without end; it is simulated in short windows, each "
     "from a state estimated from the measured motion."
 )
 NOT_AT_REST = (
-    "The recording does not begin at rest; the model is simulated in windows of 1 s, each from a state estimated from "
+    "The recording does not begin at rest; the model is simulated in short windows, each from a state estimated from "
     "the measured motion."
 )
 NO_STATE = (

@@ -28,6 +28,11 @@ _UNSEEN = 1e-9
 """Of a window's largest direction: what moves the outputs less than that is not fitted."""
 
 
+STATES = 10.0
+"""Readings of a window per number of its state; principle: the state, which is fitted and does not count, then takes a
+tenth of an error at most by chance."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
     """For plants that integrate freely, and for recordings that do not begin at rest."""
@@ -149,8 +154,11 @@ class Windows:
 def windows_of(
     records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
 ) -> Windows:
-    """scales: unit and noise, (c,) each. Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
+    """scales: unit and noise, (c,) each. window_s: at least. Raises numpy.linalg.LinAlgError where the motion cannot be
+    estimated."""
     unit, noise = scales
+    fitted = 2 * len(model.mass) / records[0].measured.shape[1]
+    window_s = max(window_s, STATES * fitted / records[0].recording.sample_rate_hz)
     states = []
     for record in records:
         rate_hz = record.recording.sample_rate_hz

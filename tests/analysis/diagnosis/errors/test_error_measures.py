@@ -112,6 +112,19 @@ def test_a_plant_that_drifts_freely_is_simulated_in_windows(drifting: Recording)
     assert "integrates freely" in chosen.remarks[0]
 
 
+def test_a_window_holds_many_readings_per_number_of_its_state_at_any_rate(drifting: Recording) -> None:
+    """Of a window of a single reading, the fitted state would leave nothing, whatever the model."""
+    slow = replace(
+        drifting,
+        command=replace(drifting.command, sample_rate_hz=1.0),
+        response=replace(drifting.response, sample_rate_hz=1.0),
+    )
+    measure = measure_of([slow], model()).measure
+    assert measure.name == "windows of 20 s"
+    heavy = replace(model(), mass=np.array([[1e9]]), damping=np.array([[1e9]]))
+    assert np.std(measure.residuals(heavy, ())[0]) > 0
+
+
 def test_friction_of_a_drifting_plant_is_recovered_in_windows(drifting: Recording) -> None:
     findings = found(drifting, "coulomb_friction", "viscous_damping", "hardening_stiffness")
     (effect,) = findings.diagnosis.effects
