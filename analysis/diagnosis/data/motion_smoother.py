@@ -143,6 +143,8 @@ def _gains(advance: FloatArray, look: FloatArray, walk: FloatArray, large: Float
     stirred = np.diag(walk / large**2) + _STIRRED * np.eye(len(advance))
     foreseen = _steady_covariance(scaled, seeing, stirred)
     gain = np.linalg.solve(seeing @ foreseen @ seeing.T + eye, seeing @ foreseen).T
+    if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ seeing)).max() >= 1:
+        raise np.linalg.LinAlgError("a filter for the motion is not stable in floating point")
     found = foreseen - gain @ seeing @ foreseen
     back = np.linalg.lstsq(foreseen, scaled @ found, rcond=1e-13)[0].T
     return gain * large[:, None], np.ascontiguousarray(back * large[:, None] / large[None, :])
