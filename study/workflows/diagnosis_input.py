@@ -74,16 +74,24 @@ def read_input(sources: Sequence[Path], seed: int, plain: bool = False) -> Diagn
         )  # fmt: skip
     else:
         read = tuple(read_recording(source) for source in sources)
+        _require_alike(read, _names(sources))
         formed, said = plain_form(read) if plain else (read, ())
         driven, gaps = across_gaps(all_force_driven(formed), _names(sources))
         found = DiagnosisInput(driven, _names(sources), tuple(sources), (*said, *gaps))
     try:
-        require_alike(found.recordings, found.names)
         require_something(found.recordings, found.names)
         require_different(found.recordings, found.names)
     except NothingToDiagnose as refusal:
         raise nothing_to_diagnose(refusal.problems) from refusal
     return _moving_position(same_position(found))
+
+
+def _require_alike(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+    """Before any form is found for all of them. Raises StudyError."""
+    try:
+        require_alike(recordings, names)
+    except NothingToDiagnose as refusal:
+        raise nothing_to_diagnose(refusal.problems) from refusal
 
 
 def given_model(path: Path, found: DiagnosisInput) -> MechanicalModel:

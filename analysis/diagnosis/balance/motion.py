@@ -87,10 +87,16 @@ def moving_signal(recording: Recording) -> Signal | None:
         if not known:
             continue
         lowest = min(known)
-        places = [k for k, order in enumerate(orders) if order == lowest and np.nanstd(signal.samples[:, k]) > 0]
+        places = [k for k, order in enumerate(orders) if order == lowest and _moves(signal.samples[:, k])]
         if places:
             found.append((lowest, signal.picked(places)))
     return min(found, key=lambda item: item[0])[1] if found else None
+
+
+def _moves(samples: FloatArray) -> bool:
+    """Whether what is known of it changes."""
+    known = samples[np.isfinite(samples)]
+    return bool(len(known)) and float(np.ptp(known)) > 0
 
 
 def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:

@@ -22,6 +22,8 @@ from equalizer.signals.signal import FloatArray, Signal
 FORCES = frozenset({"force", "torque"})
 DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
 """What moves something; all else that is commanded is a condition."""
+STILL = 1e-9
+"""Of its size: what changes by less is the rounding of numbers."""
 MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
 
 Recordings = tuple[Recording, ...]
@@ -32,7 +34,7 @@ def plain_form(recordings: Sequence[Recording]) -> tuple[Recordings, tuple[str, 
     """recordings: alike in channels, units and rate. And a sentence for each change."""
     found, said = tuple(recordings), []
     steps = (
-        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses, restored, _summed,
+        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses, restored, _still, _summed,
     )  # fmt: skip
     for step in steps:
         found, sentence = step(found)
@@ -93,13 +95,41 @@ def _pushing_responses(recordings: Recordings) -> tuple[Recordings, str]:
     count = len(command.channels)
     if len(response.channels) <= count:
         return recordings, ""
-    sizes = np.nanstd(np.vstack([each.response.samples for each in recordings]), axis=0)
+    samples = np.vstack([each.response.samples for each in recordings])
+    sizes = np.array(
+        [np.std(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0 for column in samples.T]
+    )
     kept = sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
     left = [name for k, name in enumerate(response.channels) if k not in kept]
     return tuple(replace(each, response=each.response.picked(kept)) for each in recordings), (
         f"Of the forces along one motion the strongest, {listed([response.channels[k] for k in kept])}, was balanced; "
         f"for {listed(left)}, import the recording with that force as its only response."
     )
+
+
+def _still(recordings: Recordings) -> tuple[Recordings, str]:
+    """Commands beyond the motions that never change: no gain of theirs can be known."""
+    command, response = recordings[0].command, recordings[0].response
+    samples = np.vstack([each.command.samples for each in recordings])
+    if len(command.channels) <= len(response.channels) or not np.isfinite(samples).all():
+        return recordings, ""
+    kept = np.flatnonzero(np.ptp(samples, axis=0) > STILL * np.abs(samples).max(axis=0)).tolist()
+    if len(kept) in (0, len(command.channels)):
+        return recordings, ""
+    left = [name for k, name in enumerate(command.channels) if k not in kept]
+    return (
+        tuple(
+            replace(each, command=each.command.picked(kept),
+                    excitation=None if each.excitation is None else _same(each.excitation, each.command, kept))
+            for each in recordings
+        ),
+        f"{listed(left)} among the commands never {_verb(left, 'changes')}, and {_verb(left, 'was')} left out.",
+    )  # fmt: skip
+
+
+def _verb(names: Sequence[str], one: str) -> str:
+    plural = {"changes": "change", "was": "were", "drives": "drive"}
+    return one if len(names) == 1 else plural[one]
 
 
 def _summed(recordings: Recordings) -> tuple[Recordings, str]:
@@ -118,8 +148,8 @@ def _summed(recordings: Recordings) -> tuple[Recordings, str]:
                     excitation=None)
             for each in recordings
         ),
-        f"{listed(others)} drives the same motion as {command.channels[main]}: one command was made of them, "
-        f"{' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
+        f"{listed(others)} {_verb(others, 'drives')} the same motion as {command.channels[main]}: one command was made "
+        f"of them, {' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
     )  # fmt: skip
 
 

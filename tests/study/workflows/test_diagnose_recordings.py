@@ -328,6 +328,9 @@ def test_two_commands_of_one_motion_are_made_one_and_it_is_said(files, findings,
     write_recording(tmp_path / "two.h5", replace(recording, command=both))
     engine = asked_of_engine(plan(files, tmp_path / "out", sources=(tmp_path / "two.h5",), model=None), findings)
     assert len(engine.recordings[0].command.channels) == 1
+    unlike = tmp_path / "two.h5", files / "rec.h5"
+    error = refused_with(files, findings, tmp_path, sources=unlike, model=None)
+    assert "rec.h5 has the command" in error.happened.lower()
 
 
 def test_at_the_screen_a_stop_is_said_and_leaves_nothing(files, tmp_path):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.balance.motion import moving_signal
 from analysis.diagnosis.balance.plain_form import plain_form
 from analysis.diagnosis.data.answering import answer
 from analysis.diagnosis.data.force_driven import all_force_driven
@@ -77,6 +78,33 @@ def test_two_commands_of_one_motion_become_one():
     assert "one command was made of them" in said
 
 
+@pytest.mark.parametrize("level", [0.0, 0.5, 50.0])
+def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(level):
+    first, second = smooth(4000, 1), smooth(4000, 2)
+    recording = of(
+        [("u1", "force", "N", first), ("u2", "force", "N", second), ("u3", "force", "N", np.full(4000, level))],
+        [("v", "velocity", "m/s", speed_of(first + 0.4 * second))],
+    )
+
+    (found,), (left_out, summed) = plain_form((recording,))
+
+    assert found.command.channels == ("u1",)
+    assert found.command.samples[:, 0] == pytest.approx(first + 0.4 * second, abs=0.02 * first.std())
+    assert left_out == "u3 among the commands never changes, and was left out."
+    assert summed.startswith("u2 drives the same motion as u1")
+
+
+def test_commands_that_never_change_stay_where_each_has_a_motion():
+    """A device that was driven along each axis in turn."""
+    push = smooth(2000, 1)
+    recording = of(
+        [("fx", "force", "N", push), ("fy", "force", "N", np.zeros(2000))],
+        [("x", "velocity", "m/s", speed_of(push)), ("y", "velocity", "m/s", 1e-3 * smooth(2000, 3))],
+    )
+
+    assert plain_form((recording,)) == ((recording,), ())
+
+
 def test_of_motions_of_several_kinds_the_lowest_is_kept():
     push = smooth(2000, 1)
     speed = speed_of(push)
@@ -101,6 +129,16 @@ def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
 
     assert (driven.command.channels, driven.response.channels) == (("b",), ("q",))
     assert "for a, import the recording" in said
+
+
+def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
+    """Without a warning, which would be an error here."""
+    push, none = smooth(2000, 1), np.full(2000, np.nan)
+    moved = of([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
+    assert (moving := moving_signal(moved)) is not None
+    assert moving.channels == ("y",)
+    pushed = of([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
+    assert plain_form((pushed,))[0][0].response.channels == ("f2",)
 
 
 def test_one_force_along_two_imposed_motions_keeps_both():
