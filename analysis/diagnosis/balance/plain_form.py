@@ -111,7 +111,8 @@ def _still(recordings: Recordings) -> tuple[Recordings, str]:
     """Commands beyond the motions that never change: no gain of theirs can be known."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([each.command.samples for each in recordings])
-    if len(command.channels) <= len(response.channels) or not np.isfinite(samples).all():
+    samples = samples[np.isfinite(samples).all(axis=1)]
+    if len(command.channels) <= len(response.channels) or not len(samples):
         return recordings, ""
     kept = np.flatnonzero(np.ptp(samples, axis=0) > STILL * np.abs(samples).max(axis=0)).tolist()
     if len(kept) in (0, len(command.channels)):

@@ -86,10 +86,17 @@ def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(leve
         [("v", "velocity", "m/s", speed_of(first + 0.4 * second))],
     )
 
-    (found,), (left_out, summed) = plain_form((recording,))
+    command = recording.command.samples.copy()
+    command[2000:2010] = np.nan
 
+    (found,), (left_out, summed) = plain_form(
+        (replace(recording, command=replace(recording.command, samples=command)),)
+    )
+
+    known = np.isfinite(command).all(axis=1)
     assert found.command.channels == ("u1",)
-    assert found.command.samples[:, 0] == pytest.approx(first + 0.4 * second, abs=0.02 * first.std())
+    assert np.array_equal(np.isfinite(found.command.samples[:, 0]), known)
+    assert found.command.samples[known, 0] == pytest.approx((first + 0.4 * second)[known], abs=0.02 * first.std())
     assert left_out == "u3 among the commands never changes, and was left out."
     assert summed.startswith("u2 drives the same motion as u1")
 
