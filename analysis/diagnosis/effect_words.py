@@ -150,6 +150,11 @@ LAW_WORDS: Mapping[str, LawWords] = {
         EffectWords("a force gain that drifts", {"change": "by {} from beginning to end"}, shares=("change",)),
         place="actuator",
     ),
+    "force_quantization": LawWords(
+        EffectWords("a command in steps", {"step": "of {}"}), {"step": _FORCE}, place="actuator"
+    ),
+    "sensor_noise": LawWords(EffectWords("a sensor that is noisier", {"rms": "by {} rms"}), {}, place="sensor"),
+    "sensor_play": LawWords(EffectWords("play before the sensor", {"gap": "a gap of {}"}), {}, place="sensor"),
     "sensor_asymmetry": LawWords(EffectWords("a sensor that reads more to one side (square)"), place="sensor"),
 }
 """Laws of the force balance, and faults beside clean recordings, that no simulation plays."""

@@ -13,7 +13,7 @@ from analysis.diagnosis.data.observed_parts import part_of, parts_of
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
-MOST_SAMPLES = 10_000
+MOST_SAMPLES = 5_000
 """Of each half of a recording, and of what is played before it."""
 SHORTEST = 0.6
 """Of the longest half that a recording allows."""

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.fault import Fault, Told, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
+from equalizer.effects.slew_kernel import follow
 from equalizer.signals.band_limited import odd_continued, straight
 from equalizer.signals.signal import FloatArray
 
@@ -55,6 +56,9 @@ def actuator_faults(number: int, name: str, parts: Sequence[Taken], by_force: bo
     shares = np.quantile(np.abs(whole), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
     limits = sorted(top * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
     yield axis.fault("force_saturation", [_saturated(axis, limit) for limit in limits])
+    fastest = max(float(np.abs(np.diff(part.command[:, number])).max(initial=0.0)) * part.rate_hz for part in parts)
+    if fastest > 0:
+        yield axis.fault("slew_limit", [_slow(axis, float(rate)) for rate in fastest * np.geomspace(0.01, 0.9, GRID)])
     yield axis.fault("force_deadband", [_dead(axis, float(width)) for width in rms * np.geomspace(0.02, 1.5, GRID)])
 
 
@@ -90,6 +94,17 @@ def _lagging(axis: _Axis, time_s: float) -> Variant:
 
 def _saturated(axis: _Axis, limit: float) -> Variant:
     return Variant((axis.of(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
+
+
+def _slow(axis: _Axis, limit: float) -> Variant:
+    return Variant((axis.of(lambda u, rate: _followed(u, limit / rate)),), lambda s: {"rate": limit}, 0.6, 1.5)
+
+
+def _followed(command: FloatArray, reach: float) -> FloatArray:
+    """As near to the command as it comes by steps of `reach` at most."""
+    mean, end = np.empty_like(command), np.empty_like(command)
+    follow(command - command[0], reach, mean, end)
+    return np.asarray(end + command[0])
 
 
 def _dead(axis: _Axis, width: float) -> Variant:

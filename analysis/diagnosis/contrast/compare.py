@@ -32,8 +32,11 @@ STEPS = 24
 ALL = tuple(range(FOLDS))
 APART = ((0, 1), (2, 3), (4, 5), (0, 1, 2))
 """Blocks of a set that are weighed against its others: thirds and halves, like two recordings."""
-LEAST = 0.005
-"""Of the error power, that a fault must gain: what is less is not worth a name."""
+AS_ONE = 0.05
+"""Excess of the error of both sets together over that of each by itself, up to which they are of one device."""
+LEAST = 0.05
+"""Of the error power of both sets, that a fault must gain: so much comes of one that adds a tenth to the error power of
+one of them. What is less is not worth a name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +87,11 @@ class Compared:
     @property
     def excess(self) -> float:
         return float(self.plain.sum()) / self.samples - 1
+
+    @property
+    def differ(self) -> bool:
+        """By more than stretches of one set do."""
+        return self.excess > max(AS_ONE, self.usual)
 
 
 def compared(

@@ -42,8 +42,9 @@ class Decided:
 
 def decide(found: Compared, responses: int) -> Decided:
     """responses: how many channels there are."""
-    sure = [law for law in found.weighed if _why_not(law) == ""]
-    others = tuple((law, _why_not(law)) for law in found.weighed if law.gain > 0 and law not in sure)
+    reasons = [(law, _why_not(law, found.differ)) for law in found.weighed]
+    sure = [law for law, why in reasons if why == ""]
+    others = tuple((law, why) for law, why in reasons if law.gain > 0 and why)
     if not sure:
         return Decided(None, (), 0.0, others)
     best = _plainest(sure)
@@ -82,9 +83,13 @@ def _plainest(sure: Sequence[Weighed]) -> Weighed:
     return best
 
 
-def _why_not(weighed: Weighed) -> str:
+def _why_not(weighed: Weighed, differ: bool) -> str:
+    """differ: whether the sets do by more than stretches of one. What changes in the course of a recording is not to be
+    weighed between stretches of the faulty set, and asks for that."""
     if weighed.gain < LEAST or weighed.gain_low <= 0:
         return "its gain is not larger than what varies between stretches"
+    if weighed.fault.varies and not differ:
+        return "stretches of one set differ as much as the sets do"
     if weighed.gain <= BEYOND * weighed.usual:
         return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
     main = next(iter(weighed.values))

@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.contrast.actuator_faults import AROUND, GRID, at_times, late_times, later, middle_hz
 from analysis.diagnosis.contrast.fault import Fault, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
+from equalizer.effects.bristle_kernel import bent
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]
@@ -19,6 +20,8 @@ SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
 """Of the channel's rms."""
 BENT = (0.02, 0.06, 0.15, 0.3)
 """Share of its largest reading by which that is off."""
+PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
+"""As SHIFTS, of a gap before the sensor."""
 FASTEST = 0.05
 """No clock is further off."""
 
@@ -54,14 +57,35 @@ def sensor_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fa
     yield replace(channel.fault("sensor_drift", [_drift(channel, shift) for shift in shifts]), varies=True)
     yield channel.fault("logger_offset", [_late(channel, time_s) for time_s in times])
     yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
-    bent = [side * share for share in BENT for side in (1.0, -1.0)]
-    yield channel.fault("sensor_nonlinearity", [_bent(channel, share, 3, "cubic") for share in bent])
-    yield channel.fault("sensor_asymmetry", [_bent(channel, share, 2, "square") for share in bent])
+    shares = [side * share for share in BENT for side in (1.0, -1.0)]
+    yield channel.fault("sensor_nonlinearity", [_bent(channel, share, 3, "cubic") for share in shares])
+    yield channel.fault("sensor_asymmetry", [_bent(channel, share, 2, "square") for share in shares])
+    yield channel.fault("sensor_play", [_play(channel, share * channel.rms) for share in PLAYS])
+    for other in range(longest.response.shape[1]):
+        if other != number:
+            yield _heard(channel, other)
     seconds = len(longest.response) / longest.rate_hz
     least = 0.02 / middle_hz(longest.response[:, number], longest.rate_hz) / seconds
     rates = [side * float(rate) for rate in least * np.geomspace(0.2, 100.0, GRID) for side in (1.0, -1.0)]
     clocks = [_other_clock(channel, rate) for rate in rates if abs(rate) < FASTEST]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
+
+
+def _play(channel: _Channel, gap: float) -> Variant:
+    """What is read stays behind by half the gap, which it takes the whole gap to turn round."""
+    undo = channel.of(lambda y, rate: y + 0.5 * gap * np.sign(bent(y, 0.05 * gap)))
+    return Variant((undo,), sized("gap", gap), *WIDELY)
+
+
+def _heard(channel: _Channel, other: int) -> Fault:
+    """Another channel in this one."""
+
+    def undo(taken: Taken) -> Taken:
+        response = taken.response.copy()
+        response[:, channel.number] -= taken.response[:, other]
+        return replace(taken, response=response)
+
+    return channel.fault("cross_axis_sensitivity", [Variant((undo,), sized("from_next"))])
 
 
 def _gain(channel: _Channel, gain: float) -> Variant:

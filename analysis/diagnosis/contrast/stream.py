@@ -13,6 +13,7 @@ from analysis.diagnosis.contrast.ledger import Grams, Places, weights_of
 from analysis.diagnosis.contrast.step_base import StepBase
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.contrast.watch_base import WatchBase
+from analysis.diagnosis.errors.residual_colour import lagged_products
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
@@ -103,12 +104,9 @@ def _white_error(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: Flo
 
 
 def _colour(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
-    power = np.zeros(MEMORY + 1)
-    for error, mask in zip(errors, masks, strict=True):
-        left = np.where(mask, error, 0.0)
-        for lag in range(MEMORY + 1):
-            power[lag] += float(left[lag:] @ left[: len(left) - lag]) if len(left) > lag else 0.0
-    if power[0] <= 0:
+    courses = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
+    power = np.sum([lagged_products(course, MEMORY)[:, 0] for course in courses if len(course) > MEMORY], axis=0)
+    if not np.any(power > 0):
         return np.array([1.0])
     power[0] *= 1 + 1e-6
     return np.asarray(np.concatenate([[1.0], -np.asarray(solve_toeplitz(power[:-1], power[1:]))]))

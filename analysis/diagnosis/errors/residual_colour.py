@@ -46,7 +46,7 @@ def colour_of(courses: Sequence[FloatArray], least: FloatArray) -> Colour:
     """courses: (n, c) each, NaN where not known. least: (c,), rms of noise that is white."""
     count = sum(int(np.isfinite(course).all(axis=1).sum()) for course in courses)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
-    alike: FloatArray = np.sum([_products(course, lags) for course in courses], axis=0) / max(count, 1)
+    alike: FloatArray = np.sum([lagged_products(course, lags) for course in courses], axis=0) / max(count, 1)
     alike[0] = alike[0] * (1 + FLAT) + least**2
     steps = np.zeros((lags + 1, len(least)))
     steps[0] = 1.0
@@ -55,7 +55,7 @@ def colour_of(courses: Sequence[FloatArray], least: FloatArray) -> Colour:
     return Colour(steps)
 
 
-def _products(course: FloatArray, lags: int) -> FloatArray:
-    """(lags + 1, c): sums of lagged products."""
+def lagged_products(course: FloatArray, lags: int) -> FloatArray:
+    """(lags + 1, c): sums of lagged products of a course (n, c); what is not known counts as 0."""
     filled: FloatArray = np.where(np.isfinite(course).all(axis=1, keepdims=True), course, 0.0)
     return np.array([np.sum(filled[k:] * filled[: len(filled) - k], axis=0) for k in range(lags + 1)])

@@ -5,18 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import Compared, Weighed
+from analysis.diagnosis.contrast.compare import AS_ONE, Compared, Weighed
 from analysis.diagnosis.contrast.decide import BOUND, Decided
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import si_unit
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.search.by_contrast import AS_ONE, Contrast
+from analysis.diagnosis.search.by_contrast import Contrast
 from analysis.diagnosis.search.patience import OUT_OF_TIME
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 
@@ -140,22 +140,25 @@ def _candidate(weighed: Weighed, why: str, recording: Recording) -> Candidate:
 
 
 def _shown(found: Contrast, recording: Recording) -> NamedEffect | None:
-    channels = recording.response.channels
-    if found.hum is not None:
-        name, sites = "mains_hum", found.hum.channels
-        values = {"amplitude": found.hum.amplitude, "frequency": found.hum.frequency_hz}
+    place: Place = "sensor"
+    if found.line is not None:
+        name, sites, values, place = found.line.effect, found.line.channels, found.line.values, found.line.place
     elif found.shown is not None:
         claim = found.shown.claims[0]
         name, sites, values = claim.effect.name, claim.sites, dict(found.shown.placed()[0].values)
     else:
         return None
-    units = {
-        parameter.name: parameter.unit_in(False, recording.response.units[sites[0]])
-        for parameter in EFFECTS_BY_NAME[name].parameters
-    }
+    signal = recording.response if place == "sensor" else recording.command
+    channels, unit = signal.channels, signal.units[sites[0]]
+    effect = EFFECTS_BY_NAME.get(name)
+    units = (
+        dict.fromkeys(values, unit)
+        if effect is None
+        else {parameter.name: parameter.unit_in(False, unit) for parameter in effect.parameters}
+    )
     known = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
     axis = axis_letter(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None
-    return NamedEffect(name, "sensor", axis, 1.0, 1.0, known)
+    return NamedEffect(name, place, axis, 1.0, 1.0, known)
 
 
 def _improved(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:

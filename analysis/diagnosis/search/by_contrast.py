@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.contrast.compare import Compared, compared
 from analysis.diagnosis.contrast.decide import Decided, decide
-from analysis.diagnosis.contrast.lines import Hum, hum_of
+from analysis.diagnosis.contrast.lines import Line, hum_of, noise_of, steps_of
 from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.errors.choose_measure import Chosen
 from analysis.diagnosis.errors.hypothesis import Hypothesis
@@ -18,15 +18,11 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-HUM = "mains_hum"
+HUM, NOISE, STEPS = "mains_hum", "sensor_noise", "force_quantization"
 FORESEEN = 0.02
 """Share of a clean recording that a model may miss for faults to be told by it alone. By hand, as the next."""
 NOISY = 0.1
 """Share of the signal from which what does not repeat is more than noise: a device that slips and sticks."""
-
-
-AS_ONE = 0.05
-"""Excess of the error of both sets together over that of each by itself, up to which they are of one device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,8 +31,8 @@ class Contrast:
 
     shown: Hypothesis | None
     """By the readings themselves,"""
-    hum: Hum | None
-    """by a line of their spectrum,"""
+    line: Line | None
+    """by their spectrum, or by steps of the command,"""
     compared: Compared | None
     """or by comparison."""
     decided: Decided | None
@@ -46,7 +42,7 @@ class Contrast:
         """Whether the sets differ by more than any two stretches of either do, and no fault explains that."""
         if self.compared is None or self.decided is None or self.decided.named is not None:
             return False
-        return self.compared.excess > max(AS_ONE, self.compared.usual)
+        return self.compared.differ
 
     @property
     def weighed(self) -> frozenset[str]:
@@ -61,9 +57,11 @@ def contrast_of(
     shown = seen_directly(recordings, clean, effects)
     if shown:
         return Contrast(shown[0], None, None, None)
-    hum = None if HUM in without else hum_of(taken_of(recordings), taken_of(clean))
-    if hum is not None:
-        return Contrast(None, hum, None, None)
+    faulty, sound = taken_of(recordings), taken_of(clean)
+    for name, look in ((HUM, hum_of), (STEPS, steps_of), (NOISE, noise_of)):
+        line = look(faulty, sound) if faulty and sound and name not in without else None
+        if line is not None:
+            return Contrast(None, line, None, None)
     found = compared(recordings, clean, without, patient)
     return Contrast(
         None, None, found, None if found is None else decide(found, recordings[0].response.samples.shape[1])

@@ -16,6 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 ALIKE = 1e-3
 """Share of a step by which those of channels may differ that have the same."""
+LONG_RUNS = 2.0
+"""Repeats in a row, on average, as they are where half of all samples are lost: more is play, or a sensor at rest."""
 SAME = 1e-9
 """Share of its largest reading by which a channel's readings at a limit may differ."""
 
@@ -66,10 +68,17 @@ def _limit(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
         limit, count = _at_the_top(new[:, c])
         usual = max(_at_the_top(readings[:, c])[1] / len(readings) for readings in sound) * len(new)
         beyond = max(float(np.abs(readings[:, c]).max()) for readings in sound)
-        if limit < beyond and _unusual(count, usual):
+        elsewhere = max(_elsewhere(readings[:, c]) / len(readings) for readings in sound) * len(new)
+        if limit < beyond and _unusual(count, usual) and not _unusual(_elsewhere(new[:, c]), elsewhere):
             found[c] = limit
     within = bool(found) and bool(np.all(np.abs(new) <= max(found.values()) * (1 + SAME)))
     return _where(found, within, new.shape[1], "limit")
+
+
+def _elsewhere(values: FloatArray) -> int:
+    """Readings that stay as they were away from the largest magnitude: play holds them at any level, no limit does."""
+    sizes = np.abs(values[1:])
+    return int(np.count_nonzero((np.diff(values) == 0) & (sizes < sizes.max() * (1 - SAME))))
 
 
 def _at_the_top(values: FloatArray) -> tuple[float, int]:
@@ -86,7 +95,8 @@ def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     """Repeated samples that are scattered: a sensor at rest for a while has not lost samples."""
     repeated = _repeats(new)
     usual = max(float(_begun(_repeats(readings)).mean()) for readings in sound) * len(repeated)
-    if not _unusual(int(_begun(repeated).sum()), usual):
+    begun = int(_begun(repeated).sum())
+    if not _unusual(begun, usual) or repeated.sum() > LONG_RUNS * begun:
         return None
     fraction = (float(repeated.sum()) - usual) / len(repeated)
     return tuple(range(new.shape[1])), {"fraction": fraction}

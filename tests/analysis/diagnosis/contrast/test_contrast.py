@@ -7,9 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.diagnosis import diagnose as engine
+from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.compare import compared
 from analysis.diagnosis.contrast.decide import Decided, decide
-from analysis.diagnosis.contrast.lines import hum_of
+from analysis.diagnosis.contrast.lines import hum_of, noise_of, steps_of
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
@@ -188,8 +189,59 @@ def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none():
     clean = taken_of([recording(1)])
     found = hum_of(taken_of([recording(2, "mains_hum", 2e-5)]), clean)
     assert found is not None
-    assert (found.frequency_hz, found.amplitude) == (pytest.approx(50.0, abs=0.1), pytest.approx(2e-5, rel=0.2))
+    assert found.values == {"frequency": pytest.approx(50.0, abs=0.1), "amplitude": pytest.approx(2e-5, rel=0.2)}
     assert hum_of(taken_of([recording(2)]), clean) is None
+
+
+def noisy(rms: float, seed: int = 2) -> Recording:
+    plain = recording(seed)
+    more = rms * np.random.default_rng(9).normal(size=plain.response.samples.shape)
+    return replace(plain, response=replace(plain.response, samples=plain.response.samples + more))
+
+
+def test_white_noise_is_seen_where_the_clean_recording_has_less():
+    clean = taken_of([recording(1)])
+    found = noise_of(taken_of([noisy(2e-5)]), clean)
+    assert found is not None
+    assert found.values == {"rms": pytest.approx(2e-5, rel=0.1)}
+    assert noise_of(taken_of([recording(2)]), clean) is None
+
+
+def test_what_is_only_louder_at_times_or_at_some_frequencies_is_no_noise_of_the_sensor():
+    clean, plain = taken_of([recording(1)]), noisy(2e-5)
+    half = np.where(np.arange(COUNT)[:, None] < COUNT // 2, recording(2).response.samples, plain.response.samples)
+    assert noise_of(taken_of([replace(plain, response=replace(plain.response, samples=half))]), clean) is None
+    steep = recording(2).response.samples + 2e-5 * np.diff(
+        np.random.default_rng(9).normal(size=(COUNT + 6, 1)), 6, axis=0
+    )
+    assert noise_of(taken_of([replace(plain, response=replace(plain.response, samples=steep))]), clean) is None
+
+
+def test_a_command_in_steps_is_seen_where_the_clean_one_has_none():
+    clean, plain = taken_of([recording(1)]), recording(2)
+    stepped = replace(plain, command=replace(plain.command, samples=0.1 * np.round(plain.command.samples / 0.1)))
+    found = steps_of(taken_of([stepped]), clean)
+    assert found is not None
+    assert (found.place, found.values) == ("actuator", {"step": pytest.approx(0.1)})
+    assert steps_of(taken_of([plain]), clean) is None
+    assert steps_of(taken_of([stepped]), taken_of([stepped])) is None
+
+
+def test_a_drive_that_follows_slowly_is_named():
+    plain = recording(2)
+    force, limit = plain.command.samples[:, 0].copy(), 40.0 / RATE_HZ
+    asked = np.repeat(force[::250], 250)
+    given = np.empty(COUNT)
+    reached = asked[0]
+    for k, wanted in enumerate(asked):
+        reached += np.clip(wanted - reached, -limit, limit)
+        given[k] = reached
+    part = taken_of([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
+    (fault,) = [each for each in actuator_faults(0, "fx", part, True) if each.effect == "slew_limit"]
+    left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
+    best = fault.variants[int(np.argmin(left))]
+    assert best.values(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
+    assert min(left) < 0.3 * np.std(asked - given)
 
 
 def test_what_is_cut_short_ends_with_what_it_has():

@@ -84,3 +84,16 @@ def test_what_may_not_be_named_is_not_seen():
 def test_what_is_not_known_does_not_count():
     new = spoiled(recording(2), lambda y: np.where(np.arange(len(y))[:, None] < 500, np.nan, y))
     assert seen(new, recording(1)) == []
+
+
+def test_play_before_the_sensor_is_neither_a_limit_nor_lost_samples():
+    """It stays where it is after each turn, at any level."""
+
+    def play(y):
+        found, read = np.empty_like(y), y[0]
+        for k, here in enumerate(y):
+            read = np.clip(read, here - 0.2, here + 0.2)
+            found[k] = read
+        return found
+
+    assert seen(spoiled(recording(2, 0.0), play), recording(1, 0.0)) == []
