@@ -67,7 +67,7 @@ class Beside:
         """force: (n,); nuisances: (n, k)"""
         scale = np.linalg.norm(nuisances, axis=0)
         left, sizes, _ = np.linalg.svd(nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False)
-        self._known = left[:, sizes > 1e-9 * max(float(sizes[0]), np.finfo(float).tiny)]
+        self._known = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), np.finfo(float).tiny)]
         self.force = self._without(force)
         """(n,): what the nuisances leave of it."""
         self._power = max(float(self.force @ self.force), np.finfo(float).tiny)

@@ -13,7 +13,7 @@ from analysis.diagnosis.contrast.ledger import Grams, Places, weights_of
 from analysis.diagnosis.contrast.step_base import StepBase
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.contrast.watch_base import WatchBase
-from analysis.diagnosis.errors.residual_colour import lagged_products
+from analysis.diagnosis.data.lagged_products import lagged_products
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 

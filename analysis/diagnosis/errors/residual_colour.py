@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.signal import fftconvolve
 
+from analysis.diagnosis.data.lagged_products import lagged_products
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
@@ -53,9 +54,3 @@ def colour_of(courses: Sequence[FloatArray], least: FloatArray) -> Colour:
     for c, row in enumerate(alike.T):
         steps[1:, c] = -solve_toeplitz(row[:-1], row[1:])
     return Colour(steps)
-
-
-def lagged_products(course: FloatArray, lags: int) -> FloatArray:
-    """(lags + 1, c): sums of lagged products of a course (n, c); what is not known counts as 0."""
-    filled: FloatArray = np.where(np.isfinite(course).all(axis=1, keepdims=True), course, 0.0)
-    return np.array([np.sum(filled[k:] * filled[: len(filled) - k], axis=0) for k in range(lags + 1)])
