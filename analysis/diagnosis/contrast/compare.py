@@ -12,7 +12,7 @@ from analysis.diagnosis.balance.weighed import LEVEL, drawn_of
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.fault import Fault, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase, force_base
-from analysis.diagnosis.contrast.ledger import Fit, Pair, fitted, foretold, weights_of
+from analysis.diagnosis.contrast.ledger import Fit, Pair, fitted, foretold, left_by_own
 from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.sensor_faults import sensor_faults, turned_sensor
 from analysis.diagnosis.contrast.step_base import StepBase, likely_step
@@ -201,17 +201,12 @@ def _excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
     """Of stretches of one set described together over each by itself. sides: per stream, products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
-        return sum(_left_by_own(side[list(blocks)].sum(axis=0)) for side in sides)
+        return sum(left_by_own(side[list(blocks)].sum(axis=0)) for side in sides)
 
     together = error(ALL)
     for at in APART:
         apart = error(at) + error([block for block in ALL if block not in at])
         yield together / max(apart, 1e-300) - 1
-
-
-def _left_by_own(gram: FloatArray) -> float:
-    weights = weights_of(gram)
-    return max(float(weights @ gram @ weights), 0.0)
 
 
 def _weighed(

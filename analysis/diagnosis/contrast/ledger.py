@@ -113,6 +113,12 @@ def weights_of(plain: FloatArray) -> FloatArray:
     return np.concatenate([[1.0], -found])
 
 
+def left_by_own(gram: FloatArray) -> float:
+    """By weights that are fitted to these products alone."""
+    weights = weights_of(gram)
+    return max(float(weights @ gram @ weights), 0.0)
+
+
 def _joined(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     whole, spread = pair.with_it.part(pair.at), pair.with_it.spread(_padded(pair, sizes))
     return whole, spread, np.asarray(spread @ whole @ spread.T + sum(pair.without))
