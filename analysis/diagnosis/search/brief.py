@@ -5,20 +5,36 @@ course; before each kept stretch a run-in lets the model forget where it came fr
 Identification, ch. 2: transients of periodic excitation).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from analysis.diagnosis.data.growth import growth_rate
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.periods import settled_periods
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import Sensitivity
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.settings import BRIEF_CONSTANTS, BRIEF_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.evidence import Evidence
 from equalizer.signals.signal import FloatArray
+
+Places = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cut:
+    kept: Places
+    """Samples of one record."""
+    fit: Mask
+    """Which of all are fitted to,"""
+    instead: Places
+    """and for each of all the one that repeats it and is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +42,15 @@ class Brief:
     arena: Arena
     """Its measure holds the kept samples alone; what there is to fit is also what is chosen by."""
     kept: tuple[np.ndarray, ...]
-    """Per record of the long measure, the samples that are kept."""
+    """Per record of the long measure that has any, the samples that are kept."""
+    stands_in: Places
+    """(samples to fit of the long measure,): which of the kept samples to fit stands for each."""
+
+    def repeated(self, known: Sensitivity) -> Sensitivity:
+        """As it is on the long measure: what one period does, all of them do."""
+        t, samples = len(known.columns), sum(int(record.fit.sum()) for record in self.arena.measure.records)
+        columns = known.columns.reshape(t, samples, -1)[:, self.stands_in].reshape(t, -1)
+        return Sensitivity(known.at, columns, columns @ columns.T)
 
     def of(self, evidence: Evidence) -> Evidence:
         """The first record's, at the kept samples."""
@@ -54,28 +78,38 @@ def brief_of(arena: Arena, held: Hypothesis) -> Brief | None:
     settling_s = BRIEF_CONSTANTS / max(-growth_rate(arena.tuning.model), np.finfo(float).tiny)
     cut = [_cut(record, settling_s) for record in measure.records]
     before = sum(len(record.command) for record in measure.records)
-    if not len(cut[0][0]) or sum(len(kept) for kept, _ in cut) > BRIEF_SHARE * before:
+    if not len(cut[0].kept) or sum(len(one.kept) for one in cut) > BRIEF_SHARE * before:
         return None
-    records = tuple(_spliced(record, *each) for record, each in zip(measure.records, cut, strict=True))
+    records = tuple(_spliced(record, each) for record, each in zip(measure.records, cut, strict=True))
     short = measure.with_records(tuple(record for record in records if len(record.command)))
-    return Brief(replace(arena, measure=short), tuple(kept for kept, _ in cut if len(kept)))
+    return Brief(
+        replace(arena, measure=short), tuple(one.kept for one in cut if len(one.kept)), _stands_in(measure, cut)
+    )
 
 
-def _cut(record: Observed, settling_s: float) -> tuple[np.ndarray, Mask]:
-    """Which samples are kept, and which of all are fitted to."""
-    fit = record.fit.copy()
+def _stands_in(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
+    found, before = [], 0
+    for record, one in zip(measure.records, cut, strict=True):
+        found.append(before + (np.cumsum(one.fit) - 1)[one.instead[record.fit]])
+        before += int(one.fit.sum())
+    return np.concatenate(found)
+
+
+def _cut(record: Observed, settling_s: float) -> _Cut:
+    fit, instead = record.fit.copy(), np.arange(len(record.fit))
     for periods in settled_periods(record.recording):
         inside = slice(periods.segment.start, periods.segment.stop)
         last = slice(periods.starts[-1], periods.starts[-1] + periods.length)
         if periods.settled and fit[inside].any() and record.fit[last].all():
             fit[inside] = False
             fit[last] = True
+            instead[inside] = last.start + (instead[inside] - last.start) % periods.length
     needed, run_in = fit.copy(), int(np.ceil(min(settling_s * record.recording.sample_rate_hz, len(fit))))
     for start in np.flatnonzero(np.diff(np.concatenate([[0], fit.astype(np.int8)])) > 0).tolist():
         needed[max(start - run_in, 0) : start] = True
-    return np.flatnonzero(needed), fit
+    return _Cut(np.flatnonzero(needed), fit, instead)
 
 
-def _spliced(record: Observed, kept: np.ndarray, fit: Mask) -> Observed:
-    sealed = np.zeros(len(kept), dtype=np.bool_)
+def _spliced(record: Observed, cut: _Cut) -> Observed:
+    kept, fit, sealed = cut.kept, cut.fit, np.zeros(len(cut.kept), dtype=np.bool_)
     return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], sealed)

@@ -20,9 +20,10 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import Arena, Contender, refine
+from analysis.diagnosis.search.rivalry import Arena, Contender
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_step import without_step

@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
-from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit, gather_evidence
+from analysis.diagnosis.errors.output_error import Fitted, evaluated, gather_evidence
 from analysis.diagnosis.search.brief import brief_of
 from analysis.diagnosis.search.by_brief import fits_by_brief
 from analysis.diagnosis.search.candidates import CLOCK_DRIFT, candidates, clock_drift_by_trial
+from analysis.diagnosis.search.contest import contest, refine
 from analysis.diagnosis.search.families import excludes
 from analysis.diagnosis.search.no_answer import silences
 from analysis.diagnosis.search.parsimony import plainest_first
 from analysis.diagnosis.search.patience import OutOfPatienceError, always, impatient
-from analysis.diagnosis.search.rivalry import Arena, Contender, contest, first_fits, refine, sensitivity_at
+from analysis.diagnosis.search.rivalry import Arena, Contender, first_fits, sensitivity_at
 from analysis.diagnosis.search.same_within_errors import excess
 from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.settings import ADDED_GAIN, ADDED_SHARE, MOST_EFFECTS, NOISE_ALONE, SEALED_SURPRISE, SEARCH_ON
@@ -22,8 +23,6 @@ from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
 from equalizer.effects.evidence import Evidence
 from equalizer.signals.signal import FloatArray
-
-RETUNING_ROUNDS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,8 +118,7 @@ def retuned_alone(arena: Arena) -> Fitted:
 
 
 def _retuned_from(arena: Arena, before: Fitted) -> Fitted:
-    known = sensitivity_at(arena, before.deviations, NOTHING)
-    return refine(arena, fit(arena.measure, arena.tuning, before, known, RETUNING_ROUNDS))
+    return refine(arena, before)
 
 
 @dataclass(frozen=True, slots=True)

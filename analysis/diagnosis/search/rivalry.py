@@ -1,4 +1,4 @@
-"""Fits the hypotheses that passed the screening, and orders them by their errors."""
+"""What all fits share, and the first fits of the hypotheses that passed the screening."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,31 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import Hypothesis, alike, without_claim
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting, sensitivity
+from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
 from analysis.diagnosis.errors.standing import Standing, standing
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.screening import Screened
 from analysis.diagnosis.search.sound_recordings import SoundRecordings
-from analysis.diagnosis.settings import (
-    LEAST_FITTED,
-    MOST_FITTED,
-    MOST_REFINED,
-    NO_SECOND_START,
-    REACHES_NOISE,
-    RICHER_LAW_SQUARES,
-    WORTH_FITTING,
-    WORTH_REFINING,
-)
+from analysis.diagnosis.settings import LEAST_FITTED, MOST_FITTED, WORTH_FITTING
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
-FIRST_ROUNDS, SECOND_ROUNDS = 3, 4
-MOST_REFRESHED, SETTLED, SETTLED_FAR, STALE = 4, 0.0005, 0.01, 0.5
-"""What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
-noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
-deviations since, for it costs a simulation for each."""
+FIRST_ROUNDS = 3
 FELT = 0.06
 """Change of an axis's channel, as a share of the largest that any number makes there."""
 
@@ -88,20 +75,6 @@ class Arena:
         return Contender(fitted, stands.larger(np.exp(gained)), 2 * float(gained.mean()))
 
 
-def contest(arena: Arena, base: Fitted, fits: Sequence[Fitted]) -> tuple[Contender, ...]:
-    """The best first. fits: as `first_fits` leaves them."""
-    worth = _worth_refining(base, fits)
-    refined, others = [refine(arena, candidate) for candidate in worth[:1]], worth[1:MOST_REFINED]
-    if refined and arena.contender(refined[0]).standing.seen <= NO_SECOND_START:
-        others = [law for law in others if arena.contender(law).standing.seen <= REACHES_NOISE]
-    refined += [refine(arena, candidate) for candidate in others]
-    rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
-    plain = [plain_law for plain_law in rest if any(_holds(richer, plain_law) for richer in refined[:1])][:1]
-    refined += [refine(arena, law) for law in plain]
-    contenders = [arena.contender(law) for law in [*refined, *(law for law in rest if law not in plain)]]
-    return tuple(sorted(contenders, key=lambda contender: contender.standing.chosen_by))
-
-
 def first_fits(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> list[Fitted]:
     """Of those that the screening foresees a gain of, the best first."""
     measure, tuning = arena.measure, arena.tuning
@@ -113,37 +86,6 @@ def first_fits(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequenc
 
     fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
     return sorted(fits, key=lambda found: found.cost)
-
-
-def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """fits: the best first."""
-    gained = [base.cost - found.cost for found in fits]
-    return [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
-
-
-def refine(arena: Arena, fitted: Fitted) -> Fitted:
-    """Fitted until it settles, with sensitivities recomputed; where more than noise is left, also from the calibration,
-    because re-tuning may have absorbed the missing effect and ended in another minimum."""
-    here, known = _refined_from(arena, fitted, None)
-    here, known = _of_alike(arena, here, known)
-    if arena.contender(here).standing.seen <= NO_SECOND_START:
-        return here
-    calibrated = evaluated(arena.measure, arena.tuning, np.zeros_like(here.deviations), here.hypothesis)
-    there, _ = _refined_from(arena, calibrated, known)
-    return there if there.cost < here.cost else here
-
-
-def _of_alike(arena: Arena, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
-    """The best of the hypotheses that behave almost alike, each fitted; the plain one where it is as good as any."""
-    best = fitted, known
-    for other in alike(fitted.hypothesis):
-        beside = _refined_from(arena, evaluated(arena.measure, arena.tuning, fitted.deviations, other), known)
-        best = beside if beside[0].cost < best[0].cost else best
-    for other in alike(best[0].hypothesis):
-        plain = evaluated(arena.measure, arena.tuning, best[0].deviations, other)
-        samples = len(fitting(arena.measure, plain.residuals))
-        best = (plain, best[1]) if plain.cost < best[0].cost + RICHER_LAW_SQUARES / samples else best
-    return best
 
 
 def sensitivity_at(
@@ -160,33 +102,6 @@ def sensitivity_at(
         return plain
     felt = felt_numbers(arena.measure, arena.tuning, plain, hypothesis)
     return sensitivity(arena.measure, arena.tuning, deviations, hypothesis, arena.map_, (plain.columns, felt))
-
-
-def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
-    """known: sensitivity at another point of the same hypothesis; None = not computed yet."""
-    best = fitted
-    complete = known is not None
-    there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
-    before = np.inf
-    for _ in range(MOST_REFRESHED):
-        better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
-        gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        # Gains shrink about evenly, so that the next one can be foreseen.
-        foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
-        best = better
-        settled = (foreseen if complete else gained) < max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))
-        if (complete and settled) or (arena.contender(best).standing.seen <= NO_SECOND_START and settled):
-            break
-        if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
-            there = sensitivity_at(arena, best.deviations, best.hypothesis, with_forces=True)
-            complete = True
-    return best, there
-
-
-def _holds(richer: Fitted, plain: Fitted) -> bool:
-    """Whether the last claim contains the other's as a special case: then both must be fitted equally well."""
-    last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
-    return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)
 
 
 def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:

@@ -6,10 +6,11 @@ from dataclasses import replace
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.standing import standing
+from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import Learned, floored
 from analysis.diagnosis.search.no_answer import foresees_nothing
-from analysis.diagnosis.search.rivalry import Arena, Contender, refine
+from analysis.diagnosis.search.rivalry import Arena, Contender
 from analysis.diagnosis.search.search import Searched, searched
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
 from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import Arena, Contender, refine
+from analysis.diagnosis.search.rivalry import Arena, Contender
 
 
 def without_step(arena: Arena, found: Explanation, number: int) -> Explanation:

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
 from analysis.diagnosis.errors.output_error import bounded_step, evaluated, fit, fitting, sensitivity
-from analysis.diagnosis.search.rivalry import refine
+from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect

@@ -9,8 +9,8 @@ from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
 from analysis.diagnosis.errors.output_error import evaluated, fit, sensitivity
 from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.error_table import errors_of
+from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import refine
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 

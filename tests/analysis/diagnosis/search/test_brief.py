@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
-from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.output_error import evaluated, sensitivity
 from analysis.diagnosis.search import brief
 from analysis.diagnosis.search.brief import brief_of
 from equalizer.effects.catalogue import EFFECTS
@@ -60,3 +60,19 @@ def test_evidence_is_cut_like_the_samples(lagging):
 
 def test_there_is_none_where_what_is_held_hangs_on_the_time(lagging):
     assert brief_of(lagging, claim("sensor_drift", total=1.0, bend=0.0, start=0.0)) is None
+
+
+def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
+    short, at = brief_of(lagging, NOTHING), np.zeros(len(lagging.tuning.names))
+    (record,) = lagging.measure.records
+    whole = sensitivity(lagging.measure, lagging.tuning, at, NOTHING)
+    found = short.repeated(sensitivity(short.arena.measure, short.arena.tuning, at, NOTHING))
+    assert found.columns.shape == whole.columns.shape == (len(at), record.fit.sum() * record.measured.shape[1])
+    later = np.ones(len(record.fit), dtype=bool)
+    for segment in record.recording.segments:
+        later[segment.start : segment.start + segment.period] = False  # in which the motion settles
+    told = np.repeat(later[record.fit], record.measured.shape[1])
+    off = np.linalg.norm((found.columns - whole.columns)[:, told], axis=1)
+    assert (off < 0.02 * np.linalg.norm(whole.columns[:, told], axis=1)).all()
+    turned = np.roll(found.columns, 100 * record.measured.shape[1], axis=1)
+    assert np.linalg.norm((turned - whole.columns)[:, told]) > 0.2 * np.linalg.norm(whole.columns[:, told])

@@ -6,7 +6,8 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import Claim, claimed
 from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.errors.output_error import evaluated
-from analysis.diagnosis.search.rivalry import refine, sensitivity_at
+from analysis.diagnosis.search.contest import refine
+from analysis.diagnosis.search.rivalry import sensitivity_at
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
