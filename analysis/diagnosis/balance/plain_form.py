@@ -34,7 +34,8 @@ def plain_form(recordings: Sequence[Recording]) -> tuple[Recordings, tuple[str, 
     """recordings: alike in channels, units and rate. And a sentence for each change."""
     found, said = tuple(recordings), []
     steps = (
-        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses, restored, _still, _summed,
+        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses,
+        restored, _still, _summed,
     )  # fmt: skip
     for step in steps:
         found, sentence = step(found)
