@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, model_validator
 from pydantic.dataclasses import dataclass
 
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
+from analysis.diagnosis.found_law import FoundLaw
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, Place
 
 FORMAT, VERSION = "hapteq-diagnosis", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
@@ -92,9 +93,12 @@ class NamedEffect:
         tuple[EffectWord, ...],
         Field(alias="class", description="Laws that these data cannot part, this one first; empty where they can."),
     ] = ()
+    law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}, and of nothing else.")] = None
 
     @model_validator(mode="after")
     def _as_in_the_vocabulary(self) -> Self:
+        if (self.effect == DISCOVERED_LAW) != (self.law is not None):
+            raise ValueError(f"an effect has a law where its name is {DISCOVERED_LAW}, and nowhere else")
         known = EFFECTS_BY_NAME.get(self.effect)
         if known is None:
             return self
@@ -117,6 +121,7 @@ class Candidate:
     held_out_gain: Annotated[Share, Field(description="Of the error power on data that nothing was fitted to.")]
     share_of_black_box: Annotated[Share, Field(description="Of what all laws together take of the linear error power.")]
     why_not: str
+    law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}.")] = None
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -187,7 +192,9 @@ class Diagnosis:
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain values, without format and version."""
     plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
-    for entry, optional in ((plain, "candidates"), *((effect, "class") for effect in plain["effects"])):
+    effects, candidates = plain["effects"], plain["candidates"]
+    left_out = [(effect, "class") for effect in effects] + [(entry, "law") for entry in (*effects, *candidates)]
+    for entry, optional in ((plain, "candidates"), *left_out):
         if not entry[optional]:
             del entry[optional]
     return plain

@@ -212,8 +212,8 @@ def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     known = _words(effect)
     named = dict(known.numbers) if known else {}
     if not named:
-        main = EFFECTS_BY_NAME[effect].main.name if effect in EFFECTS_BY_NAME else next(iter(parameters), "")
-        named = {main: _BARE}
+        main = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]
+        named = dict.fromkeys(main, _BARE)
     shares = known.shares if known else ()
     return ", ".join(
         said.format(estimate_text(parameters[name], name in shares))

@@ -16,7 +16,7 @@ from analysis.diagnosis.search.rivalry import Contender
 from analysis.figures.diagnosis_style import AFTER, RETUNED, ratio_ticks
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_nothing_to_draw
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
@@ -123,7 +123,7 @@ def _scale(axes: Axes, values: FloatArray) -> None:
 
 def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
     noun = noun_of(claim.effect.name)
-    if claim.spread != "one" or EFFECTS_BY_NAME[claim.effect.name].place == "hand":
+    if claim.spread != "one" or place_of_effect(claim.effect) == "hand":
         return f"{noun}, {'all alike' if claim.spread == 'all' else 'each its own'}" if len(claim.sites) > 1 else noun
     site = claim.sites[0]
     return f"{noun}, {axes[site] if site < len(axes) else site + 1}" if len(axes) > 1 else noun

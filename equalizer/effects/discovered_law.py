@@ -13,6 +13,7 @@ from equalizer.laws.parse import MEMORY
 from equalizer.laws.program import DEEPEST, program_of
 from equalizer.laws.roles import Role, roles
 from equalizer.laws.tree import Apply, nodes
+from equalizer.laws.units import FORCE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -52,6 +53,19 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
         law=law,
         of_time="t" in law.variables,
     )
+
+
+def law_units(law: Law, channels: Channels, rotational: bool) -> tuple[str, ...]:
+    """Of its free numbers: those that it says, else as far as its formula tells them."""
+    if law.units:
+        return law.units
+    order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
+    orders = [motion_dimension(number) for number in range(len(DERIVATIVES))]
+    signals = {"t": SECOND, **dict.fromkeys(channels.outputs, orders[order]), **dict.fromkeys(channels.inputs, FORCE)}
+    for letter in LETTERS:
+        signals |= {prefix + letter: orders[number] for number, prefix in enumerate(DERIVATIVES)}
+        signals[COMMAND + letter] = FORCE
+    return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, rotational)
 
 
 def law_values(law: Law) -> Values:

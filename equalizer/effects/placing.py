@@ -1,10 +1,14 @@
 """Effects as a model's file names them, by axis and parameters, and as a simulation plays them, both ways."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.effect import PlacedEffect
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.effects.discovered_law import Channels, law_effect, law_values, law_with
+from equalizer.effects.effect import Effect, PlacedEffect
+from equalizer.laws.law import Law
+from equalizer.laws.parse import LawError
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, LAW_PLACES, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, nearest
 
 SHORT = 2
@@ -23,7 +27,8 @@ def placed_effects(
     An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A number that a file leaves out is as if
     what it says were not there. Raises PlacingError.
     """
-    return tuple(_placed(effect, input_channels, output_channels) for effect in model.effects)
+    channels = Channels(input_channels, output_channels, model.quantity)
+    return tuple(_placed(effect, channels) for effect in model.effects)
 
 
 def model_effects(
@@ -31,10 +36,22 @@ def model_effects(
 ) -> tuple[ModelEffect, ...]:
     """As `placed_effects` reads them back: one per site, or one without an axis where all share it."""
     return tuple(
-        ModelEffect(one.effect.name, axis, dict(one.effect.report(one.values)))
+        _model_effect(one, axis)
         for one in placed
-        for axis in _axes(one, output_channels if _is_sensors(one.effect.name) else input_channels)
+        for axis in _axes(one, output_channels if place_of_effect(one.effect) == "sensor" else input_channels)
     )
+
+
+def place_of_effect(effect: Effect) -> Place:
+    """Where it sits: a law without a name, by what it acts on."""
+    return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
+
+
+def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
+    law = placed.effect.law
+    if law is None or axis is None:
+        return ModelEffect(placed.effect.name, axis, dict(placed.effect.report(placed.values)))
+    return ModelEffect(placed.effect.name, axis, {}, replace(law_with(law, placed.values), axis=axis))
 
 
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
@@ -45,7 +62,8 @@ def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
 
 
 def _axes(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
-    if set(placed.sites) == set(range(len(channels))) and (len(channels) > 1 or "one" not in placed.effect.sites):
+    shared = placed.effect.law is None and set(placed.sites) == set(range(len(channels)))
+    if shared and (len(channels) > 1 or "one" not in placed.effect.sites):
         yield None
         return
     for site in placed.sites:
@@ -54,7 +72,9 @@ def _axes(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | Non
         yield axis_letter(channels[site], channels)
 
 
-def _placed(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> PlacedEffect:
+def _placed(effect: ModelEffect, channels: Channels) -> PlacedEffect:
+    if effect.law is not None:
+        return _placed_law(effect, effect.law, channels)
     entry = EFFECTS.get(effect.kind)
     if entry is None:
         raise PlacingError(
@@ -64,7 +84,19 @@ def _placed(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ..
         value = effect.parameters.get(parameter.name, 0.0)
         if parameter.scale == "log" and value < 0:
             raise PlacingError(f"{effect.kind}.{parameter.name} is {value:g}; it must not be negative")
-    return PlacedEffect(entry, _sites(effect, outputs if _is_sensors(effect.kind) else inputs), effect.parameters)
+    return PlacedEffect(entry, _sites(effect, _channels(place_of_effect(entry), channels)), effect.parameters)
+
+
+def _placed_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
+    try:
+        entry = law_effect(law, channels)
+    except LawError as error:
+        raise PlacingError(f"{effect.kind} on {effect.axis}: {error}") from error
+    return PlacedEffect(entry, _sites(effect, _channels(place_of_effect(entry), channels)), law_values(law))
+
+
+def _channels(place: Place, channels: Channels) -> tuple[str, ...]:
+    return channels.outputs if place == "sensor" else channels.inputs
 
 
 def _sites(effect: ModelEffect, channels: tuple[str, ...]) -> tuple[int, ...]:
@@ -76,7 +108,3 @@ def _sites(effect: ModelEffect, channels: tuple[str, ...]) -> tuple[int, ...]:
         found = "is on several of" if named else "is none of"
         raise PlacingError(f"{effect.kind}: the axis '{effect.axis}' {found} {', '.join(channels)}")
     return named
-
-
-def _is_sensors(kind: str) -> bool:
-    return EFFECTS_BY_NAME[kind].place == "sensor"

@@ -158,5 +158,7 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
 DISCOVERED_LAW = "discovered_law"
 """A law that has no name: a formula, whose numbers p0, p1, … are its own; see `equalizer.laws`. Not one of those above:
 where it acts, the law says."""
+LAW_PLACES: dict[str, Place] = {"force": "mechanism", "command": "actuator", "response": "sensor"}
+"""Where a law sits, by what it acts on."""
 
 EFFECTS_BY_NAME: dict[str, EffectName] = {effect.name: effect for effect in EFFECT_NAMES}

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.laws.law import Law
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
 DERIVATIVE_OF_QUANTITY = {
@@ -70,6 +71,8 @@ class ModelEffect:
     axis: str | None
     """The command's or response's axis or channel name; None where all share it."""
     parameters: Mapping[str, float]
+    law: Law | None = None
+    """Of a discovered law, whose numbers stand in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,9 +172,12 @@ def _mass_problems(mass: FloatArray) -> Iterator[str]:
 
 def effect_problems(effect: ModelEffect) -> Iterator[str]:
     """What contradicts the vocabulary."""
+    if effect.kind == DISCOVERED_LAW:
+        yield from _law_problems(effect)
+        return
     known = EFFECTS_BY_NAME.get(effect.kind)
     if known is None:
-        names = tuple(EFFECTS_BY_NAME)
+        names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
         yield f"unknown kind '{effect.kind}'{nearest(effect.kind, names)}; allowed are {', '.join(names)}"
         return
     names = tuple(parameter.name for parameter in known.parameters)
@@ -187,3 +193,10 @@ def effect_problems(effect: ModelEffect) -> Iterator[str]:
     ]
     if missing:
         yield f"{effect.kind} lacks {', '.join(missing)}"
+
+
+def _law_problems(effect: ModelEffect) -> Iterator[str]:
+    if effect.law is None:
+        yield f"{effect.kind} lacks expression, acts_on or axis"
+    if effect.parameters:
+        yield f"{effect.kind} has its numbers in its expression; beside it stands {', '.join(effect.parameters)}"

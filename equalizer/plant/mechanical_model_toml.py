@@ -8,6 +8,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from equalizer.laws.law import Law, law_of
+from equalizer.laws.parse import LawError
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import (
     ActuatorLimits,
     MechanicalModel,
@@ -74,7 +77,9 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
     lines += _section("[sensor]", asdict(model.sensor))
     lines += _section("[actuator]", asdict(model.actuator))
     for effect in model.effects:
-        lines += _section("[[effect]]", {"kind": effect.kind, "axis": effect.axis, **effect.parameters})
+        lines += _section(
+            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_of_law(effect), **effect.parameters}
+        )
     if model.tolerance is not None:
         lines += _section("[tolerance]", asdict(model.tolerance))
     if model.provenance:
@@ -139,7 +144,9 @@ def _effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
         return ()
     found = []
     for number, entry in enumerate(entries, start=1):
-        numbers = {key: value for key, value in entry.items() if key not in ("kind", "axis")}
+        law = _law(entry, number, problems) if entry.get("kind") == DISCOVERED_LAW else None
+        words = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
+        numbers = {key: value for key, value in entry.items() if key not in words}
         wrong = [f"{key} = {_said(value)}" for key, value in numbers.items() if not _is_number(value)]
         if wrong:
             problems.append(f"effect {number} holds {', '.join(wrong)}; parameters are numbers")
@@ -151,12 +158,32 @@ def _effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
             problems.append(
                 f"effect {number}: axis is {_said(entry['axis'])}; it must be a text, or left out for all axes"
             )
-        found.append(ModelEffect(kind, entry.get("axis") or None, numbers))
+        found.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
     return () if problems else tuple(_as_floats(effect) for effect in found)
 
 
+_LAW_KEYS = ("acts_on", "expression")
+
+
+def _law(entry: Mapping[str, Any], number: int, problems: list[str]) -> Law | None:
+    missing = [key for key in (*_LAW_KEYS, "axis") if not isinstance(entry.get(key), str)]
+    if missing:
+        problems.append(f"effect {number}: {DISCOVERED_LAW} lacks {', '.join(missing)} (texts)")
+        return None
+    try:
+        return law_of(entry["expression"], entry["acts_on"], entry["axis"])
+    except LawError as error:
+        problems.append(f"effect {number}: {error}")
+        return None
+
+
+def _of_law(effect: ModelEffect) -> dict[str, str]:
+    return {} if effect.law is None else {"acts_on": effect.law.acts_on, "expression": effect.law.exact_text}
+
+
 def _as_floats(effect: ModelEffect) -> ModelEffect:
-    return ModelEffect(effect.kind, effect.axis, {key: float(value) for key, value in effect.parameters.items()})
+    numbers = {key: float(value) for key, value in effect.parameters.items()}
+    return ModelEffect(effect.kind, effect.axis, numbers, effect.law)
 
 
 def _is_number(value: Any) -> bool:

@@ -29,6 +29,8 @@ LAYOUT = (
     Entry("actuator.limit", "number", "largest force or torque; 0 = none", False),
     Entry("effect.kind", "text", "a name of the table of effects; one [[effect]] per effect", False),
     Entry("effect.axis", "text", "axis or channel; left out where all share it", False),
+    Entry("effect.acts_on", "text", "of a `discovered_law`: force, command or response", False),
+    Entry("effect.expression", "text", "of a `discovered_law`: its formula, see below", False),
     Entry("effect.…", "number", "every parameter of the effect, by its name", False),
     Entry("tolerance.mass_kg", "number", "one standard deviation, as calibrated, at each driven axis", False),
     Entry("tolerance.damping_n_s_per_m", "number", "likewise", False),

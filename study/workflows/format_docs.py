@@ -35,6 +35,7 @@ from study.store.layout import Entry
 from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.store.text_file import write_text
 from study.workflows.importing_docs import importing_markdown
+from study.workflows.law_docs import LAWS
 from study.workflows.session_log_docs import event_schema, session_log_markdown
 
 
@@ -129,6 +130,8 @@ def formats_markdown() -> str:
         "Names of physics that a model may have or lack, with the parameters in order, the main one first; units of "
         "translational and rotational models. Further names may appear in a diagnosis.",
         _effects(),
+        "## Laws without a name",
+        LAWS,
         *_tables(),
         *session_log_markdown(),
         "## JSON documents and protocols",

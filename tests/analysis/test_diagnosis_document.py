@@ -99,3 +99,34 @@ def test_an_unexplained_mismatch_is_there():
 
 def test_the_schema_asks_for_every_key_of_the_contract():
     assert set(diagnosis_schema()["required"]) == set(DOCUMENT)
+
+
+LAW = {"expression": "-4.1*abs(vy)**1.5*sign(vy)", "variables": ["vy"], "acts_on": "force", "axis": "y"}
+DISCOVERED = {
+    **DOCUMENT["effects"][0], "effect": "discovered_law", "axis": "y", "law": LAW,
+    "parameters": {"p0": {"value": 4.1, "unit": "N s^1.5/m^1.5", "ci95": [3.9, 4.3]}},
+}  # fmt: skip
+
+
+def test_a_law_without_a_name_goes_to_json_and_back():
+    document = changed(("effects",), [DISCOVERED])
+    assert diagnosis_to_json(diagnosis_from_json(document)) == document
+
+
+@pytest.mark.parametrize(
+    ("effect", "problem"),
+    [
+        ({**DISCOVERED, "effect": "drag"}, "has a law where its name is discovered_law, and nowhere else"),
+        ({**DISCOVERED, "law": None}, "has a law where its name is discovered_law, and nowhere else"),
+        (
+            {**DISCOVERED, "law": {**LAW, "expression": "-4.1*vy.T"}},
+            "'vy.T' at character 6 is not part of the language",
+        ),
+        ({**DISCOVERED, "law": {**LAW, "variables": ["vx"]}}, "needs vy; its variables say otherwise"),
+        ({**DISCOVERED, "law": {**LAW, "acts_on": "motion"}}, "Input should be 'force', 'command' or 'response'"),
+    ],
+)
+def test_a_law_that_contradicts_itself_is_refused(effect, problem):
+    with pytest.raises(DiagnosisError) as error:
+        diagnosis_from_json(changed(("effects",), [effect]))
+    assert problem in str(error.value)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from equalizer.laws.law import law_of
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from equalizer.plant.mechanical_model import (
     ActuatorLimits,
@@ -154,3 +155,24 @@ def test_a_value_that_toml_does_not_have_is_refused_when_writing():
     )
     with pytest.raises(TypeError, match="a value of type complex cannot be written as TOML: 1j"):
         mechanical_model_toml(odd)
+
+
+LAW = '[[effect]]\nkind = "discovered_law"\naxis = "x"\nacts_on = "force"\nexpression = "-2.0*vx**3"\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('"-2.0*vx**3"', '"-2.0*vx.real"', "effect 1: 'vx.real' at character 6 is not part of the language of laws"),
+        ('"-2.0*vx**3"', "3", "effect 1: discovered_law lacks expression (texts)"),
+        ('axis = "x"\n', "", "effect 1: discovered_law lacks axis (texts)"),
+        ('"force"', '"motion"', "effect 1: a law acts on force, command, response; not on 'motion'"),
+        ("acts_on", "gain = 2\nacts_on", "discovered_law has its numbers in its expression; beside it stands gain"),
+        ('"discovered_law"', '"discoverd_law"', "effect 1 holds acts_on = 'force', expression = '-2.0*vx**3'"),
+    ],
+)
+def test_a_discovered_law_that_cannot_be_read_is_said_so(old, new, problem):
+    assert parse_mechanical_model(ONE_AXIS + LAW).effects[0].law == law_of("-2.0*vx**3", "force", "x")
+    with pytest.raises(MechanicalModelError) as error:
+        parse_mechanical_model(ONE_AXIS + LAW.replace(old, new))
+    assert problem in str(error.value)

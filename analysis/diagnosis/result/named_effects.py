@@ -1,12 +1,13 @@
 """The named effects for the document: numbers with intervals, rivals with reasons, probabilities."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.diagnosis.document import Estimate, NamedEffect, Rival
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
+from analysis.diagnosis.found_law import FoundLaw, found_law
 from analysis.diagnosis.result.impact_wording import BY_CHANCE, BY_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand, only_refines
@@ -23,7 +24,9 @@ from analysis.diagnosis.settings import (
     MOST_RIVALS,
     PROBABILITY_SCALE,
 )
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.discovered_law import Channels, law_units, law_with
+from equalizer.effects.effect import Effect, Values
+from equalizer.effects.placing import axis_letter, place_of_effect
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -41,6 +44,8 @@ class Said:
     outputs: tuple[str, ...]
     response_unit: str
     rotational: bool
+    quantity: str = "acceleration"
+    """Of the response."""
 
 
 def said_of(recording: Recording, model: MechanicalModel) -> Said:
@@ -50,6 +55,7 @@ def said_of(recording: Recording, model: MechanicalModel) -> Said:
         recording.response.channels,
         unit if isinstance(unit, str) else unit[0],
         model.rotational,
+        model.quantity,
     )
 
 
@@ -63,12 +69,13 @@ def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[N
         named.append(
             NamedEffect(
                 effect=claim.effect.name,
-                place=EFFECTS_BY_NAME[claim.effect.name].place,
+                place=place_of_effect(claim.effect),
                 axis=axis_of(claim, said),
                 share=shares[number],
                 probability=likely,
                 parameters=_estimates(whole, number, errors, slice(first, first + size), said),
                 rivals=rivals,
+                law=_law(whole, number, axis_of(claim, said)),
             )
         )
         first += size
@@ -79,7 +86,7 @@ def axis_of(claim: Claim, said: Said) -> str | None:
     """None where all share it."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
-    sensed = EFFECTS_BY_NAME[claim.effect.name].place == "sensor"
+    sensed = place_of_effect(claim.effect) == "sensor"
     channels = said.outputs if sensed else said.inputs
     return axis_letter(channels[claim.sites[0]], channels)
 
@@ -142,14 +149,28 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
         moved[coordinate] += errors[coordinate]
         for name, value in _reported(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
-    units = {
-        p.name: p.unit_in(said.rotational, said.response_unit) for p in EFFECTS_BY_NAME[claim.effect.name].parameters
-    }
+    units = _units(claim.effect, at, said)
     return {
         name: Estimate(value, units.get(name, "1"), _interval(value, float(np.sqrt(spread[name]))))
         for name, value in at.items()
         if np.isfinite(value)
     }
+
+
+def _units(effect: Effect, values: Values, said: Said) -> dict[str, str]:
+    if effect.law is not None:
+        law = law_with(effect.law, values)
+        units = law_units(law, Channels(said.inputs, said.outputs, said.quantity), said.rotational)
+        return dict(zip(values, units, strict=True))
+    return {p.name: p.unit_in(said.rotational, said.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
+
+
+def _law(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
+    law = whole.claims[number].effect.law
+    if law is None:
+        return None
+    found = law_with(law, _groups(whole, number, whole.point)[0])
+    return found_law(replace(found, axis=axis or found.axis))
 
 
 def _interval(value: float, standard_error: float) -> tuple[float, float] | None:
@@ -164,8 +185,8 @@ def _reported(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, fl
     groups = _groups(whole, number, point)
     claim = whole.claims[number]
     reported = [dict(claim.effect.report(values)) for values in groups]
-    main = EFFECTS_BY_NAME[claim.effect.name].main.name
     if claim.effect.name in LARGEST and len(reported) > 1:
+        main = EFFECTS_BY_NAME[claim.effect.name].main.name
         return max(reported, key=lambda values: abs(values[main]))
     return reported[0]
 

@@ -11,7 +11,7 @@ from analysis.diagnosis.result.next_experiment import Bench, Foreseen, as_docume
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.rivalry import Arena, Contender, sensitivity_at
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 
@@ -43,7 +43,7 @@ def proposed_experiment(arena: Arena, found: Explanation) -> Proposal | None:
         named, other = contenders[0].fitted, rival.fitted
         claims = named.hypothesis.claims[-1], other.hypothesis.claims[-1]
         record = arena.measure.records[0]
-        sensed = EFFECTS_BY_NAME[claims[0].effect.name].place == "sensor"
+        sensed = place_of_effect(claims[0].effect) == "sensor"
         axis = min(claims[0].sites[0], record.command.shape[1] - 1) if sensed else claims[0].sites[0]
         level = float(np.abs(record.command).max())
         rate_hz = record.recording.sample_rate_hz

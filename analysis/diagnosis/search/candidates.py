@@ -11,7 +11,7 @@ from equalizer.effects.clock_drift import LARGEST_PPM
 from equalizer.effects.effect import ALL_SITES, Effect, Values
 from equalizer.effects.evidence import Evidence
 from equalizer.effects.other_times import read_other_times
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 CLOCK_DRIFT = "clock_drift"
@@ -21,7 +21,7 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
     """In the catalogue's order; an effect whose estimator finds no starting value is left out."""
 
     def of_effect(effect: Effect) -> list[Hypothesis]:
-        sensed = EFFECTS_BY_NAME[effect.name].place == "sensor"
+        sensed = place_of_effect(effect) == "sensor"
         sites = range(evidence.model.outputs if sensed else evidence.model.inputs)
         starts = [effect.starts(evidence, site)[:STARTS_PER_CLAIM] for site in sites]
         found: list[Hypothesis] = []

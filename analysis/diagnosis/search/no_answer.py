@@ -8,7 +8,7 @@ from analysis.diagnosis.errors.standing import rms_over
 from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.settings import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
 from analysis.diagnosis.types import Mask
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 _TINY = 1e-300
@@ -25,7 +25,7 @@ def silences(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
     before, left = _left(measure, base), _left(measure, fitted)
     most = int(np.argmax(np.log(np.maximum(before, _TINY)) - np.log(np.maximum(left, _TINY))))
     claim = fitted.hypothesis.claims[-1]
-    sensed = claim.sites if EFFECTS_BY_NAME[claim.effect.name].place == "sensor" else ()
+    sensed = claim.sites if place_of_effect(claim.effect) == "sensor" else ()
     nothing = left >= np.maximum(NO_PREDICTION_SHARE * _signal(measure), NO_PREDICTION_ERROR * measure.noise)
     return bool(nothing[most] or any(nothing[site] for site in sensed if site < len(nothing)))
 

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.discovered_law import law_effect, law_values
+from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import PlacingError, axis_letter, model_effects, placed_effects
 from equalizer.effects.simulator import simulate_mechanism
+from equalizer.laws.law import law_of
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import ModelEffect
 from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
@@ -80,3 +83,30 @@ def test_an_effect_beyond_the_channels_cannot_be_written(bench):
 )
 def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter):
     assert axis_letter(channels[1], channels) == letter
+
+
+@pytest.mark.parametrize(
+    ("text", "acts_on"),
+    [
+        ("-4.123456789*abs(vy)**1.5*sign(vy) + 2*x**2*vy", "force"),
+        ("fy - 0.1*fx", "command"),
+        ("delay(ay, 0.0021)", "response"),
+    ],
+)
+def test_a_discovered_law_is_written_and_read_back_the_same(bench, text, acts_on):
+    law = law_of(text, acts_on, "y")
+    fitted = PlacedEffect(law_effect(law), (1,), law_values(law))
+    model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
+    again = parse_mechanical_model(mechanical_model_toml(model))
+    assert again.effects == (ModelEffect("discovered_law", "y", {}, law),)
+    (placed_again,) = placed_effects(again, INPUTS, OUTPUTS)
+    assert (placed_again.sites, placed_again.values) == ((1,), law_values(law))
+    commands = 0.1 * bench.commands(3)[:500]
+    one, other = (simulate_mechanism(again, commands, 1000.0, [each]).response for each in (fitted, placed_again))
+    assert np.array_equal(one, other)
+
+
+def test_a_law_of_a_signal_that_is_not_there_is_refused(bench):
+    effect = ModelEffect("discovered_law", "y", {}, law_of("-2.0*voltage", "force", "y"))
+    with pytest.raises(PlacingError, match="discovered_law on y: the law needs the signal 'voltage'; there are"):
+        placed(bench.three_axes(), effect)

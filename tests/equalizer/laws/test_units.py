@@ -1,0 +1,31 @@
+"""Units of a law's numbers follow from its formula."""
+
+import pytest
+
+from equalizer.effects.discovered_law import Channels, law_units
+from equalizer.laws.law import law_of
+
+
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [
+        ("-4.1*abs(vy)**1.5*sign(vy)", ("N s^1.5/m^1.5", "1")),
+        ("0.2*sin(2*pi*x/0.01 + 0.3)", ("N", "m", "1")),
+        ("-3.0*x**2*vx", ("N s/m^3",)),
+        ("-1500.0*(x - lag(x, 0.02))", ("N/m", "s")),
+        ("-20.0*play(x, 1e-4) + 3.0*integral(x)", ("N/m", "m", "N/(m s)")),
+        ("-2.0*maximum(x - 0.01, 0) - 0.1*ax", ("N/m", "m", "N s^2/m")),
+        ("0.1*fx*(1 + 0.2*tanh(vy/0.05))", ("1", "1", "m/s")),
+        ("0.3/(x + 0.02)", ("N m", "m")),
+        ("0.3*0.2*x", ("?", "?")),
+    ],
+)
+def test_units_of_a_force(text: str, units: tuple[str, ...]):
+    assert law_units(law_of(text, "force", "y"), Channels(), False) == units
+
+
+def test_units_of_a_torque_and_of_a_response():
+    assert law_units(law_of("-4.1*vx*abs(vx)", "force", "x"), Channels(("u",), ("q",), "angle"), True) == (
+        "N m s^2/rad^2",
+    )
+    assert law_units(law_of("ax + 0.2*ax**3", "response", "x"), Channels(), False) == ("s^4/m^2",)
