@@ -106,7 +106,8 @@ def _remembers(law: Law) -> bool:
     return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))
 
 
-def _axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
+def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
+    """What a formula calls the axes: by the ends of their channels where these are x, y, z, else in their order."""
     ends = tuple(channel[-1:] for channel in channels)
     if len(set(ends)) == len(ends) and set(ends) <= set(LETTERS):
         return ends
@@ -120,7 +121,7 @@ def force_signals(channels: Channels) -> dict[str, int]:
 
 def _motion_signals(channels: Channels) -> Iterator[tuple[str, int]]:
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
-    for axis, letter in enumerate(_axis_names(channels.inputs)):
+    for axis, letter in enumerate(axis_names(channels.inputs)):
         for number, prefix in enumerate((*DERIVATIVES, COMMAND)):
             yield prefix + letter, PER_AXIS * axis + number
     for axis, name in enumerate(channels.outputs if len(channels.outputs) == len(channels.inputs) else ()):
@@ -145,7 +146,7 @@ def _on_force(law: Law, channels: Channels) -> AxisForce:
 
 
 def _on_command(law: Law, channels: Channels) -> OnCommand:
-    signals = {COMMAND + letter: axis for axis, letter in enumerate(_axis_names(channels.inputs))}
+    signals = {COMMAND + letter: axis for axis, letter in enumerate(axis_names(channels.inputs))}
     signals |= {name: axis for axis, name in enumerate(channels.inputs)}
     program_of(law.tree, {**signals, "t": -1})
 
@@ -172,6 +173,6 @@ def _on_response(law: Law, channels: Channels) -> OnResponse:
 
 def _response_signals(channels: Channels) -> Mapping[str, int]:
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity)
-    letters = _axis_names(channels.outputs) if order is not None else ()
+    letters = axis_names(channels.outputs) if order is not None else ()
     named = {DERIVATIVES[order or 0] + letter: number for number, letter in enumerate(letters)}
     return {**named, **{name: number for number, name in enumerate(channels.outputs)}}

@@ -54,7 +54,7 @@ def _text(tree: Node, numbers: Sequence[float] | None, digits: int | None) -> tu
     """The text, and how strongly it holds together."""
     match tree:
         case Number(value):
-            return _signed(repr(value).removesuffix(".0"))
+            return _signed(repr(float(value)).removesuffix(".0"))
         case Free(place):
             return (f"p{place}", _ATOM) if numbers is None else _signed(_free(numbers[place], digits))
         case Variable(name):

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from equalizer.effects.discovered_law import axis_names
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.known_forces import LAWS
+from equalizer.tracking.law_forces import why_law_stays
 
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
 
@@ -32,8 +34,11 @@ TIMED = "in the identified model; used to send what is added ahead of time"
 SCALING, TIMING = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
 
 
-def why_not(kind: str) -> str:
-    """Empty for an effect that is compensated."""
+def why_not(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
+    """Empty for an effect that is compensated. inputs: channels of the commands."""
+    kind = effect.kind
+    if effect.law is not None:
+        return why_law_stays(effect.law, axis_names(inputs))
     if kind in LAWS or kind == "force_deadband":
         return ""
     if kind in SCALING:

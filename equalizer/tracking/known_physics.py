@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from equalizer.effects.discovered_law import axis_names
+from equalizer.laws.law import Law as FoundLaw
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.plant.model_response import model_response
@@ -19,7 +21,8 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.band_part import band_share, padded_length
 from equalizer.tracking.effect_roles import lead_s, why_not
 from equalizer.tracking.iteration import fitting_share
-from equalizer.tracking.known_forces import LAWS, deadband_share, equivalent_impedance
+from equalizer.tracking.known_forces import LAWS, Law, deadband_share, equivalent_impedance
+from equalizer.tracking.law_forces import along_own_axis, force_against, linear_share, undone
 from equalizer.tracking.planned_motion import PlannedMotion, planned_motion
 
 SLIP_SHARE = 0.05
@@ -61,16 +64,18 @@ def compensate(
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz
     motion = planned_motion(wanted, rate_hz, model.band_hz, lead_s(physics, rate_hz))
-    reasons = [(effect, why_not(effect.kind)) for effect in physics.effects]
+    reasons = [(effect, why_not(effect, model.input_channels)) for effect in physics.effects]
     used = tuple(effect for effect, reason in reasons if not reason)
     gain = axis_gains(physics, model.input_channels, model.output_channels)
     played, added = forces.copy(), np.zeros_like(forces)
     for effect, axis in _by_axis(used, model):
-        if effect.kind in LAWS:
+        if effect.kind in LAWS or _is_force(effect):
             added[:, axis] += _beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
     for effect, axis in _by_axis(used, model):
         if effect.kind == "force_deadband":
             _out_of_deadband(effect.parameters["width"], played, added, axis, identified_with_n)
+        elif effect.law is not None and not _is_force(effect):
+            _undone(effect.law, played, added, axis, identified_with_n)
     difference = played + added - forces
     share = 1.0 if cap_n is None else fitting_share(forces, difference, cap_n)
     not_used = tuple((effect, reason) for effect, reason in reasons if reason)
@@ -114,11 +119,9 @@ def _beyond_model(
     effect: ModelEffect, axis: int, motion: PlannedMotion, model: IdentifiedModel, identified_with_n: float | None
 ) -> FloatArray:
     """(N,): the effect's force along the motion, less what of it the linear model holds already."""
-    law, v = LAWS[effect.kind], motion.velocity[:, axis]
+    v = motion.velocity[:, axis]
     slip = slip_speed(v)
-    if slip == 0:
-        return np.zeros_like(v)
-    force = law(effect.parameters, motion.position[:, axis], v, slip)
+    law, force = force_law(effect, axis, motion, (model.input_channels, model.sample_rate_hz), slip)
     if identified_with_n is None:
         return force
     length = padded_length(len(v), model.sample_rate_hz)
@@ -129,6 +132,33 @@ def _beyond_model(
     held = np.zeros(len(lines_hz), dtype=np.complex128)
     held[inside] = equivalent_impedance(law, effect.parameters, lines_hz[inside], speed, SLIP_SHARE)
     return np.asarray(force - np.fft.irfft(held * np.fft.rfft(v, length), length)[: len(v)])
+
+
+def force_law(
+    effect: ModelEffect, axis: int, motion: PlannedMotion, sampled: tuple[tuple[str, ...], float], slip: float
+) -> tuple[Law, FloatArray]:
+    """The force (N,) to be added along a motion, and the law that gives it along one axis. sampled: channels of the
+    commands, and the rate, Hz."""
+    if effect.law is not None:
+        letters = axis_names(sampled[0])
+        against = force_against(effect.law, letters, motion, sampled[1], slip)
+        return along_own_axis(effect.law, letters, axis), against
+    law, v = LAWS[effect.kind], motion.velocity[:, axis]
+    if slip == 0:
+        return law, np.zeros_like(v)
+    return law, law(effect.parameters, motion.position[:, axis], v, slip)
+
+
+def _is_force(effect: ModelEffect) -> bool:
+    return effect.law is not None and effect.law.acts_on == "force"
+
+
+def _undone(law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None) -> None:
+    """What must be commanded so that the force behind a command map is the one that is meant, in place."""
+    if identified_with_n is not None:
+        played[:, axis] *= linear_share(law, identified_with_n)
+    meant = played[:, axis] + added[:, axis]
+    added[:, axis] += undone(law, meant) - meant
 
 
 def _out_of_deadband(

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from equalizer.laws.evaluate import evaluate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
-from equalizer.tracking.effect_roles import lead_s
-from equalizer.tracking.known_forces import LAWS
-from equalizer.tracking.known_physics import axes_of, axis_gains, slip_speed
+from equalizer.tracking.effect_roles import lead_s, why_not
+from equalizer.tracking.known_physics import axes_of, axis_gains, force_law, slip_speed
 from equalizer.tracking.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
@@ -38,13 +38,15 @@ def without_effects(recording: Recording, physics: MechanicalModel, excited_hz: 
     gain, freed = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
         for axis in axes_of(effect, inputs, outputs):
+            if effect.law is not None and effect.law.acts_on == "command" and not why_not(effect, inputs):
+                freed[:, axis] = evaluate(effect.law, {effect.law.variables[0]: freed[:, axis]}, rate_hz)
             if effect.kind == "force_deadband":
                 beyond = np.maximum(np.abs(freed[:, axis]) - effect.parameters["width"], 0.0)
                 freed[:, axis] = np.copysign(beyond, freed[:, axis])
     for effect in physics.effects:
-        if effect.kind in LAWS:
+        acts_on = "force" if effect.law is None else effect.law.acts_on
+        if acts_on == "force" and effect.kind != "force_deadband" and not why_not(effect, inputs):
             for axis in axes_of(effect, inputs, outputs):
-                x, v = motion.position[:, axis], motion.velocity[:, axis]
-                slip = max(slip_speed(v), np.finfo(np.float64).tiny)
-                freed[:, axis] -= LAWS[effect.kind](effect.parameters, x, v, slip) / gain[axis]
+                slip = max(slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
+                freed[:, axis] -= force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]
     return replace(recording, command=replace(recording.command, samples=freed))

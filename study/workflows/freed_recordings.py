@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.tracking.effect_roles import why_not
 from equalizer.tracking.without_effects import without_effects
@@ -19,7 +19,7 @@ def freed_recordings(recordings: Sequence[Recording], physics: MechanicalModel, 
     """path: of the mechanical model, for what is said. Raises StudyError where it names nothing that can be taken off,
     or where a recording does not show the motion."""
     if not freed_of(physics):
-        left = "".join(f" {effect.kind}: {why_not(effect.kind)}." for effect in physics.effects)
+        left = "".join(f" {effect.kind}: {why_not(effect)}." for effect in physics.effects)
         raise _not_freed(f"{path.name} names no effect that can be taken off a recording.{left}")
     try:
         return tuple(without_effects(one, physics, excited_band_hz(one)) for one in recordings)
@@ -30,11 +30,16 @@ def freed_recordings(recordings: Sequence[Recording], physics: MechanicalModel, 
 def freed_of(physics: MechanicalModel) -> list[str]:
     """What is taken off, in words."""
     return [
-        f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} "
-        f"({', '.join(f'{name} {value:g}' for name, value in effect.parameters.items())})"
+        f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} ({_numbers(effect)})"
         for effect in physics.effects
-        if not why_not(effect.kind)
+        if not why_not(effect)
     ]
+
+
+def _numbers(effect: ModelEffect) -> str:
+    if effect.law is not None:
+        return effect.law.text
+    return ", ".join(f"{name} {value:g}" for name, value in effect.parameters.items())
 
 
 def excited_band_hz(recording: Recording) -> tuple[float, float]:
