@@ -31,7 +31,7 @@ from equalizer.effects.instant import (
     V,
     X,
 )
-from equalizer.effects.mechanism_kernel import LAW, LAWS, Integers
+from equalizer.effects.mechanism_kernel import LAW, LAWS, READ_ONLY, Integers
 from equalizer.signals.signal import FloatArray
 
 _VECTOR = types.float64[::1]
@@ -58,7 +58,7 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
 
     @njit(
-        types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, _MATRIX, _MATRIX, _MATRIX, types.float64),
+        types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY, _MATRIX, _MATRIX, types.float64),
         cache=True, nogil=True, error_model="numpy",
     )  # fmt: skip
     def follow(  # noqa: PLR0913 - a kernel takes flat arrays

@@ -45,6 +45,7 @@ SWEEPS = 3
 """Over all forces per step, where there are several: each is found again with the others as they have become."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
+READ_ONLY = types.Array(types.float64, 2, "C", readonly=True)
 _PLACES = types.int64[:, ::1]
 LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
 """What every law of force is compiled as."""
@@ -185,7 +186,9 @@ with warnings.catch_warnings():
                 )
 
     @njit(
-        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _COUNT, types.float64),
+        types.void(
+            _LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64
+        ),
         cache=True, nogil=True, error_model="numpy", fastmath=FAST,
     )  # fmt: skip
     def play(  # noqa: PLR0913 - a kernel takes flat arrays

@@ -161,6 +161,14 @@ def test_laws_act_beside_each_other_and_beside_named_effects(bench):
     assert max(apart(bench, [drag, *many], [drag, spring])) < 1e-4
 
 
+def test_commands_may_be_read_only(bench):
+    held = COMMANDS[:50].copy()
+    held.flags.writeable = False
+    simulate_mechanism(bench.three_axes(), held, RATE_HZ, [at_y("-2.0*vy")])
+    along = force_along(bench.three_axes(), [at_y("-2.0*vy")], (COMMANDS[:50],) * 3, (held, held), RATE_HZ)
+    assert along[:-1, 1] == pytest.approx(-(held[:-1, 1] + held[1:, 1]))
+
+
 def test_a_law_of_nothing_changes_nothing(bench):
     plain = simulate_mechanism(bench.three_axes(), COMMANDS, RATE_HZ)
     none = simulate_mechanism(bench.three_axes(), COMMANDS, RATE_HZ, [at_y("0.0*vx*fy")])
