@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.observed_parts import names_of_parts
+from analysis.diagnosis.discovery.join import with_laws
 from analysis.diagnosis.errors.choose_measure import Compared, measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
@@ -20,7 +21,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import state_maps
 from analysis.diagnosis.search.by_balance import balances_of, borne_out, leaves_open, searched_by_balance
-from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, known_to_repeat
+from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, hums_low, known_to_repeat
 from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.impacts import rattling
@@ -38,7 +39,6 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
-LOWEST_MAINS_HZ = 45.0
 WEIGHED = ("force_deadband", "force_saturation")
 """Laws of the command that a balance has weighed: what it does not name is not there."""
 GAINS = ("force_gain", "sensor_gain")
@@ -59,6 +59,8 @@ class DiagnosisSettings:
     """Where they were weighed already: `balances_of` these recordings."""
     compared: Compared = "auto"
     """What is compared: motion, force, or what suits."""
+    discovery: bool = False
+    """Where no name of the catalogue stands, laws without a name are looked for."""
     patient: Patience = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
 
@@ -89,6 +91,8 @@ def diagnose(
         return beside
     look = look_of(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     seen = _by_search(recordings, look, settings, map_, progress, balances)
+    if settings.discovery and not settings.fitted:
+        seen = replace(seen, searched=with_laws(seen.searched, progress, settings.patient))
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 
@@ -200,7 +204,7 @@ def _by_search(
         found = _Seen(searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor)
     else:
         found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
-        if _hums_low(found.searched):
+        if hums_low(found.searched.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
             found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
     if balances and found.searched.judged.named:
@@ -213,12 +217,6 @@ def _by_search(
         if rattled is not None:
             return replace(found, searched=Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
-
-
-def _hums_low(seen: Searched) -> bool:
-    """A line far below any mains is a harmonic of what drives the device."""
-    placed = seen.found.after.fitted.hypothesis.placed()
-    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
 
 
 def _beside_motion(name: str, imposed: bool) -> bool:

@@ -152,3 +152,22 @@ SAME_TO_READERS = 1.05  # ratio of errors that count as the same
 FIT_CONFIRMED = 1.25  # held-out error over the error on what was fitted
 UNIT_FACTOR, UNIT_CORRELATION = 5.0, 0.9  # factor from which a unit is doubted, where courses correlate so well
 TELLING_GAIN = 10.0  # log likelihood below which a proposed recording would leave rivals as good as each other
+
+# A law without a name (`discovery`). By hand, but where a principle is named.
+LAW_BLOCKS = 6  # least number of stretches that held-out errors are taken over
+LAW_POWER_KEPT = 0.999  # share of the commands' power within the band that laws are ranked in
+LAW_REFINED, LAW_BEAM = 6, 4  # starts whose free numbers are fitted; sums that are kept
+LAW_MOST_TERMS = 2  # along one axis at once; more are added round by round
+LAW_MAIN_PART = 0.3  # of the misfit that one term may leave; beyond, a sum is looked for
+LAW_ALMOST_NOISE = 1.1  # held-out error power along an axis, 1 = noise, below which no law is looked for
+LAW_WORTH_SHARE = 0.4  # of what is left above the noise that a further term must take
+LAW_AXES_SHARE = 0.3  # of the largest held-out misfit that a second axis needs, to be searched at once
+LAW_FITTED, LAW_FITTED_WITHIN = (
+    3,
+    3.0,
+)  # sums that are fitted by output error: of the best one's remainder, so many times
+LAW_MOST_ROUNDS = 3  # laws that are added one after the other
+LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error, change nothing for a reader
+LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
+LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
+LAW_PLACEBO = 0.2  # share that the best term may take of a shuffled force

@@ -12,6 +12,7 @@ from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.errors.choose_measure import Chosen
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.played_errors import played_error
+from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.seen_directly import seen_directly
 from analysis.diagnosis.types import Patience
 from equalizer.effects.catalogue import CATALOGUE
@@ -19,6 +20,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 HUM, NOISE, STEPS = "mains_hum", "sensor_noise", "force_quantization"
+LOWEST_MAINS_HZ = 45.0
 FORESEEN = 0.02
 """Share of a clean recording that a model may miss for faults to be told by it alone. By hand, as the next."""
 NOISY = 0.1
@@ -78,3 +80,9 @@ def known_to_repeat(chosen: Chosen) -> bool:
     size = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
     repeats = all(floor.how == "repeats" for floor in chosen.floors)
     return repeats and bool(np.all(chosen.measure.noise <= NOISY * size)) and chosen.measure.name == "free simulation"
+
+
+def hums_low(found: Explanation) -> bool:
+    """A line far below any mains is a harmonic of what drives the device."""
+    placed = found.after.fitted.hypothesis.placed()
+    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)

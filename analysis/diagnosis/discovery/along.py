@@ -1,0 +1,38 @@
+"""A shape along samples, whole arrays at a time where nothing is remembered: a search evaluates hundreds."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from analysis.diagnosis.discovery.grammar import Columns
+from equalizer.laws.evaluate import evaluate
+from equalizer.laws.law import Law
+from equalizer.laws.parse import MEMORY, parsed
+from equalizer.laws.tree import Apply, Free, Node, Number, nodes
+from equalizer.signals.signal import FloatArray
+
+_WHOLE: Mapping[str, Callable[..., FloatArray]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative,
+    "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs,
+    "sign": np.sign, "tanh": np.tanh, "atan": np.arctan, "minimum": np.minimum, "maximum": np.maximum,
+}  # fmt: skip
+
+
+def along(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
+    """(n,). Outside its domain NaN or inf."""
+    tree = parsed(shape, template=True)[0]
+    with np.errstate(all="ignore"):
+        if any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(tree)):
+            return evaluate(Law(shape, tuple(numbers), (), "force", "x"), columns, rate_hz)
+        return np.array(np.broadcast_to(_value(tree, numbers, columns), columns["t"].shape))
+
+
+def _value(tree: Node, numbers: Sequence[float], columns: Columns) -> FloatArray:
+    match tree:
+        case Number(value):
+            return np.float64(value)  # type: ignore[return-value]
+        case Free(place):
+            return np.float64(numbers[place])  # type: ignore[return-value]
+        case Apply(name, parts):
+            return _WHOLE[name](*(_value(part, numbers, columns) for part in parts))
+    return columns[tree.name] if tree.name != "pi" else np.float64(np.pi)  # type: ignore[return-value]

@@ -1,0 +1,151 @@
+"""Forward selection of laws that have no name: where most is missing, the best sum of terms, fitted by output error."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.discovery.as_effect import hypothesis_of, law_of_sum
+from analysis.diagnosis.discovery.beam import Searched, best_sums
+from analysis.diagnosis.discovery.grammar import axes_of, periodic, terms_of
+from analysis.diagnosis.discovery.screen import products_of, tried
+from analysis.diagnosis.discovery.snap import snapped
+from analysis.diagnosis.discovery.sums import Sum
+from analysis.diagnosis.discovery.whitened import View, views_of
+from analysis.diagnosis.errors.hypothesis import together
+from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
+from analysis.diagnosis.search.contest import refine
+from analysis.diagnosis.search.explain import Explanation, worthwhile
+from analysis.diagnosis.search.rivalry import FIRST_ROUNDS, Arena, Contender, sensitivity_at
+from analysis.diagnosis.settings import (
+    LAW_ALMOST_NOISE,
+    LAW_AXES_SHARE,
+    LAW_FITTED,
+    LAW_FITTED_WITHIN,
+    LAW_MOST_ROUNDS,
+    NOISE_ALONE,
+    RETUNING_BOUND,
+)
+from analysis.diagnosis.types import Patience, Progress
+from equalizer.plant.mechanical_model import MechanicalModelError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Round:
+    """One law that was added."""
+
+    contenders: tuple[Contender, ...]
+    """The best first."""
+    sums: tuple[Sum, ...]
+    """As the screen had them; the first is that of the first contender."""
+    placebo: float
+    """Share of the held-out squares above the noise that the best term takes of a missing force out of its time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Discovered:
+    found: Explanation
+    """`after` holds the laws; its rounds and steps are those of the laws."""
+    rounds: tuple[Round, ...]
+
+
+def discover(arena: Arena, known: Explanation, progress: Progress, patient: Patience) -> Discovered | None:
+    """None where no law is found that is worth its numbers. known: what the named effects explain."""
+    retuned = known.retuned.fitted
+    base = arena.contender(evaluated(arena.measure, arena.tuning, retuned.deviations, retuned.hypothesis))
+    rounds: list[Round] = []
+    steps: list[Contender] = []
+    while len(rounds) < LAW_MOST_ROUNDS and patient() and base.standing.seen > NOISE_ALONE:
+        progress("looking for a law that has no name", 0.6 + 0.1 * len(rounds))
+        found = _next(arena, base.fitted, patient)
+        if found is None or not worthwhile(base, found.contenders[0]):
+            break
+        base = found.contenders[0]
+        rounds.append(found)
+        steps.append(base)
+    if not rounds:
+        return None
+    last = arena.contender(snapped(arena, base.fitted))
+    steps[-1] = last
+    whole = Explanation(
+        known.before, known.retuned, arena.confirmed(last), tuple(each.contenders for each in rounds), tuple(steps)
+    )
+    return Discovered(whole, tuple(rounds))
+
+
+def _next(arena: Arena, base: Fitted, patient: Patience) -> Round | None:
+    views = views_of(arena.measure, arena.tuning, base)
+    searched = [_along(view, patient) for view in _where(views)]
+    every = sorted((one for found in searched for one in found.sums), key=lambda one: _taken(views, one), reverse=True)
+    sums = _near(_different(every))[:LAW_FITTED]
+    if not sums:
+        return None
+    known = sensitivity_at(arena, base.deviations, base.hypothesis)
+    fits: list[tuple[Fitted, Sum]] = []
+    for one in sums:
+        start = _started(arena, base, one)
+        if start is not None:
+            fits.append((fit(arena.measure, arena.tuning, start, known, FIRST_ROUNDS), one))
+    fits.sort(key=lambda pair: pair[0].cost)
+    if not fits or not np.isfinite(fits[0][0].cost):
+        return None
+    first = (arena.contender(refine(arena, fits[0][0])), fits[0][1])
+    others = [(arena.contender(fitted), one) for fitted, one in fits[1:]]
+    ranked = sorted([first, *others], key=lambda pair: pair[0].standing.chosen_by)
+    placebo = max((found.placebo for found in searched), default=0.0)
+    return Round(tuple(one for one, _ in ranked), tuple(one for _, one in ranked), placebo)
+
+
+def _started(arena: Arena, base: Fitted, one: Sum) -> Fitted | None:
+    """With the model's own numbers as they were, or as the sum wants them."""
+    law = hypothesis_of(law_of_sum(one), one.axis, arena.measure.records[0].recording)
+    found: list[Fitted] = []
+    for deviations in (base.deviations, np.clip(base.deviations + one.moved, -RETUNING_BOUND, RETUNING_BOUND)):
+        try:
+            found.append(evaluated(arena.measure, arena.tuning, deviations, together(base.hypothesis, law)))
+        except (MechanicalModelError, np.linalg.LinAlgError):
+            continue
+    return min(found, key=lambda start: start.cost, default=None)
+
+
+def _where(views: Sequence[View]) -> list[View]:
+    """The axes at which most is missing, the first first."""
+    missing = [(_excess(view), view.axis) for view in views]
+    most = max(excess for excess, _ in missing)
+    worth = [(excess, axis) for excess, axis in missing if excess > LAW_ALMOST_NOISE]
+    return [views[axis] for excess, axis in sorted(worth, reverse=True)[:2] if excess >= LAW_AXES_SHARE * most]
+
+
+def _excess(view: View) -> float:
+    """Held-out squares of the re-tuned model over the noise's."""
+    base = products_of(view)
+    without = tried(base, view.residual[None, :]).without
+    return float(without.sum()) / (view.noise * len(view.residual))
+
+
+def _along(view: View, patient: Patience) -> Searched:
+    seen = view.records[0]
+    axes = axes_of(seen.columns, seen.left.shape[1])
+    terms = terms_of(axes, view.axis, len(seen.left) / seen.rate_hz, seen.rate_hz)
+    lines = periodic(seen.columns, axes[view.axis], seen.left[:, view.axis], seen.rate_hz)
+    return best_sums(products_of(view), (*terms, *lines), patient)
+
+
+def _taken(views: Sequence[View], one: Sum) -> float:
+    view = views[one.axis]
+    return (one.without - one.crossed) * view.noise * len(view.residual)
+
+
+def _near(sums: Sequence[Sum]) -> list[Sum]:
+    """Those that leave not much more than the best one."""
+    return [
+        one for one in sums if one.crossed - 1 <= LAW_FITTED_WITHIN * max(sums[0].crossed - 1, LAW_ALMOST_NOISE - 1)
+    ]
+
+
+def _different(sums: Sequence[Sum]) -> list[Sum]:
+    """The best of each structure."""
+    found: dict[tuple[int, frozenset[str]], Sum] = {}
+    for one in sums:
+        found.setdefault((one.axis, frozenset(term.shape for term in one.terms)), one)
+    return list(found.values())

@@ -1,0 +1,149 @@
+"""Which term explains most of what a fit leaves, beside what re-tuning does: held out, block by block.
+
+Each block's error is that of numbers fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
+own numbers pulled to their calibration. Terms are tried together, as products of columns.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from analysis.diagnosis.discovery.whitened import View
+from equalizer.signals.signal import FloatArray
+
+_DEPENDENT = 1e-6
+"""Of a column's power that must be its own beside the model's numbers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Products:
+    """Of base columns, block by block; (blocks, …) each."""
+
+    view: View
+    held: tuple[FloatArray, ...]
+    """(s,) each: columns of terms that are held to be there, after the model's numbers and a constant."""
+    squares: FloatArray
+    """(blocks, k, k)"""
+    seen: FloatArray
+    """(blocks, k): with the residual,"""
+    power: FloatArray
+    """(blocks,): and the residual's own."""
+
+    @property
+    def blocks(self) -> list[slice]:
+        edges = self.view.edges
+        return [slice(a, b) for a, b in pairwise(edges)]
+
+    @property
+    def calibration(self) -> FloatArray:
+        """(k,): how strongly each is pulled back."""
+        sizes = self.squares.sum(axis=0).diagonal()
+        pulled = np.where(sizes > 0, 1e-10 * sizes, 1.0)
+        pulled[: len(self.view.pull) - 1] = 1.0
+        return pulled
+
+    def cross(self, columns: FloatArray) -> FloatArray:
+        """(blocks, k, terms). columns: (terms, s)"""
+        found = []
+        for part in self.blocks:
+            those = columns[:, part].T
+            rows = [self.view.tuned[:, part] @ those, *((column[None, part] @ those) for column in self.held)]
+            found.append(np.vstack(rows))
+        return np.array(found)
+
+
+def products_of(view: View) -> Products:
+    """Of the model's numbers and a constant."""
+    base, edges = view.tuned, list(pairwise(view.edges))
+    return Products(
+        view,
+        (),
+        np.array([base[:, a:b] @ base[:, a:b].T for a, b in edges]),
+        np.array([base[:, a:b] @ view.residual[a:b] for a, b in edges]),
+        np.array([view.residual[a:b] @ view.residual[a:b] for a, b in edges]),
+    )
+
+
+def extended(base: Products, columns: Sequence[FloatArray]) -> Products:
+    """With terms that are held to be there, too."""
+    if not len(columns):
+        return base
+    more, view = np.array(columns), base.view
+    cross = base.cross(more).transpose(0, 2, 1)
+    own = np.array([more[:, part] @ more[:, part].T for part in base.blocks])
+    seen = np.array([more[:, part] @ view.residual[part] for part in base.blocks])
+    squares = np.concatenate(
+        [np.concatenate([base.squares, cross.transpose(0, 2, 1)], axis=2), np.concatenate([cross, own], axis=2)], axis=1
+    )
+    return Products(view, (*base.held, *columns), squares, np.hstack([base.seen, seen]), base.power)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    without: FloatArray
+    """(blocks,): held-out squares of the base alone,"""
+    with_it: FloatArray
+    """(blocks, terms): and with each term."""
+    factors: FloatArray
+    """(blocks, terms): of the term, fitted to the other blocks."""
+
+
+def tried(of: Products, columns: FloatArray) -> Tried:
+    """columns: (terms, s)"""
+    parts = of.blocks
+    cross = of.cross(columns)
+    own = np.array([np.einsum("ks,ks->k", columns[:, part], columns[:, part]) for part in parts])
+    seen = np.array([columns[:, part] @ of.view.residual[part] for part in parts])
+    pulled = of.calibration
+    wanted = np.zeros(len(pulled))
+    wanted[: len(of.view.pull)] = pulled[: len(of.view.pull)] * of.view.pull
+    without, with_it, factors = [], [], []
+    for number in range(len(parts)):
+        squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(pulled)
+        pull = of.seen.sum(axis=0) - of.seen[number] + wanted
+        other = cross.sum(axis=0) - cross[number]
+        solved = np.linalg.solve(squares, np.column_stack([pull, other]))
+        alone, along = solved[:, 0], solved[:, 1:]
+        size = own.sum(axis=0) - own[number]
+        left = size - np.einsum("kt,kt->t", other, along)
+        free = left > _DEPENDENT * size
+        gained = seen.sum(axis=0) - seen[number] - other.T @ alone
+        factor = np.where(free, gained / np.where(free, left, 1.0), 0.0)
+        weights = alone[:, None] - along * factor
+        without.append(_squares(of, number, alone[:, None])[0])
+        with_it.append(
+            _squares(of, number, weights)
+            - 2 * factor * seen[number]
+            + 2 * factor * np.einsum("kt,kt->t", weights, cross[number])
+            + factor**2 * own[number]
+        )
+        factors.append(factor)
+    return Tried(np.array(without), np.array(with_it), np.array(factors))
+
+
+def _squares(of: Products, number: int, weights: FloatArray) -> FloatArray:
+    """(terms,). weights: (k, terms)"""
+    return np.asarray(
+        of.power[number] - 2 * of.seen[number] @ weights + np.einsum("kt,kt->t", weights, of.squares[number] @ weights)
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    weights: FloatArray
+    """(k,)"""
+    cost: float
+    """Squares that are left, and those of the calibration."""
+
+
+def solved(of: Products) -> Solved:
+    """All blocks together."""
+    pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.seen.sum(axis=0)
+    wanted = np.zeros(len(pulled))
+    wanted[: len(of.view.pull)] = pulled[: len(of.view.pull)] * of.view.pull
+    weights = np.linalg.solve(squares + np.diag(pulled), seen + wanted)
+    own = weights[: len(of.view.pull)] - of.view.pull
+    left = float(of.power.sum() - 2 * seen @ weights + weights @ squares @ weights)
+    return Solved(weights, left + float(pulled[: len(own)] @ own**2))

@@ -1,0 +1,96 @@
+"""Exponents that are simple numbers within their errors, written as such; and the formula as a reader writes it."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.discovery.as_effect import channels_of, laws_of
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed, together
+from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
+from analysis.diagnosis.search.rivalry import FIRST_ROUNDS, Arena, sensitivity_at
+from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
+from equalizer.effects.discovered_law import law_effect, law_values
+from equalizer.laws.law import Law
+from equalizer.laws.roles import roles
+
+
+def snapped(arena: Arena, fitted: Fitted) -> Fitted:
+    """Fitted anew with its exponents held at simple numbers; the same where none is near one."""
+    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
+    errors = standard_errors(arena.measure, arena.tuning, fitted, known)[len(arena.tuning.names) :]
+    plain = _plain(arena, fitted.hypothesis, errors)
+    if plain is None:
+        return fitted
+    start = evaluated(arena.measure, arena.tuning, fitted.deviations, plain)
+    found = fit(arena.measure, arena.tuning, start, known, FIRST_ROUNDS)
+    return found if found.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
+
+
+def _plain(arena: Arena, whole: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
+    """errors: (numbers,), of the point."""
+    recording = arena.measure.records[0].recording
+    parts, changed, first = [], False, 0
+    for number, (claim, law) in enumerate(zip(whole.claims, laws_of(whole), strict=True)):
+        count = len(claim.effect.parameters) * claim.groups
+        own = errors[first : first + count]
+        first += count
+        if law is None:
+            parts.append(_of_claim(whole, number))
+            continue
+        simple = _simple(law, own)
+        changed |= simple is not law
+        effect = law_effect(simple, channels_of(recording))
+        parts.append(claimed(Claim(effect, "one", claim.sites), [law_values(simple)]))
+    if not changed:
+        return None
+    found = parts[0]
+    for part in parts[1:]:
+        found = together(found, part)
+    return found
+
+
+def _of_claim(whole: Hypothesis, number: int) -> Hypothesis:
+    claim = whole.claims[number]
+    return claimed(claim, [dict(placed.values) for placed in whole.of_claim(number)])
+
+
+def _simple(law: Law, errors: np.ndarray) -> Law:
+    """With exponents near a half or a whole number written into the formula. errors: of exponents as logarithms."""
+    found = law
+    for place, role in sorted(roles(law.tree).items(), reverse=True):
+        value = law.numbers[place]
+        if role != "exponent" or value <= 0:
+            continue
+        near = max(round(2 * value) / 2, 0.5)
+        reach = 1.96 * INTERVAL_FACTOR * float(errors[place]) * value
+        if abs(value - near) <= max(reach, LAW_SNAP * value):
+            found = held(found, place, near)
+    return replace(found, expression=readable(found.expression))
+
+
+def held(law: Law, place: int, value: float) -> Law:
+    """With a free number as part of the formula."""
+    text = re.sub(rf"\bp{place}\b", f"{value:g}", law.expression)
+    renamed = re.sub(r"\bp(\d+)\b", lambda found: f"p{int(found[1]) - (int(found[1]) > place)}", text)
+    numbers = (*law.numbers[:place], *law.numbers[place + 1 :])
+    return replace(law, expression=renamed, numbers=numbers, units=())
+
+
+def readable(expression: str) -> str:
+    """Signed powers of whole exponents without absolute values."""
+
+    def signed(found: re.Match[str]) -> str:
+        name, power = found[1], int(found[2])
+        if power % 2:
+            return name if power == 1 else f"{name}**{power}"
+        return f"{name}*abs({name})" if power == 2 else f"{name}*abs({name})**{power - 1}"
+
+    def plain(found: re.Match[str]) -> str:
+        name, power = found[1], int(found[2])
+        return f"abs({name})" if power == 1 else f"{name}**{power}" if power % 2 == 0 else f"abs({name})**{power}"
+
+    expression = re.sub(r"abs\((\w+)\)\*\*(\d+)(?!\.)\*sign\(\1\)", signed, expression)
+    expression = re.sub(r"abs\((\w+)\)\*\*(\d+)(?![\d.])", plain, expression)
+    return re.sub(r"\)\*\*1(?![\d.])", ")", expression)

@@ -1,0 +1,110 @@
+"""Laws are found in simulated recordings, and none where nothing is missing. Compiles."""
+
+import pytest
+
+from analysis.diagnosis.discovery.as_effect import laws_of
+from analysis.diagnosis.discovery.beam import best_sums
+from analysis.diagnosis.discovery.discover import discover
+from analysis.diagnosis.discovery.grammar import axes_of, periodic, terms_of
+from analysis.diagnosis.discovery.join import with_laws
+from analysis.diagnosis.discovery.screen import products_of
+from analysis.diagnosis.discovery.snap import readable
+from analysis.diagnosis.discovery.whitened import views_of
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.verdict import judge
+from tests.lawful import PLAN, arena_of, law, recorded
+
+DRAG = law("-p0*abs(vx)**1.5*sign(vx)", 3.0)
+
+
+def quiet(said, share):
+    pass
+
+
+def always():
+    return True
+
+
+def found_in(recording):
+    arena, known = arena_of(recording)
+    found = discover(arena, known, quiet, always)
+    return None if found is None else laws_of(found.found.after.fitted.hypothesis)
+
+
+@pytest.mark.parametrize("seed", [1])
+@pytest.mark.parametrize(
+    ("true", "shape"),
+    [
+        (DRAG, "p0*abs(vx)**1.5*sign(vx)"),
+        (law("-p0*x**3", 1e5), "p0*x**3"),
+        (law("p0*fx*sin(2*pi*x/p1)", 0.2, 0.013), "p0*fx*sin(2*pi*x/p1 + p2)"),
+        (law("p0*lag(x, p1)", 40.0, 0.05), "p0*lag(x, p1)"),
+    ],
+)
+def test_a_law_is_found_with_its_numbers(true, shape, seed):
+    laws = found_in(recorded((true,), seed))
+    assert laws is not None
+    assert laws[0].expression == shape
+    sign = -1.0 if true.expression.startswith("-") else 1.0
+    assert laws[0].numbers[0] == pytest.approx(sign * true.numbers[0], rel=0.05)
+    assert laws[0].numbers[1 : len(true.numbers)] == pytest.approx(true.numbers[1:], rel=0.05)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_nothing_is_found_where_nothing_is_missing(seed):
+    assert found_in(recorded((), seed)) is None
+
+
+def test_ten_times_the_noise_leaves_the_law(seed=6):
+    laws = found_in(recorded((DRAG,), seed, noise=10.0))
+    assert laws is not None
+    assert "vx" in laws[0].variables
+
+
+def joined(recording):
+    arena, known = arena_of(recording)
+    return with_laws(Searched(arena, known, judge(known)), quiet, always)
+
+
+def test_a_proved_law_explains(seed=7):
+    seen = joined(recorded((DRAG,), seed))
+    assert seen.judged.verdict == "explained"
+    assert [claim.effect.name for claim in seen.found.after.fitted.hypothesis.claims] == ["discovered_law"]
+
+
+def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
+    plan = (*PLAN[:3], ("multisine", 1.5, "test"))
+    seen = joined(recorded((DRAG,), seed, plan=plan))
+    assert not seen.judged.named
+    assert any("candidate" in remark and "abs(vx)**1.5" in remark for remark in seen.remarks)
+
+
+def test_a_shuffled_force_holds_no_law(seed=9):
+    arena, known = arena_of(recorded((DRAG,), seed))
+    fitted = known.retuned.fitted
+    view = views_of(arena.measure, arena.tuning, evaluated(arena.measure, arena.tuning, fitted.deviations, NOTHING))[0]
+    seen = view.records[0]
+    axis = axes_of(seen.columns, 1)
+    terms = terms_of(axis, 0, len(seen.left) / seen.rate_hz, seen.rate_hz)
+    found = best_sums(
+        products_of(view), (*terms, *periodic(seen.columns, axis[0], seen.left[:, 0], seen.rate_hz)), always
+    )
+    best = found.sums[0]
+    assert found.placebo < 0.1 < 0.9 < 1 - best.crossed / best.without
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("p0*abs(vx)**3*sign(vx)", "p0*vx**3"),
+        ("p0*abs(x)**2*sign(x)", "p0*x*abs(x)"),
+        ("p0*abs(x)**2*vx", "p0*x**2*vx"),
+        ("p0*abs(vx)**1.5*sign(vx)", "p0*abs(vx)**1.5*sign(vx)"),
+        ("p0*abs(x)**1*vx", "p0*abs(x)*vx"),
+        ("p0*maximum(x - p1, 0)**1", "p0*maximum(x - p1, 0)"),
+    ],
+)
+def test_formulas_are_written_as_a_reader_would(written, read):
+    assert readable(written) == read
