@@ -35,7 +35,8 @@ from analysis.diagnosis.search.seen_directly import seen_directly
 from analysis.diagnosis.search.verdict import Judgement, judge
 from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.effects.law_entry import LawEntry, kept_effects
+from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
@@ -61,6 +62,8 @@ class DiagnosisSettings:
     """What is compared: motion, force, or what suits."""
     discovery: bool = False
     """Where no name of the catalogue stands, laws without a name are looked for."""
+    kept: tuple[LawEntry, ...] = ()
+    """Laws that were found elsewhere, to be looked for beside the catalogue."""
     patient: Patience = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
 
@@ -188,14 +191,15 @@ def _by_search(
     effects of actuator and sensor are."""
     chosen, arena = look.chosen, _arena(look, settings, map_)
     left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
-    catalogue = [effect for effect in CATALOGUE if effect.name not in left_out]
+    known = (*CATALOGUE, *kept_effects(settings.kept, recordings[0]))
+    catalogue = [effect for effect in known if effect.name not in left_out]
     refined = {name for effect in catalogue for name in effect.simpler}
     catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
     may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
     if balances:
         named = any(balance.named for balance in balances)
         imposed = bool(recordings[0].meta.get("imposed"))
-        catalogue = [] if named else [effect for effect in catalogue if _beside_motion(effect.name, imposed)]
+        catalogue = [] if named else [e for e in catalogue if _beside_motion(e.name, place_of_effect(e), imposed)]
         may_be_named = []
     if settings.clean:
         learned = learned_from(settings.clean, look.model, recordings, map_, progress)
@@ -219,10 +223,10 @@ def _by_search(
     return found
 
 
-def _beside_motion(name: str, imposed: bool) -> bool:
+def _beside_motion(name: str, place: str, imposed: bool) -> bool:
     """An effect of the actuator or sensor, of which a force balance tells nothing."""
     told = name == "body_on_actuator" or (name in WEIGHED and not imposed)
-    return EFFECTS_BY_NAME[name].place in ("actuator", "sensor") and not told
+    return place in ("actuator", "sensor") and not told
 
 
 def _assembled(

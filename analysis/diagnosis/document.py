@@ -93,12 +93,14 @@ class NamedEffect:
         tuple[EffectWord, ...],
         Field(alias="class", description="Laws that these data cannot part, this one first; empty where they can."),
     ] = ()
-    law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}, and of nothing else.")] = None
+    law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}, or of one that was kept.")] = None
 
     @model_validator(mode="after")
     def _as_in_the_vocabulary(self) -> Self:
-        if (self.effect == DISCOVERED_LAW) != (self.law is not None):
-            raise ValueError(f"an effect has a law where its name is {DISCOVERED_LAW}, and nowhere else")
+        if self.law is None and self.effect == DISCOVERED_LAW:
+            raise ValueError(f"{DISCOVERED_LAW} lacks its law")
+        if self.law is not None and self.effect in EFFECTS_BY_NAME:
+            raise ValueError(f"{self.effect} has a name, and so no law")
         known = EFFECTS_BY_NAME.get(self.effect)
         if known is None:
             return self

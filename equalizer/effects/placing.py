@@ -8,7 +8,7 @@ from equalizer.effects.discovered_law import Channels, law_effect, law_values, l
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
-from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, LAW_PLACES, Place
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, LAW_PLACES, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, nearest
 
 SHORT = 2
@@ -51,7 +51,7 @@ def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
     law = placed.effect.law
     if law is None or axis is None:
         return ModelEffect(placed.effect.name, axis, dict(placed.effect.report(placed.values)))
-    return ModelEffect(placed.effect.name, axis, {}, replace(law_with(law, placed.values), axis=axis))
+    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(law_with(law, placed.values), axis=axis))
 
 
 def axis_letter(channel: str, channels: tuple[str, ...]) -> str:

@@ -82,8 +82,7 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int, command
     outward, inward = asked @ form.outward, (form.inward @ by_force).T
     step = (form.advance, _whole(outward), _whole(inward), _whole(per_newton.T))
     into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
-    # A copy: compiled code takes no array that may not be written to.
-    seen = np.array(commanded, dtype=np.float64, order="C") if forces.sees else np.empty((0, 0))
+    seen = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
     def run(course: FloatArray, first: int) -> None:

@@ -1,6 +1,7 @@
 """`hapteq diagnose`: where model and recording differ, and what physics the model lacks."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -31,6 +32,11 @@ CleanOption = Annotated[
     ),
 ]
 
+EffectFileOption = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="EFFECT.py", help="A law of your own to look for, of `hapteq effect`; may be repeated."),
+]
+
 WithoutOption = Annotated[
     list[str] | None, typer.Option(metavar="EFFECT", help="An effect not to be considered; may be repeated.")
 ]
@@ -54,6 +60,7 @@ def diagnose(
     compare: CompareOption = "auto",
     seconds: SecondsOption = None,
     no_discovery: NoDiscoveryOption = False,
+    effect_file: EffectFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Locate the mismatch, name what is missing, and test it on held-out data.
@@ -64,7 +71,8 @@ def diagnose(
     from study.workflows.diagnose_recordings import DiagnosePlan, answered, written
     from study.workflows.diagnosed_summary import answer_lines, file_lines, summary
 
-    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare, seconds)
+    plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
+    plan = replace(plan, seconds=seconds, effect_files=tuple(effect_file or ()))
     with steps("Diagnosing") as show:
         answer = answered(plan, show)
     if no_discovery:

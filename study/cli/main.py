@@ -20,6 +20,7 @@ from study.cli import (
     analyze,
     diagnose,
     doctor,
+    effect,
     equalize,
     identify,
     import_recording,
@@ -102,6 +103,11 @@ app.command("identify", short_help="Fit a stable state-space model to a band, an
     identify.identify
 )
 app.command("equalize", short_help="Turn wanted accelerations into forces", rich_help_panel="Device")(equalize.equalize)
+app.command(
+    "effect",
+    short_help="Keep a discovered law as an effect of your own",
+    rich_help_panel="Analysis",
+)(effect.effect)
 app.command("twin", short_help="Write the mechanical model of the simulated omega.3", rich_help_panel="Device")(
     twin.twin
 )

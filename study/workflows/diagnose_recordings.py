@@ -32,6 +32,7 @@ from study.workflows.diagnosis_input import (
     nothing_to_diagnose,
     read_input,
 )
+from study.workflows.effect_file import read_entry
 from study.workflows.spring_in_model import spring_words, with_spring
 from study.workflows.worker_threads import worker_threads
 from study.workflows.write_twin import TwinPlan, write_twin
@@ -59,6 +60,8 @@ class DiagnosePlan:
     seed: int = 1
     """Of what is drawn: which trials of a session are taken, and which are kept for the test."""
     compare: Compared = "auto"
+    effect_files: tuple[Path, ...] = ()
+    """Of laws that were found elsewhere and are kept, as `hapteq effect` writes them."""
     seconds: float | None = None
     """Of processor time, after which the search ends with what it has."""
 
@@ -170,6 +173,7 @@ def _settings(
         fitted=plan.model is None and not found.simulated,
         balances=balances,
         compared=plan.compare,
+        kept=tuple(read_entry(path) for path in plan.effect_files),
         patient=patient,
     )
 

@@ -116,8 +116,8 @@ def test_a_law_without_a_name_goes_to_json_and_back():
 @pytest.mark.parametrize(
     ("effect", "problem"),
     [
-        ({**DISCOVERED, "effect": "drag"}, "has a law where its name is discovered_law, and nowhere else"),
-        ({**DISCOVERED, "law": None}, "has a law where its name is discovered_law, and nowhere else"),
+        ({**DISCOVERED, "effect": "cogging"}, "cogging has a name, and so no law"),
+        ({**DISCOVERED, "law": None}, "discovered_law lacks its law"),
         (
             {**DISCOVERED, "law": {**LAW, "expression": "-4.1*vy.T"}},
             "'vy.T' at character 6 is not part of the language",

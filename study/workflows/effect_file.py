@@ -1,0 +1,92 @@
+"""Laws that were discovered, kept as Python files of a user's own, which a diagnosis looks for beside the catalogue."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+from analysis.diagnosis.document import Diagnosis
+from equalizer.effects.law_entry import LawEntry
+from equalizer.laws.law import Law, law_of
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
+from study.errors import StudyError
+from study.store.diagnosis_file import read_diagnosis
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.text_file import write_text
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+TEXT = """\"\"\"{about}\"\"\"
+
+from equalizer.effects.law_entry import LawEntry
+from equalizer.laws.law import Law
+
+ENTRY = LawEntry(
+    name={name!r},
+    # p0, p1, ... are free; a fit starts from `numbers`, and force factors from a linear regression.
+    law=Law(
+        expression={expression!r},
+        numbers={numbers!r},
+        units={units!r},
+        acts_on={acts_on!r},
+        axis={axis!r},
+    ),
+    source={source!r},
+    # Ends the sentence that names it.
+    signature={signature!r},
+)
+"""
+
+
+def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
+    """number: which law, from 1. Raises StudyError where there is none, or where the file's name is no name."""
+    laws = _laws(found)
+    if number > len(laws):
+        has = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
+        raise _refused(f"{found} {has}.", "Give a diagnosis or model that has one, or another --number.")
+    if out.suffix != ".py" or not NAME.fullmatch(out.stem) or out.stem in (*EFFECTS_BY_NAME, DISCOVERED_LAW):
+        raise _refused(
+            f"'{out.name}' cannot be an effect's name.",
+            "Choose a name of small letters, digits and _ that is not in the catalogue, such as my_effect.py.",
+        )
+    law = laws[number - 1]
+    signature = f"it goes with {', '.join(law.variables) or 'nothing'} as the formula says"
+    entry = LawEntry(out.stem, law, f"found by hapteq: {found.name}", signature)
+    write_text(
+        out,
+        TEXT.format(
+            about=f"A law that was found, not named: {law.text} (acts on the {law.acts_on} at {law.axis}).",
+            name=entry.name, expression=law.expression, numbers=law.numbers, units=law.units, acts_on=law.acts_on,
+            axis=law.axis, source=entry.source, signature=entry.signature,
+        ),
+    )  # fmt: skip
+    return entry
+
+
+def read_entry(path: Path) -> LawEntry:
+    """Runs the file. Raises StudyError where it defines no ENTRY."""
+    spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise _refused(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise _refused(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
+    entry = getattr(module, "ENTRY", None)
+    if not isinstance(entry, LawEntry) or entry.name in EFFECTS_BY_NAME or not NAME.fullmatch(entry.name):
+        raise _refused(
+            f"{path} defines no ENTRY, or one by a name of the catalogue.",
+            "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
+        )
+    return entry
+
+
+def _laws(found: Path) -> list[Law]:
+    if found.suffix == ".toml":
+        return [effect.law for effect in read_mechanical_model(found).effects if effect.law is not None]
+    document: Diagnosis = read_diagnosis(found / "diagnosis.json" if found.is_dir() else found)
+    laws = [one.law for one in document.effects] + [one.law for one in document.candidates]
+    return [law_of(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
+
+
+def _refused(happened: str, do: str) -> StudyError:
+    return StudyError("There is no effect of your own", happened, do, saved="Nothing was written.")
