@@ -28,3 +28,8 @@ class FoundLaw:
 
 def found_law(law: Law) -> FoundLaw:
     return FoundLaw(law.text, law.variables, law.acts_on, law.axis)
+
+
+def law_text(law: FoundLaw) -> str:
+    """ "F = -4.1*abs(vy)**1.5*sign(vy) N": what a law adds, or what it puts in the place of its command or response."""
+    return f"F = {law.expression} N" if law.acts_on == "force" else f"{law.axis} becomes {law.expression}"

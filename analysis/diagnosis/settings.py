@@ -171,3 +171,4 @@ LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error,
 LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
 LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
 LAW_PLACEBO = 0.2  # share that the best term may take of a shuffled force
+LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told

@@ -19,8 +19,12 @@ SecondsOption = Annotated[
     typer.Option(min=1.0, help="Processor time for the search; what was found by then is kept. [default: no limit]"),
 ]
 
-NoDiscoveryOption = Annotated[
-    bool, typer.Option("--no-discovery", help="Name laws of the catalogue only; no others are looked for yet.")
+DiscoveryOption = Annotated[
+    bool,
+    typer.Option(
+        "--discovery/--no-discovery",
+        help="Where no effect of the catalogue explains what is missing, look for a formula that does.",
+    ),
 ]
 
 CleanOption = Annotated[
@@ -59,7 +63,7 @@ def diagnose(
     ] = 1,
     compare: CompareOption = "auto",
     seconds: SecondsOption = None,
-    no_discovery: NoDiscoveryOption = False,
+    discovery: DiscoveryOption = False,
     effect_file: EffectFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -72,11 +76,9 @@ def diagnose(
     from study.workflows.diagnosed_summary import answer_lines, file_lines, summary
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
-    plan = replace(plan, seconds=seconds, effect_files=tuple(effect_file or ()))
+    plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
     with steps("Diagnosing") as show:
         answer = answered(plan, show)
-    if no_discovery:
-        typer.echo("Note: no law outside the catalogue is looked for yet; --no-discovery changes nothing.", err=True)
     found = answer.findings
     # Said before it is drawn: the page takes a while.
     typer.echo(json.dumps(summary(found), indent=2) if as_json else "\n".join(answer_lines(found)))

@@ -64,6 +64,8 @@ class DiagnosePlan:
     """Of laws that were found elsewhere and are kept, as `hapteq effect` writes them."""
     seconds: float | None = None
     """Of processor time, after which the search ends with what it has."""
+    discovery: bool = False
+    """Laws that have no name are looked for, too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,6 +176,7 @@ def _settings(
         balances=balances,
         compared=plan.compare,
         kept=tuple(read_entry(path) for path in plan.effect_files),
+        discovery=plan.discovery,
         patient=patient,
     )
 

@@ -17,12 +17,14 @@ from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
 from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.search.explain import Explanation, worthwhile
 from analysis.diagnosis.search.rivalry import FIRST_ROUNDS, Arena, Contender, sensitivity_at
+from analysis.diagnosis.search.same_within_errors import inseparable
 from analysis.diagnosis.settings import (
     LAW_ALMOST_NOISE,
     LAW_AXES_SHARE,
     LAW_FITTED,
     LAW_FITTED_WITHIN,
     LAW_MOST_ROUNDS,
+    LAW_NEAR,
     NOISE_ALONE,
     RETUNING_BOUND,
 )
@@ -89,11 +91,30 @@ def _next(arena: Arena, base: Fitted, patient: Patience) -> Round | None:
     fits.sort(key=lambda pair: pair[0].cost)
     if not fits or not np.isfinite(fits[0][0].cost):
         return None
-    first = (arena.contender(refine(arena, fits[0][0])), fits[0][1])
-    others = [(arena.contender(fitted), one) for fitted, one in fits[1:]]
-    ranked = sorted([first, *others], key=lambda pair: pair[0].standing.chosen_by)
+    refined = [(arena.contender(refine(arena, fits[0][0])), fits[0][1])]
+    rest = [(arena.contender(fitted), one) for fitted, one in fits[1:]]
+    close = [pair for pair in rest if _price(pair[1]) < _price(fits[0][1]) and inseparable(refined[0][0], pair[0])]
+    refined += [(arena.contender(refine(arena, contender.fitted)), one) for contender, one in close]
+    ranked = _plainest_first([*refined, *(pair for pair in rest if pair not in close)])
     placebo = max((found.placebo for found in searched), default=0.0)
     return Round(tuple(one for one, _ in ranked), tuple(one for _, one in ranked), placebo)
+
+
+def _plainest_first(pairs: Sequence[tuple[Contender, Sum]]) -> list[tuple[Contender, Sum]]:
+    """The best first; of those that these data cannot part from it, the one with the fewest numbers to be told."""
+    ranked = sorted(pairs, key=lambda pair: pair[0].standing.chosen_by)
+    alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
+    first = min(alike, key=lambda pair: _price(pair[1]))
+    return [first, *(pair for pair in ranked if pair is not first)]
+
+
+def _price(of: Sum) -> int:
+    """Numbers that have to be told: an exponent that is a whole or half number is none."""
+    told = 0
+    for term in of.terms:
+        plain = [k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR]
+        told += 1 + len(term.numbers) - len(plain)
+    return told
 
 
 def _started(arena: Arena, base: Fitted, one: Sum) -> Fitted | None:

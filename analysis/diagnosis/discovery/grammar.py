@@ -2,7 +2,7 @@
 
 A term is a shape times a factor; its free numbers (exponents, widths, time constants, pitches) start on a grid that the
 recording's own travel, speed and duration span. What is linear in an axis's own motion is no term: mass, damping and
-stiffness are numbers of the model. docs/laws.md says what the grammar holds and what it does not.
+stiffness are numbers of the model. docs/diagnosis.md says what the grammar holds and what it does not.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -163,20 +163,22 @@ def _drifting(of: Axis, seconds: float) -> Iterator[Term]:
 
 def periodic(columns: Columns, own: Axis, left: FloatArray, rate_hz: float) -> tuple[Term, ...]:
     """Along the way or in time: of what is left of the force (n,) the strongest lines, alone or times the speed, the
-    place or the command; and longer pitches, which hardly make a line."""
+    place or the command; and long pitches, which hardly make a line. Two pitches at least were travelled: of fewer no
+    data tell a wave from a power."""
     x = columns[own.x]
     every = max(len(x) // 8000, 1)
-    waves = np.arange(0.5, 40.0, 0.175) / own.travel
+    waves = np.arange(1.0, 40.0, 0.175) / own.travel
     turns = np.exp(-2j * np.pi * np.outer(x[::every], waves)).astype(np.complex64)
     found = []
-    for name, wave, angle in product(("", own.f, own.v), np.geomspace(0.25, 4.0, 9).tolist(), (0.0, np.pi / 2)):
+    for name, wave, angle in product(("", own.f, own.v), np.geomspace(1.0, 6.0, 9).tolist(), (0.0, np.pi / 2)):
         pitch = own.travel / wave
-        found.append(_wave(name, f"{own.x}/p0", pitch, (0.5 * pitch, 2 * pitch), angle))
+        found.append(_wave(name, f"{own.x}/p0", pitch, (0.5 * pitch, min(2 * pitch, own.travel)), angle))
     for name in ("", own.f, own.v):
         weight = columns[name] if name else np.ones_like(x)
         lines = (left * weight)[::every].astype(np.complex64) @ turns
         for k in _peaks(np.abs(lines), 2):
-            pitch, bounds = 1 / float(waves[k]), (0.5 / float(waves[k]), 2 / float(waves[k]))
+            pitch = 1 / float(waves[k])
+            bounds = (0.5 * pitch, min(2 * pitch, own.travel))
             found.append(_wave(name, f"{own.x}/p0", pitch, bounds, _angle(lines[k])))
     for name in (own.x, own.v, own.f):
         lines = np.fft.rfft(left * columns[name])

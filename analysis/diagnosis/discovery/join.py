@@ -12,7 +12,7 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.rivalry import Arena, Contender
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import judge
-from analysis.diagnosis.settings import NOISE_ALONE, SEALED_ALONE_ERROR
+from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
 from analysis.diagnosis.types import Patience, Progress
 
 
@@ -30,6 +30,9 @@ def with_laws(searched: Searched, progress: Progress, patient: Patience) -> Sear
     if len(checked.steps) < len(found.found.steps):
         reasons = (*reasons, "these recordings leave its numbers as good as open")
     judged = judge(checked)
+    sealed = float(np.nanmax(checked.after.standing.test, initial=0.0))
+    if sealed > NAMED_ERROR:
+        reasons = (*reasons, f"on what was kept for the test it leaves {sealed:.3g} times the noise")
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:

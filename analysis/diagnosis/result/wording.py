@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
+from analysis.diagnosis.found_law import law_text
 from analysis.diagnosis.result.candidate_wording import (
     Device,
     best_candidate_sentence,
@@ -32,6 +33,8 @@ def effect_title(effect: NamedEffect, single: bool = False) -> str:
 
 def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
     """signature: what is seen in the data where it is the cause, as the catalogue has it."""
+    if effect.law is not None:
+        signature = "; ".join(filter(None, (law_text(effect.law), signature)))
     said = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
     return f"{capital(said)}: {signature}." if signature else f"{capital(said)}."
 

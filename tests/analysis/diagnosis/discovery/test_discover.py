@@ -2,6 +2,7 @@
 
 import pytest
 
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.discovery.as_effect import laws_of
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
@@ -12,8 +13,11 @@ from analysis.diagnosis.discovery.snap import readable
 from analysis.diagnosis.discovery.whitened import views_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import judge
+from equalizer.effects.catalogue import CATALOGUE
+from tests.diagnosed import device
 from tests.lawful import PLAN, arena_of, law, recorded
 
 DRAG = law("-p0*abs(vx)**1.5*sign(vx)", 3.0)
@@ -108,3 +112,16 @@ def test_a_shuffled_force_holds_no_law(seed=9):
 )
 def test_formulas_are_written_as_a_reader_would(written, read):
     assert readable(written) == read
+
+
+def test_a_diagnosis_says_the_law(seed=10):
+    """The catalogue's own law is struck out: its formula is found."""
+    recording = recorded((law("-p0*vx*abs(vx)", 5.0),), seed)
+    without = tuple(effect.name for effect in CATALOGUE if effect.name not in ("amplifier_lag", "sensor_lag"))
+    found = diagnose([recording], device(1), DiagnosisSettings(without=without, discovery=True), map, quiet)
+    law_found = found.diagnosis.effects[0].law
+    assert found.diagnosis.verdict == "explained"
+    assert law_found is not None
+    assert law_found.variables == ("vx",)
+    assert found.diagnosis.effects[0].parameters["p0"].value == pytest.approx(-5.0, rel=0.02)
+    assert f"F = {law_found.expression} N" in " ".join(summary_lines(found))
