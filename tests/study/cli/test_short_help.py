@@ -40,5 +40,6 @@ def test_every_command_stands_under_a_heading():
 
 
 def test_a_shell_can_complete_commands():
-    said = CliRunner().invoke(app, ["--show-completion", "bash"]).output
-    assert "_HAPTEQ_COMPLETE" in said
+    asked = {"_HAPTEQ_COMPLETE": "complete_bash", "COMP_WORDS": "hapteq stud", "COMP_CWORD": "1"}
+    said = CliRunner().invoke(app, [], env=asked, prog_name="hapteq").output
+    assert "study" in said.split()
