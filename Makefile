@@ -16,11 +16,12 @@ DIAGNOSIS := tests/stories/test_missing_physics_is_named.py \
 # time and must wake up at once: they start first, and what computes gives way to them, the longest first.
 real_time := $(shell grep -rl --include='test_*.py' 'mark.real_time' tests)
 workflows := tests/study/workflows
+evaluation := tests/study/evaluation
 screens := tests/study/tui
 stories := tests/stories tests/contracts
 equalizer := tests/equalizer
 analysis := tests/analysis
-PARTS := screens workflows equalizer stories analysis
+PARTS := screens workflows evaluation equalizer stories analysis
 rest := tests $(foreach part,$(PARTS),$(addprefix --ignore=,$($(part))))
 TESTED := $(addprefix tested-,real_time screens workflows rest $(filter-out screens workflows,$(PARTS)))
 JOBS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2) + 2)
@@ -89,7 +90,7 @@ prove-bank: $(VENV)/.installed-prove ## The blind proof of the diagnosis (CASES=
 	$(BIN)/hapteq prove --controls --cases $(CASES) --seed $(SEED) --out $(BANK) --table docs/proof/bank-$(SEED).csv
 
 docs: $(VENV)/.installed ## Make docs/formats.md and the schemas again from the code
-	$(BIN)/python -m study.workflows.format_docs docs
+	$(BIN)/python -m study.workflows.files.format_docs docs
 
 $(VENV)/.installed-prove: $(VENV)/.installed
 	@echo "Installing the second physics engine"

@@ -20,7 +20,7 @@ def main() -> None:
     for name in kernels():
         import_module(name)
     # Its functions have no signatures: they compile for what they are first called with.
-    import_module("study.challenge.draw_case").draw_case(1, ["coulomb_friction"])
+    import_module("study.evaluation.challenge.draw_case").draw_case(1, ["coulomb_friction"])
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ def analyze(
     as_json: JsonOption = False,
 ) -> None:
     """Write thresholds.csv, anova.json, figures and report.html."""
-    from study.workflows.analysis_files import ANALYSIS_NAME
-    from study.workflows.analyze_data import analyze_data
+    from study.workflows.results.analysis_files import ANALYSIS_NAME
+    from study.workflows.results.analyze_data import analyze_data
 
     out = out if out is not None else data / ANALYSIS_NAME
     show(analyze_data(data, out, ellipsoid, protocol), as_json)

@@ -17,13 +17,13 @@ from study.store.privacy import left_open
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
-from study.workflows.conduct_session import Participant, conduct_new, conduct_resumed
-from study.workflows.display import PersonsHand
-from study.workflows.end_sitting import end_sitting, finish_closed
-from study.workflows.fold_session import fold_session
-from study.workflows.plan_sitting import plan_sitting
-from study.workflows.requests_port import QueuedRequests
-from study.workflows.simulated_participant import simulated_participant
+from study.workflows.results.fold_session import fold_session
+from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
+from study.workflows.session.end_sitting import end_sitting, finish_closed
+from study.workflows.session.plan_sitting import plan_sitting
+from study.workflows.session.simulated_participant import simulated_participant
+from study.workflows.trial.display import PersonsHand
+from study.workflows.trial.requests_port import QueuedRequests
 
 
 @dataclass(frozen=True, slots=True)

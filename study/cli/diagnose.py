@@ -72,8 +72,8 @@ def diagnose(
     Writes diagnosis.json, improved.toml, report.html and figures.
     """
     from study.cli.progress import steps
-    from study.workflows.diagnose_recordings import DiagnosePlan, answered, written
-    from study.workflows.diagnosed_summary import answer_lines, file_lines, summary
+    from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, answered, written
+    from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, summary
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))

@@ -12,7 +12,7 @@ from study.cli.study import DataOption, DeviceOption
 
 if TYPE_CHECKING:
     from study.session.views import DeviceFinding
-    from study.workflows.examine_setup import Examination
+    from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17
 
@@ -29,8 +29,8 @@ def doctor(
     from contextlib import nullcontext
 
     from study.cli.progress import bar
-    from study.workflows.check_installation import this_terminal
-    from study.workflows.examine_setup import examine_setup
+    from study.workflows.checks.check_installation import this_terminal
+    from study.workflows.checks.examine_setup import examine_setup
 
     with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
         examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)

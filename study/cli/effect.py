@@ -16,7 +16,7 @@ def effect(
 ) -> None:
     """Write a discovered law as an effect of your own. `hapteq diagnose --effect-file EFFECT.py` then looks for it in
     other recordings, at every axis."""
-    from study.workflows.effect_file import write_entry
+    from study.workflows.diagnosis.effect_file import write_entry
 
     entry = write_entry(found, out, number)
     typer.echo(str(out))

@@ -10,7 +10,7 @@ from study.cli.results import JsonOption
 from study.cli.seed import checked_seed
 
 if TYPE_CHECKING:
-    from study.workflows.equalize_trajectory import EqualizePlan
+    from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 
 
 def equalize(
@@ -45,7 +45,7 @@ def equalize(
 
     Models of several places are interpolated at --at; a narrow and a wide one of one place play three bands.
     """
-    from study.workflows.equalize_trajectory import EqualizePlan
+    from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 
     _require_whole(files, repeat, device, earlier)
     *models, trajectory = files
@@ -72,8 +72,8 @@ def _require_whole(files: list[Path], repeat: int | None, device: str | None, ea
 
 
 def _once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
-    from study.workflows.equalize_trajectory import equalize_trajectory
-    from study.workflows.equalized_summary import summary, summary_lines
+    from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
+    from study.workflows.equalizer.equalized_summary import summary, summary_lines
 
     done = equalize_trajectory(plan)
     return summary(done), summary_lines(done)
@@ -83,7 +83,12 @@ def _repeated(
     plan: "EqualizePlan", repeat: int, device: str, earlier: Path | None, seed: int
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
     from study.cli.progress import late_bar
-    from study.workflows.repeat_trajectory import RepeatOrder, repeat_trajectory, repeated_lines, repeated_summary
+    from study.workflows.equalizer.repeat_trajectory import (
+        RepeatOrder,
+        repeat_trajectory,
+        repeated_lines,
+        repeated_summary,
+    )
 
     order = RepeatOrder(repeat, device, earlier, seed)
     with late_bar("Plays", total=repeat + 1) as show:

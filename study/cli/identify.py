@@ -35,9 +35,9 @@ def identify(
 ) -> None:
     """Fit a stable model to the band, test it on what was kept for a test, and write it."""
     from study.cli.progress import bar
-    from study.workflows.identified_summary import summary, summary_lines
-    from study.workflows.identify_model import IdentifyPlan, check_free, identify_model
-    from study.workflows.report_identification import report_identification
+    from study.workflows.equalizer.identified_summary import summary, summary_lines
+    from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
+    from study.workflows.equalizer.report_identification import report_identification
 
     plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics, longest_decay)
     check_free(out)

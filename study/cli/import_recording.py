@@ -28,8 +28,8 @@ def import_recording(
     """
     from study.cli.progress import late_bar
     from study.importing.map_errors import MapNeededError
-    from study.workflows.import_recording import ImportPlan, check_free
-    from study.workflows.import_recording import import_recording as run
+    from study.workflows.recording.import_recording import ImportPlan, check_free
+    from study.workflows.recording.import_recording import import_recording as run
 
     check_free(out)
     try:

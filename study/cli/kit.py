@@ -28,7 +28,7 @@ def draw(
 ) -> None:
     """Draw the order of the changes. The person who diagnoses must not see it."""
     from analysis.proof.lab_kit import CHANGES
-    from study.workflows.lab_kit import draw_labels
+    from study.evaluation.kit.lab_kit import draw_labels
 
     labels = draw_labels(out, repeats, seed)
     typer.echo(f"{len(labels)} recordings, {labels[0].recording} to {labels[-1].recording}: {out}")
@@ -40,7 +40,7 @@ def draw(
 @app.command("seal")
 def seal(labels: LabelsArgument) -> None:
     """Hash the completed table. Give the hash to the person who diagnoses, and keep the table."""
-    from study.workflows.lab_kit import seal_labels
+    from study.evaluation.kit.lab_kit import seal_labels
 
     typer.echo(seal_labels(labels))
 
@@ -58,7 +58,7 @@ def score(
 
     Without --seal its hash is compared only with the file beside it. A recording without a diagnosis is not right.
     """
-    from study.workflows.score_kit import score_kit, score_lines
+    from study.evaluation.kit.score_kit import score_kit, score_lines
 
     for line in score_lines(score_kit(labels, diagnoses, out, seal)):
         typer.echo(line)

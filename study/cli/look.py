@@ -23,7 +23,7 @@ def look(
     """Signals, spectra, coherence, levels and repeats; and checks of units, clock, derivatives, lags, clipping and
     steps. Exit code 0 also where something is wrong: that is a result."""
     from study.cli.progress import late_bar
-    from study.workflows.look_at_recordings import look_at, look_document, write_look
+    from study.workflows.recording.look_at_recordings import look_at, look_document, write_look
 
     with late_bar("Looking (%)", total=100) as show:
         found = look_at(recordings, lambda share: show(round(100 * share)))

@@ -20,7 +20,12 @@ def model(
     `auto` compares structures by their error on held-out data, and says why it took which.
     """
     from study.cli.progress import late_bar
-    from study.workflows.fit_first_model import FirstModelPlan, first_model_lines, first_model_summary, fit_first_model
+    from study.workflows.diagnosis.fit_first_model import (
+        FirstModelPlan,
+        first_model_lines,
+        first_model_summary,
+        fit_first_model,
+    )
 
     plan = FirstModelPlan(tuple(recordings), out, structure)
     with late_bar("Model (%)", total=100) as show:

@@ -18,7 +18,7 @@ def noise(
     high_hz: Annotated[float, typer.Option(min=1, max=20_000, help="Upper corner.")] = 8000.0,
 ) -> None:
     """Write pink noise that hides the sound of the device, and say how to use it."""
-    from study.workflows.write_masking_noise import HOW_TO_USE, NoisePlan, write_masking_noise
+    from study.workflows.session.write_masking_noise import HOW_TO_USE, NoisePlan, write_masking_noise
 
     write_masking_noise(out, NoisePlan(minutes=minutes, low_hz=low_hz, high_hz=high_hz, seed=seed))
     typer.echo(str(out))

@@ -28,7 +28,7 @@ def note(
 def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
     from study.devices.clock import RealClock
     from study.session.requests import NoteAsked
-    from study.workflows.take_note import take_note
+    from study.workflows.views.take_note import take_note
 
     written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
     waits = f"The session writes it into the log of {folder.name} as soon as it looks."

@@ -30,11 +30,11 @@ def prove(
     Writes proof.json, proof.csv and report.html. Interrupted, the same command goes on.
     """
     from study.cli.progress import steps
-    from study.workflows.proof_summary import proof_lines, summary
-    from study.workflows.prove import Wishes
-    from study.workflows.prove import prove as proved
-    from study.workflows.seal_cases import BankPlan
-    from study.workflows.write_proof import write_proof, write_table
+    from study.evaluation.bank.proof_summary import proof_lines, summary
+    from study.evaluation.bank.prove import Wishes
+    from study.evaluation.bank.prove import prove as proved
+    from study.evaluation.bank.seal_cases import BankPlan
+    from study.evaluation.bank.write_proof import write_proof, write_table
 
     with steps("Proving") as show:
         proof = proved(

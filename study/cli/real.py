@@ -37,8 +37,8 @@ def real(
 
     from analysis.diagnosis.result.real_answer import real_answer_to_json
     from study.cli.progress import steps
-    from study.workflows.real_recordings import RealPlan, diagnose_folder
-    from study.workflows.real_summary import real_lines
+    from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
+    from study.evaluation.real.real_summary import real_lines
 
     with steps("Real recordings") as show:
         done = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show)

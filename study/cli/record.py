@@ -34,7 +34,7 @@ def record(
     """
     from study.cli.progress import late_bar
     from study.store.protocol_files import read_recording_protocol
-    from study.workflows.record_device import RecordingPlan, check_free, record_device
+    from study.workflows.recording.record_device import RecordingPlan, check_free, record_device
 
     source = read_recording_protocol(protocol)
     plan = RecordingPlan(source.protocol, device=device, place_m=place, seed=seed, out=out)

@@ -24,10 +24,10 @@ def rehearse(
     """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
     from study.cli.progress import bar
     from study.store.protocol_files import read_study_protocol
-    from study.workflows.analysis_files import ANALYSIS_NAME
-    from study.workflows.analyze_data import analyze_data
-    from study.workflows.equalize_stimuli import check_playable
-    from study.workflows.rehearse_study import Rehearsal, rehearse_study
+    from study.workflows.results.analysis_files import ANALYSIS_NAME
+    from study.workflows.results.analyze_data import analyze_data
+    from study.workflows.session.equalize_stimuli import check_playable
+    from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
     source = read_study_protocol(protocol_or_default(protocol, model), out)
     check_playable(source.protocol, model)

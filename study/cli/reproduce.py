@@ -28,8 +28,8 @@ def reproduce(
 
     from analysis.reproduction.document import reproduction_to_json
     from study.cli.progress import bar
-    from study.workflows.reproduce_paper import reproduce_paper
-    from study.workflows.reproduction_plan import ReproductionPlan
+    from study.evaluation.reproduction.reproduce_paper import reproduce_paper
+    from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 
     plan = ReproductionPlan(out, subjects=subjects, seed=seed, workers=workers)
     with bar("Reproduction (%)", total=100) as show:

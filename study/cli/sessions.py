@@ -22,7 +22,7 @@ def sessions(
     as_json: JsonOption = False,
 ) -> None:
     """List all sessions, latest first: how they stand, and how far they are."""
-    from study.workflows.list_sessions import session_lines
+    from study.workflows.views.list_sessions import session_lines
 
     lines = session_lines(data)
     if as_json:

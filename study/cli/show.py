@@ -38,14 +38,14 @@ def show(
         return
     document = Path(what) / "diagnosis.json" if (Path(what) / "diagnosis.json").is_file() else Path(what)
     if document.is_file():
-        from study.workflows.view_diagnosis import diagnosis_view
+        from study.workflows.views.view_diagnosis import diagnosis_view
 
         diagnosis = diagnosis_view(document)
         _say([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
         return
     from study.local_clock import machine_zone
     from study.session.local_time import in_utc
-    from study.workflows.view_session import session_view
+    from study.workflows.views.view_session import session_view
 
     session = session_view(_folder(what, data), in_utc if as_json else machine_zone)
     _say([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
@@ -53,7 +53,7 @@ def show(
 
 def _show_recording(path: Path, as_json: bool) -> None:
     from study.cli.look import recording_lines, say
-    from study.workflows.look_at_recordings import look_at, look_document, recording_facts
+    from study.workflows.recording.look_at_recordings import look_at, look_document, recording_facts
 
     found = look_at([path])
     if as_json:

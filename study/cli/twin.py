@@ -26,8 +26,8 @@ def twin(
     hold the handle."""
     from study.cli.progress import late_bar
     from study.cli.record import announce
-    from study.workflows.twin_summary import twin_lines, twin_summary
-    from study.workflows.write_twin import TwinPlan, check_free, write_twin
+    from study.workflows.diagnosis.twin_summary import twin_lines, twin_summary
+    from study.workflows.diagnosis.write_twin import TwinPlan, check_free, write_twin
 
     plan = TwinPlan(out, device, seed, protocol, band)
     check_free(plan)

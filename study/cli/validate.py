@@ -14,8 +14,8 @@ def validate(
     """Check files: recordings, models, protocols, tables, logs; and models against the recordings that are given with
     them. Exit code 1 if anything is wrong."""
     from study.errors import ExitCode
-    from study.workflows.validate_apart import validate_files
-    from study.workflows.validate_together import validated_together
+    from study.workflows.files.validate_apart import validate_files
+    from study.workflows.files.validate_together import validated_together
 
     found = validated_together(list(validate_files(files)))
     if as_json:

@@ -84,7 +84,7 @@ def _once(folder: Path, as_json: bool) -> None:
     from study.errors import StudyError
     from study.tui.text_rows import hanging
     from study.tui.watch_lines import LABEL_CELLS, changes
-    from study.workflows.watch_session import follow
+    from study.workflows.views.watch_session import follow
 
     view = follow(folder).look(RealClock().utc())
     if view is None:
@@ -102,7 +102,7 @@ def _plain(folder: Path) -> None:
     from study.devices.clock import RealClock
     from study.session.watch_view import ON
     from study.tui.watch_lines import changes
-    from study.workflows.watch_session import follow
+    from study.workflows.views.watch_session import follow
 
     clock, follower, before = RealClock(), follow(folder), None
     while before is None or before.standing in ON:
@@ -132,7 +132,7 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
 
 def _ask_for(session: "SessionFolder", request: "Request", said: str) -> None:
     from study.devices.clock import RealClock
-    from study.workflows.ask_session import ask_session
+    from study.workflows.views.ask_session import ask_session
 
     ask_session(session, request, RealClock())
     typer.echo(said, err=True)

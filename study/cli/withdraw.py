@@ -18,8 +18,8 @@ def withdraw(
     Interrupted, the same command goes on. Links are not followed; what is not proved to be the participant's is listed.
     """
     from study.devices.clock import RealClock
-    from study.workflows.withdraw_participant import plan_withdrawal, session_to_withdraw, still_elsewhere
-    from study.workflows.withdraw_participant import withdraw as erase
+    from study.workflows.session.withdraw_participant import plan_withdrawal, session_to_withdraw, still_elsewhere
+    from study.workflows.session.withdraw_participant import withdraw as erase
 
     folder = session_to_withdraw(session, data)
     place = folder.path.parent

@@ -37,7 +37,7 @@ _counter = itertools.count()
 
 
 class RequestInbox:
-    """Implements `study.workflows.requests_port.Requests`. Any number may send; one session takes."""
+    """Implements `study.workflows.trial.requests_port.Requests`. Any number may send; one session takes."""
 
     def __init__(self, session: Path) -> None:
         self._folder = session / REQUESTS_NAME

@@ -7,7 +7,7 @@ from typing import TextIO
 
 from study.devices.clock import Clock
 from study.tui.line_input import LineInput
-from study.workflows.display import SignOfLife
+from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.05
 """Longest time between two signs of life: half of what the port allows."""

@@ -29,7 +29,7 @@ from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.conversation import Conversation
 from study.tui.line_input import LineInput
 from study.tui.trial_words import progress_sentence, run_name, turned_away_words
-from study.workflows.display import SignOfLife
+from study.workflows.trial.display import SignOfLife
 
 
 class PlainDisplay:

@@ -8,7 +8,7 @@ from study.tui.conversation import GLANCE_S, Conversation, WaitOver, shown
 from study.tui.direction_picture import sentence
 from study.tui.plain_question import LEFT
 from study.tui.trial_replies import PAUSE
-from study.workflows.display import SignOfLife
+from study.workflows.trial.display import SignOfLife
 
 SAY_AGAIN_S = 1.0
 """A screen reader that hears more than a sentence a second never finishes one."""

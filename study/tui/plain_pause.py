@@ -7,7 +7,7 @@ from study.session.requests import NoteAsked
 from study.session.views import AfterPause, PauseNotice, RestNotice
 from study.tui.conversation import GLANCE_S, Conversation, Line, WaitOver, printable, shown
 from study.tui.trial_words import WITHDRAW, progress_sentence, runs_left
-from study.workflows.display import SignOfLife
+from study.workflows.trial.display import SignOfLife
 
 COUNT_EVERY_S = 10.0
 

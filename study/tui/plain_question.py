@@ -17,7 +17,7 @@ from study.tui.conversation import Conversation, Line, WaitOver, shown
 from study.tui.direction_picture import drawing, sentence
 from study.tui.trial_replies import NO_REPEATS, PAUSE, REPEAT, repeat_words
 from study.tui.trial_words import heading, plan
-from study.workflows.display import SignOfLife
+from study.workflows.trial.display import SignOfLife
 
 LEFT = Unanswered("the participant left", leave=True)
 INTERVALS = "In one of the two intervals it shook, however weakly; in the other it did not. Type the number of the one."

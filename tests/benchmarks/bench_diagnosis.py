@@ -21,7 +21,7 @@ from scipy.signal import StateSpace, lsim
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from equalizer.effects.catalogue import CATALOGUE
-from study.challenge.draw_case import Case, draw_case
+from study.evaluation.challenge.draw_case import Case, draw_case
 from study.workflows.worker_threads import worker_threads
 
 SEED = 61

@@ -63,7 +63,7 @@ def measured(axes: int) -> dict:
 
     began = time.process_time()
     from study.store.recording_file import write_recording
-    from study.workflows.diagnose_recordings import DiagnosePlan, diagnose_recordings
+    from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 
     imports = time.process_time() - began
     taken, recording = [], device(axes)

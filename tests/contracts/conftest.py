@@ -19,8 +19,8 @@ from study.session.due_trial import Present
 from study.session.form_views import Form
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
-from study.workflows.display import Display
-from study.workflows.simulated_display import SimulatedDisplay
+from study.workflows.session.simulated_display import SimulatedDisplay
+from study.workflows.trial.display import Display
 
 
 class Seat(Protocol):

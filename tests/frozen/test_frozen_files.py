@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from study.cli.main import app
-from study.workflows.validate import validate_file
+from study.workflows.files.validate import validate_file
 
 FROZEN = Path(__file__).parent
 VERSIONS = sorted(folder for folder in FROZEN.iterdir() if folder.name.startswith("v"))

@@ -37,7 +37,9 @@ def test_headless_packages_load_no_screen_and_no_plots(package):
 
 
 def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
-    loaded = loaded_by("import study.tui.link.desk, study.workflows.end_sitting, study.workflows.validate_apart")
+    loaded = loaded_by(
+        "import study.tui.link.desk, study.workflows.session.end_sitting, study.workflows.files.validate_apart"
+    )
     assert "numba" in loaded
     slow = {"scipy.stats", "statsmodels", "pandas", "matplotlib"}
     assert loaded.isdisjoint(slow), sorted(loaded & slow)

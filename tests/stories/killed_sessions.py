@@ -17,8 +17,8 @@ from pathlib import Path
 from study.cli.main import main as hapteq
 from study.store.archive import SessionFolder, session_folders
 from study.store.event_log import read_log
-from study.workflows.fold_session import fold_session
-from study.workflows.validate import validate_file
+from study.workflows.files.validate import validate_file
+from study.workflows.results.fold_session import fold_session
 
 KILLS = 3
 RESULTS = Path(sys.argv[1]).with_name("results.jsonl")

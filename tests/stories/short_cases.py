@@ -12,11 +12,11 @@ import numpy as np
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
-from study.challenge.bench import Bench, draw_bench
-from study.challenge.device import Device, record
-from study.challenge.draw_case import DECOYS, EFFECTS
-from study.challenge.drive_plan import LEVELS_N, RATE_HZ
-from study.challenge.nominal import as_model, calibrated
+from study.evaluation.challenge.bench import Bench, draw_bench
+from study.evaluation.challenge.device import Device, record
+from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
+from study.evaluation.challenge.drive_plan import LEVELS_N, RATE_HZ
+from study.evaluation.challenge.nominal import as_model, calibrated
 
 PERIOD, PERIODS, REST = 1000, 3, 300
 LAST_LINE = 200

@@ -12,10 +12,10 @@ from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
 from study.session.views import Answered
 from study.store.archive import SessionFolder
-from study.workflows.conduct_session import Participant, conduct_new
-from study.workflows.fold_session import fold_session
-from study.workflows.open_session import SessionPlan
-from study.workflows.simulated_display import SimulatedDisplay
+from study.workflows.results.fold_session import fold_session
+from study.workflows.session.conduct_session import Participant, conduct_new
+from study.workflows.session.open_session import SessionPlan
+from study.workflows.session.simulated_display import SimulatedDisplay
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -40,19 +40,19 @@ from study.tui.link.to_engine import (
     ShowSession,
     Withdraw,
 )
-from study.workflows.ask_session import ask_session
-from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
-from study.workflows.display import PersonsHand
-from study.workflows.end_sitting import end_sitting, finish_closed
-from study.workflows.fold_session import fold_session
-from study.workflows.list_models import model_words
-from study.workflows.list_protocols import protocol_line
-from study.workflows.list_sessions import home_view
-from study.workflows.plan_sitting import plan_sitting
-from study.workflows.session_results import write_results
-from study.workflows.view_session import session_view
-from study.workflows.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
-from study.workflows.written_analysis import WrittenAnalysis
+from study.workflows.results.fold_session import fold_session
+from study.workflows.results.session_results import write_results
+from study.workflows.results.written_analysis import WrittenAnalysis
+from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.session.end_sitting import end_sitting, finish_closed
+from study.workflows.session.plan_sitting import plan_sitting
+from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+from study.workflows.trial.display import PersonsHand
+from study.workflows.views.ask_session import ask_session
+from study.workflows.views.list_models import model_words
+from study.workflows.views.list_protocols import protocol_line
+from study.workflows.views.list_sessions import home_view
+from study.workflows.views.view_session import session_view
 
 OPENING = "Preparing the device: some ten seconds the first time."
 
@@ -151,8 +151,8 @@ class Desk:
         self._link.send(Withdrawn(plan.sessions))
 
     def _diagnose(self, wanted: Diagnose) -> None:
-        from study.workflows.diagnose_at_screen import diagnose_at_screen, free_out
-        from study.workflows.diagnose_recordings import DiagnosePlan
+        from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
+        from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
 
         self._link.send(Working("getting ready", 0.0))
         sources = tuple(Path(source) for source in wanted.sources)
@@ -175,7 +175,7 @@ def _looked_up(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Sessio
 
 def _diagnosis(path: Path) -> Diagnosis:
     # Compilers and solvers are loaded when somebody asks for what needs them.
-    from study.workflows.view_diagnosis import diagnosis_view
+    from study.workflows.views.view_diagnosis import diagnosis_view
 
     return Diagnosis(diagnosis_view(path))
 

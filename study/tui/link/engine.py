@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.trial_recordings")
 """Loaded while somebody still types a code, so that beginning is quick."""
 
-NEEDED_AT_THE_END = ("study.workflows.analyze_data",)
+NEEDED_AT_THE_END = ("study.workflows.results.analyze_data",)
 """Statistics and plots: loaded after them, if there is still time, so that the results are quick."""
 
 LAST_RESORT_S = 5.0

@@ -28,8 +28,8 @@ from study.session.void_reasons import why_screen_silent
 from study.tui.link.from_engine import Ask, Call, Close, Feedback, LookUpdate, Trouble
 from study.tui.link.screen_link import ScreenLink
 from study.tui.link.to_engine import Reply
-from study.workflows.computer_load import load_per_processor
-from study.workflows.display import SignOfLife
+from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.04
 """Between two signs of life; the port allows 100 ms."""

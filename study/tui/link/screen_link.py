@@ -9,7 +9,7 @@ from queue import Empty, SimpleQueue
 
 from study.tui.link.from_engine import FromEngine
 from study.tui.link.to_engine import Command, Heartbeat, LetGo, Relay, Reply, ToEngine
-from study.workflows.requests_port import QueuedRequests
+from study.workflows.trial.requests_port import QueuedRequests
 
 
 class ScreenLink:

@@ -69,7 +69,7 @@ def feed(descriptor: int, session_path: str) -> None:
 
     from study.devices.clock import RealClock
     from study.errors import StudyError
-    from study.workflows.watch_session import follow
+    from study.workflows.views.watch_session import follow
 
     connection = Connection(descriptor)
     clock, follower = RealClock(), follow(Path(session_path))

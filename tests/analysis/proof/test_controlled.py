@@ -54,6 +54,6 @@ def test_answers_are_said_in_words():
 
 
 def test_every_claim_of_a_control_is_known():
-    from study.challenge.controls import CONTROLS
+    from study.evaluation.challenge.controls import CONTROLS
 
     assert {one.claim for one in CONTROLS} == set(CLAIMS)

@@ -93,7 +93,7 @@ def test_an_interruption_is_exit_code_130(run, small_file, tmp_path, monkeypatch
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("study.workflows.simulated_display.SimulatedDisplay.ask", interrupted)
+    monkeypatch.setattr("study.workflows.session.simulated_display.SimulatedDisplay.ask", interrupted)
     code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert code == 130
     assert "0 answers are on disk." in err
@@ -106,7 +106,7 @@ def test_a_command_that_was_left_says_that_nothing_is_half_written(run, monkeypa
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("study.workflows.identify_model.identify_model", interrupted)
+    monkeypatch.setattr("study.workflows.equalizer.identify_model.identify_model", interrupted)
     code, out, err = run("identify", tmp_path / "rec.h5", "--out", tmp_path / "model.h5")
     assert (code, out) == (130, "")
     assert "Interrupted" in err and "none is half written" in err
@@ -295,7 +295,7 @@ def test_leaving_is_not_finishing(run, small_file, tmp_path, monkeypatch):
     from study.session.views import Unanswered
 
     leave = Unanswered("the participant left", leave=True)
-    monkeypatch.setattr("study.workflows.simulated_display.SimulatedDisplay.ask", lambda *_: leave)
+    monkeypatch.setattr("study.workflows.session.simulated_display.SimulatedDisplay.ask", lambda *_: leave)
     code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert (code, out) == (130, "")
     assert "The sitting ended: the participant left." in err

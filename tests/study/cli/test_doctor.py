@@ -12,8 +12,8 @@ from study.devices.device import Fault, Health
 from study.errors import ExitCode
 from study.session.timing_verdict import judge_lateness, judge_load, lateness_of
 from study.session.views import DeviceFinding, DeviceReport
-from study.workflows.check_timing import Timing
-from study.workflows.examine_setup import Examination
+from study.workflows.checks.check_timing import Timing
+from study.workflows.checks.examine_setup import Examination
 
 HEALTH = Health(Fault.NONE, 2000, 0, 0, 0, 0, 0, 0.0)
 

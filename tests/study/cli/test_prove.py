@@ -5,7 +5,7 @@ import json
 import pytest
 
 from study.cli.main import main
-from study.workflows.proof_folder import ANSWER
+from study.evaluation.bank.proof_folder import ANSWER
 
 SEED, CASES = 51_404, 1
 

@@ -31,7 +31,7 @@ CALLED_IN = {
 }
 """`write` and `advance` count inside study/devices only: files are written elsewhere."""
 
-ELSEWHERE = ("cli", "tui", "workflows", "store", "session", "participants")
+ELSEWHERE = ("cli", "tui", "evaluation", "workflows", "store", "session", "participants")
 
 
 def names_in(node: ast.AST) -> set[str]:

@@ -12,7 +12,7 @@ from study.session.void_reasons import (
     why_screen_silent,
     why_too_many,
 )
-from study.workflows.judge_trial import judge
+from study.workflows.trial.judge_trial import judge
 
 MISSED = "12.0 % of the 1 kHz ticks were missed"
 

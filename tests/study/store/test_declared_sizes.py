@@ -25,7 +25,7 @@ from study.store.mechanical_model_file import read_mechanical_model
 from study.store.recording_file import read_recording
 from study.store.strict_json import load_json
 from study.store.toml_text import too_long_key
-from study.workflows.validate import validate_file
+from study.workflows.files.validate import validate_file
 
 pytestmark = pytest.mark.timeout(60)
 FROZEN = Path(__file__).parents[2] / "frozen" / "v0_1"
@@ -242,7 +242,7 @@ def test_memory_is_taken_for_nothing_that_is_only_declared(tmp_path, recording):
     replaced(recording, "command", (2**29, 1), "f8", chunks=(1000, 1))
     (tmp_path / "a.npy").write_bytes(header("(536870912,)"))
     script = (
-        "import resource, sys\nfrom pathlib import Path\nfrom study.workflows.validate import validate_file\n"
+        "import resource, sys\nfrom pathlib import Path\nfrom study.workflows.files.validate import validate_file\n"
         "from study.importing.arrays import read_arrays\nfrom study.importing.import_map import CsvMap\n"
         "from study.errors import StudyError\nresource.setrlimit(resource.RLIMIT_AS, (2**31, 2**31))\n"
         "print(validate_file(Path(sys.argv[1])).problems[0])\n"

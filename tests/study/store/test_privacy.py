@@ -16,9 +16,9 @@ from study.store.atomic_write import write_atomically
 from study.store.live_file import write_live
 from study.store.privacy import close_to_others, left_open, make_folder, open_to_others
 from study.store.request_inbox import RequestInbox
-from study.workflows.check_installation import check_privacy
-from study.workflows.plan_sitting import plan_sitting
-from study.workflows.validate import validate_file
+from study.workflows.checks.check_installation import check_privacy
+from study.workflows.files.validate import validate_file
+from study.workflows.session.plan_sitting import plan_sitting
 
 CORPUS = Path(__file__).resolve().parents[2] / "frozen" / "v0_1"
 LIVE = Live(

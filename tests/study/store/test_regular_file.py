@@ -31,10 +31,10 @@ from study.store.text_file import read_text
 from study.store.thresholds_file import read_thresholds
 from study.store.trajectory_file import read_trajectory
 from study.store.trials_file import read_trials
-from study.workflows.fold_session import fold_session
-from study.workflows.list_sessions import home_view
-from study.workflows.validate import validate_file
-from study.workflows.watch_session import follow
+from study.workflows.files.validate import validate_file
+from study.workflows.results.fold_session import fold_session
+from study.workflows.views.list_sessions import home_view
+from study.workflows.views.watch_session import follow
 
 pytestmark = pytest.mark.timeout(60)
 

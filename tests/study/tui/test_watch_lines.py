@@ -8,7 +8,7 @@ import pytest
 from study.store.event_log import LOG_NAME
 from study.tui.watch_lines import changes, status
 from study.tui.watch_words import duration
-from study.workflows.watch_session import follow
+from study.workflows.views.watch_session import follow
 
 TEXT = (
     'name = "small"\nkind = "study"\ntitle = "A small study"\n[stimulus]\nfrequencies_hz = [25.0]\n'
@@ -21,9 +21,9 @@ TEXT = (
 def taken(data, text):
     from protocols.loading import load_protocol
     from study.devices.clock import VirtualClock
-    from study.workflows.conduct_session import conduct_new
-    from study.workflows.open_session import SessionPlan
-    from study.workflows.simulated_participant import simulated_participant
+    from study.workflows.session.conduct_session import conduct_new
+    from study.workflows.session.open_session import SessionPlan
+    from study.workflows.session.simulated_participant import simulated_participant
 
     plan = SessionPlan(load_protocol(text, "small"), text, False, "S1", "scripted", 3, data)
     return conduct_new(plan, "simulated", simulated_participant("scripted", 3, VirtualClock())).folder

@@ -10,9 +10,9 @@ from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
 from study.session.views import Answered, Reply, Unanswered
 from study.store.archive import SessionFolder
-from study.workflows.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
-from study.workflows.open_session import SessionPlan
-from study.workflows.simulated_display import SimulatedDisplay
+from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.session.open_session import SessionPlan
+from study.workflows.session.simulated_display import SimulatedDisplay
 
 
 class LeavesAfter:

@@ -23,7 +23,7 @@ from equalizer.effects.backlash import EFFECT as PLAY
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect
-from study.challenge.draw_case import draw_case
+from study.evaluation.challenge.draw_case import draw_case
 
 GAP_M, AXIS = 5e-5, 1
 LOOSE = (

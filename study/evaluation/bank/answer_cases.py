@@ -1,0 +1,135 @@
+"""The diagnosis of a bank in a process of its own: `python -m study.evaluation.bank.answer_cases FOLDER`.
+
+It is given the folder of open cases and nothing else, reads a case's name per line, and says the name again once
+answer.json lies in the case's folder. It cannot import what the cases were made with, and opens no file beside them.
+"""
+
+import hashlib
+import json
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+import analysis.diagnosis
+import equalizer
+import study
+from study.evaluation.bank.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS
+from study.store.provenance import sha256_of
+from study.store.strict_json import load_json
+from study.store.text_file import read_text, write_text
+
+APART = "study.evaluation.challenge"
+OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
+STARTED = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
+"""Events of Python's audit. Library code of C opens files without them (HDF5): it is handed paths of this module's."""
+
+
+def main(arguments: list[str]) -> None:
+    cases = Path(arguments[0]).resolve()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent ends us
+    stay_apart(cases)
+    digest = engine_digest()
+    for line in sys.stdin:
+        answer(cases / line.strip(), digest)
+        sys.stdout.write(line)
+        sys.stdout.flush()
+
+
+def stay_apart(cases: Path) -> None:
+    """From here on, what made the cases cannot be loaded or read, no file or folder beside them can be opened or
+    listed by Python, and no other program can be started."""
+    sys.modules[APART] = cast(ModuleType, None)
+    beside, inside = os.path.realpath(cases.parent), os.path.realpath(cases)
+    maker = os.path.realpath(Path(study.__path__[0]).joinpath(*APART.split(".")[1:]))
+
+    def lies_in(path: str, folder: str) -> bool:
+        return path == folder or path.startswith(f"{folder}{os.sep}")
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event in STARTED:
+            raise PermissionError(f"a diagnosis must not start a program ({event})")
+        if event not in OPENED or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
+            return
+        path = os.path.realpath(os.fsdecode(arguments[0]))
+        if (lies_in(path, beside) and not lies_in(path, inside)) or lies_in(path, maker):
+            raise PermissionError(f"a diagnosis must not open {path}")
+
+    sys.addaudithook(watch)
+
+
+def others_sha256(place: Path) -> dict[str, str]:
+    """Of all further recordings that a case has, by their names in its folder."""
+    paths = [path for path in sorted(place.rglob("*.h5")) if path != place / RECORDING]
+    return {str(path.relative_to(place)): sha256_of(path) for path in paths}
+
+
+def answer(place: Path, digest: str) -> None:
+    """Writes answer.json, whole or not at all. What breaks the diagnosis is an answer, too: a wrong one."""
+    began, worked = time.perf_counter(), time.process_time()
+    try:
+        said = _diagnosed(place)
+    except Exception:  # noqa: BLE001 - the bank goes on, and the score counts it
+        said = {"failed": traceback.format_exc()}
+    said |= {
+        "name": place.name,
+        "seconds": time.perf_counter() - began,
+        "cpu_seconds": time.process_time() - worked,
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "others_sha256": others_sha256(place),
+        "engine": digest,
+        "knows_the_challenge": challenge_is_loaded(),
+    }
+    write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
+
+
+def challenge_is_loaded() -> bool:
+    """The name alone stands for nothing: that is how its import is forbidden."""
+    return any(name.split(".")[:2] == APART.split(".") for name, one in vars(sys)["modules"].items() if one is not None)
+
+
+def engine_digest() -> str:
+    """Of all code that an answer hangs on."""
+    digest = hashlib.sha256()
+    for package in (analysis.diagnosis, equalizer):
+        root = Path(package.__path__[0])
+        for file in sorted(root.rglob("*.py")):
+            digest.update(str(file.relative_to(root)).encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _patience(processor_s: float | None) -> Callable[[], bool]:
+    """Of processor time: what else the machine does at the time changes no answer."""
+    begun = time.process_time()
+    return lambda: processor_s is None or time.process_time() - begun < processor_s
+
+
+def _diagnosed(place: Path) -> dict[str, Any]:
+    from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+    from analysis.diagnosis.document import diagnosis_to_json
+    from study.store.mechanical_model_file import read_mechanical_model
+    from study.store.recording_file import read_recording
+
+    asked = load_json(read_text(place / SETTINGS))
+    recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
+    clean = tuple(read_recording(path) for path in sorted(place.glob(f"{CLEAN}/*.h5")))
+    settings = DiagnosisSettings(
+        without=tuple(asked["without"]), clean=clean, patient=_patience(asked.get("processor_s"))
+    )
+    found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
+    errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
+    said = {"diagnosis": diagnosis_to_json(found.diagnosis), "channel_errors": errors}
+    if (proposal := found.proposal) is not None:
+        best = proposal.document and proposal.foreseen[0].experiment.words
+        said["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
+    return said
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

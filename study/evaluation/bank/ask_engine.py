@@ -1,0 +1,157 @@
+"""A bank's open cases, answered by processes that know nothing else: one per core, each for many cases."""
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+
+from study.errors import StudyError
+from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
+from study.evaluation.bank.proof_seals import answer_at
+from study.store.text_file import write_text
+
+PATIENCE_S = 1200.0
+"""For one case; it takes seconds to a minute."""
+GLANCE_S = 0.5
+TRIES = 2
+"""A process that died may have been killed by somebody."""
+
+
+class Engine:
+    """One process, begun when it is first asked, and anew when it died."""
+
+    def __init__(self, folder: ProofFolder) -> None:
+        self._folder = folder
+        self._process: subprocess.Popen[str] | None = None
+        self._beginning = threading.Lock()
+        self.ended = False
+
+    def ask(self, name: str) -> bool:
+        """Whether an answer came; blocks until then."""
+        with self._beginning:
+            if self.ended:
+                return False
+            if self._process is None or self._process.poll() is not None:
+                self.close()
+                self._process = self._begun()
+            process = self._process
+        impatience = threading.Timer(PATIENCE_S, process.kill)
+        impatience.daemon = True
+        impatience.start()
+        try:
+            if process.stdin is None or process.stdout is None:
+                return False
+            process.stdin.write(f"{name}\n")
+            process.stdin.flush()
+            return process.stdout.readline().strip() == name
+        except OSError:
+            return False
+        finally:
+            impatience.cancel()
+
+    def end(self) -> None:
+        """For good: whoever is asking at this moment hears no answer."""
+        with self._beginning:
+            self.ended = True
+            if self._process is not None:
+                self._process.kill()
+                self._process.wait()
+
+    def close(self) -> None:
+        for pipe in () if self._process is None else (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):
+                    pipe.close()
+
+    def _begun(self) -> subprocess.Popen[str]:
+        with self._folder.log.open("a", encoding="utf-8") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", "study.evaluation.bank.answer_cases", str(self._folder.open)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+            )
+
+
+def ask_engine(folder: ProofFolder, names: Sequence[str], workers: int, on_answered: Callable[[str], None]) -> None:
+    """Blocks until all cases without an answer have one; `on_answered(name)` as they come, in this thread."""
+    left, answered = SimpleQueue[str](), SimpleQueue[str]()
+    wanted = [name for name in names if not is_answered(folder.open / name)]
+    for name in wanted:
+        left.put(name)
+    with _engines(folder, min(workers, len(wanted)), left, answered) as threads:
+        missing = len(wanted)
+        while missing:
+            try:
+                name = answered.get(timeout=GLANCE_S)
+            except Empty:
+                if not any(thread.is_alive() for thread in threads) and answered.empty():
+                    raise _ended(folder, missing) from None
+                continue
+            missing -= 1
+            on_answered(name)
+
+
+@contextmanager
+def _engines(
+    folder: ProofFolder, workers: int, left: SimpleQueue[str], answered: SimpleQueue[str]
+) -> Iterator[list[threading.Thread]]:
+    engines = [Engine(folder) for _ in range(workers)]
+    threads = [threading.Thread(target=_work, args=(one, folder, left, answered), daemon=True) for one in engines]
+    for thread in threads:
+        thread.start()
+    try:
+        yield threads
+    finally:
+        while not left.empty():
+            left.get()
+        for engine in engines:
+            engine.end()
+        for thread, engine in zip(threads, engines, strict=True):
+            thread.join()
+            engine.close()
+
+
+def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
+    while True:
+        try:
+            name = left.get_nowait()
+        except Empty:
+            return
+        if not any(engine.ask(name) for _ in range(TRIES)):
+            if engine.ended:
+                return
+            _given_up(folder.open / name)
+        answered.put(name)
+
+
+def _ended(folder: ProofFolder, missing: int) -> StudyError:
+    return StudyError(
+        "The processes of the diagnosis ended before their work was done",
+        f"{missing} cases are without an answer; what they said last is in {folder.log}.",
+        "Run the same command again: it goes on where it stopped.",
+        saved=f"All answers so far are in {folder.open}.",
+    )
+
+
+def is_answered(place: Path) -> bool:
+    """A process that died may have been killed: its case is asked again when the bank goes on."""
+    return (place / ANSWER).exists() and DIED not in answer_at(place)
+
+
+def _given_up(place: Path) -> None:
+    how = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
+    said = {"name": place.name, "failed": how, DIED: True}
+    write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
+
+
+def forget_recording(place: Path) -> None:
+    """Megabytes each; the label keeps their hash, and the seed gives them again. Kept where nobody answered."""
+    if is_answered(place):
+        with suppress(OSError):
+            (place / RECORDING).unlink(missing_ok=True)

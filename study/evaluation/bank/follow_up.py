@@ -1,0 +1,121 @@
+"""Starts that left several names, taken up again.
+
+The device, which is still sealed, plays the recording that the diagnosis asks for, and another of the same menu that
+was drawn; processes that know nothing answer both.
+"""
+
+import json
+import secrets
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.diagnosis.document import diagnosis_from_json
+from analysis.diagnosis.result.experiment_menu import Experiment, experiment_menu
+from analysis.proof.follow_up import FollowUp
+from analysis.proof.outcome import Outcome
+from study.evaluation.bank.answer_cases import others_sha256
+from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
+from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, opened
+from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seal
+from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redrawn
+from study.evaluation.challenge.drive_plan import RATE_HZ
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.provenance import sha256_of
+from study.store.recording_file import write_recording
+from study.store.text_file import read_text, write_text
+
+NEXT = "next"
+"""Folder of these cases: a bank of its own, whose labels say which start they take up."""
+FURTHER = "recording_2.h5"
+PROPOSED, DRAWN = "proposed", "drawn"
+NOISE_SEED = 7
+
+
+def follow_up(
+    folder: ProofFolder,
+    plan: BankPlan,
+    outcomes: Sequence[Outcome],
+    wishes: tuple[int, bool],
+    on_done: Callable[[int, int], None],
+) -> tuple[FollowUp, ...]:
+    """Of single effects. wishes: how many processes, and whether recordings stay once they are answered. Interrupted,
+    the same call goes on. Raises StudyError."""
+    workers, keep = wishes
+    starts = [one for one in outcomes if one.kind == "single" and len(one.returned) > len(one.named) > 0]
+    if not starts:
+        return ()
+    again = opened(folder.path / NEXT, plan.seed, plan.brief)
+    for one in starts:
+        if not again.label(one.number).exists():
+            _seal(folder, again, plan, one)
+    seal(again)
+    labels = [label_at(again.label(one.number)) for one in starts]
+    names = [label[which]["name"] for label in labels for which in (PROPOSED, DRAWN) if which in label]
+    done = sum(is_answered(again.open / name) for name in names)
+    on_done(done, len(names))
+
+    def on_answered(name: str) -> None:
+        nonlocal done
+        done += 1
+        if not keep:
+            forget_recording(again.open / name)
+            (again.open / name / FURTHER).unlink(missing_ok=True)
+        on_done(done, len(names))
+
+    ask_engine(again, names, workers, on_answered)
+    return tuple(_found(again, one, label) for one, label in zip(starts, labels, strict=True))
+
+
+def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
+    """Both cases of a start; the label comes last."""
+    first = label_at(folder.label(start.number))
+    place = folder.open / first["name"]
+    proposal = answer_at(place).get("proposal")
+    label: dict[str, Any] = {"number": start.number, "salt": secrets.token_hex(SALT_BYTES)}
+    if proposal is not None:
+        model = read_mechanical_model(place / MODEL)
+        menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
+        drawn = menu[int(np.random.default_rng([plan.seed, start.number, NOISE_SEED]).integers(len(menu)))]
+        wanted = [(DRAWN, drawn), *((PROPOSED, one) for one in menu if one.words == proposal["best"])]
+        label |= {which: _written(again, plan, (first, place), experiment) for which, experiment in wanted}
+    write_text(again.label(start.number), json.dumps(label, indent=1) + "\n")
+
+
+def _written(
+    again: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiment: Experiment
+) -> dict[str, Any]:
+    """The label's part. The first recording is drawn again, and must be the one that was answered."""
+    label, first = start
+    name = secrets.token_hex(6)
+    place = again.open / name
+    place.mkdir()
+    case = redrawn(place, plan, label)
+    further = case.again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED)
+    write_recording(place / FURTHER, further, precision="float32")
+    for kept in (MODEL, SETTINGS):
+        write_text(place / kept, read_text(first / kept))
+    return {
+        "name": name,
+        "words": experiment.words,
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "others_sha256": others_sha256(place),
+    }
+
+
+def _found(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
+    def said(which: str) -> tuple[str, tuple[str, ...]]:
+        if which not in label:
+            return "", ()
+        answer = answer_at(again.open / label[which]["name"])
+        if not is_of(label[which], answer):
+            raise broken_seal([label[which]["name"]], again.path)
+        returned = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
+        return label[which]["words"], returned
+
+    proposed, after_proposed = said(PROPOSED)
+    drawn, after_drawn = said(DRAWN)
+    return FollowUp(start.number, start.names[0], start.returned, proposed, after_proposed, drawn, after_drawn)

@@ -1,0 +1,82 @@
+"""The seals of a proof: every label's hash, written before anything is answered, and compared ever after."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from study.errors import StudyError
+from study.evaluation.bank.proof_folder import ANSWER, DIED, ProofFolder
+from study.store.file_errors import UnusableFileError
+from study.store.json_document import parse_json
+from study.store.provenance import sha256_of
+from study.store.strict_json import load_json
+from study.store.text_file import read_text, write_text
+
+HASHED = ("recording_sha256", "model_sha256", "others_sha256")
+"""In a label, and again in the answer: what was sealed is what was answered."""
+
+
+def seal(folder: ProofFolder) -> str:
+    """Adds the hashes of new labels to labels.sha256; those that are there must hold. Returns the file's SHA-256.
+
+    Raises StudyError where a label is not what was sealed.
+    """
+    known = seals_of(folder)
+    if broken := [name for name, digest in known.items() if _digest(folder.path / name) != digest]:
+        raise broken_seal(broken, folder.path)
+    fresh = [path for path in sorted(folder.sealed.glob("*.json")) if f"sealed/{path.name}" not in known]
+    lines = [f"{digest}  {name}\n" for name, digest in known.items()]
+    lines += [f"{sha256_of(path)}  sealed/{path.name}\n" for path in fresh]
+    if fresh or not folder.seals.exists():
+        write_text(folder.seals, "".join(lines), overwrite=True)
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def seals_of(folder: ProofFolder) -> dict[str, str]:
+    """Digests by name; none where nothing is sealed yet. Raises StudyError for a file that is not of this kind."""
+    if not folder.seals.exists():
+        return {}
+    parts = [line.split() for line in read_text(folder.seals).splitlines()]
+    if any(len(each) != 2 or len(each[0]) != 64 for each in parts):
+        raise broken_seal([folder.seals.name], folder.path)
+    return {name: digest for digest, name in parts}
+
+
+def label_at(path: Path) -> dict[str, Any]:
+    """Raises StudyError."""
+    return parse_json(path, read_text(path), "sealed label")
+
+
+def answer_at(place: Path) -> dict[str, Any]:
+    """An error that is not known is NaN there. Raises StudyError."""
+    try:
+        said = load_json(read_text(place / ANSWER), with_nan=True)
+    except ValueError as problem:
+        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)) from problem
+    if not isinstance(said, dict):
+        raise UnusableFileError(place / ANSWER, "answer of a diagnosis", ("it holds no object",))
+    return said
+
+
+def is_of(label: dict[str, Any], said: dict[str, Any]) -> bool:
+    """Whether an answer is to the files that were sealed, by a process that knew nothing of the challenge. A process
+    that died read nothing that it could tell of."""
+    if DIED in said:
+        return True
+    return said.get("knows_the_challenge") is False and all(
+        key in said and said[key] == label[key] for key in HASHED if key in label
+    )
+
+
+def broken_seal(names: list[str], path: Path) -> StudyError:
+    return StudyError(
+        "A seal is broken",
+        f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
+        "was sealed before the diagnosis.",
+        "Run the bank again in another folder; this one proves nothing.",
+        saved="Nothing was changed.",
+    )
+
+
+def _digest(path: Path) -> str:
+    return sha256_of(path) if path.exists() else ""

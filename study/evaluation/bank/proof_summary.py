@@ -1,0 +1,68 @@
+"""What a proof amounts to, for the terminal: misses first."""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from analysis.proof.wording import concealed_text, figure_text, said_text, strength_text
+from study.evaluation.bank.prove import Proof
+
+
+def proof_lines(proof: Proof) -> Iterator[str]:
+    score = proof.score
+    yield f"{len(score.misses)} misses in {len(proof.outcomes)} cases"
+    for one in score.misses:
+        strength = strength_text(one)
+        drawn = f"{concealed_text(one)}{f' at {strength}' if strength else ''}"
+        yield f"  {one.number:5d} {one.kind}, {one.bank}: {drawn} -> {said_text(one)}"
+    yield from control_lines(proof)
+    yield ""
+    for figure in score.figures:
+        yield f"{figure.name:52s} {figure_text(figure)}"
+    error = score.calibration.error
+    if error is not None:
+        low, high = score.calibration.low or 0.0, score.calibration.high or 0.0
+        yield f"{'expected calibration error':52s} {error:.3f} [{low:.3f}, {high:.3f}]"
+    yield ""
+    yield from remarks(proof)
+    yield f"Seal of the labels (SHA-256 of labels.sha256): {proof.seal}"
+    yield f"Everything is in {proof.folder.path}"
+
+
+def control_lines(proof: Proof) -> Iterator[str]:
+    """Those that did not hold one by one."""
+    if proof.controls:
+        yield f"{sum(one.held for one in proof.controls)} of {len(proof.controls)} controls held"
+    for one in proof.controls:
+        if not one.held:
+            yield f"  {one.name}: {', then '.join(one.said)}"
+
+
+def remarks(proof: Proof) -> Iterator[str]:
+    if proof.left_out:
+        yield (
+            f"{proof.left_out} cases of the second physics engine were left out: MuJoCo is not installed "
+            "(pip install 'hapteq[prove]')."
+        )
+    if set(proof.beside) - set(proof.engines):
+        yield f"Follow-ups and controls were answered by another version of the diagnosis ({', '.join(proof.beside)})."
+    if len(proof.engines) > 1:
+        yield f"The answers come from {len(proof.engines)} versions of the diagnosis: run the bank anew for a figure."
+
+
+def summary(proof: Proof) -> dict[str, Any]:
+    return {
+        "folder": str(proof.folder.path),
+        "cases": len(proof.outcomes),
+        "left_out": proof.left_out,
+        "seal": proof.seal,
+        "engines": list(proof.engines),
+        "figures": {
+            figure.name: {"value": figure.value, "ci95": [figure.low, figure.high], "of": figure.of}
+            for figure in proof.score.figures
+        },
+        "expected_calibration_error": proof.score.calibration.error,
+        "followed": [asdict(one) for one in proof.followed],
+        "controls": {one.name: one.held for one in proof.controls},
+        "misses": [one.number for one in proof.score.misses],
+    }

@@ -1,0 +1,85 @@
+"""Controls of a diagnosis, asked of the same processes as a bank: files in, answers out, claims checked."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
+from analysis.proof.controlled import Controlled, controlled
+from study.errors import StudyError
+from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
+from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.evaluation.bank.proof_seals import answer_at
+from study.evaluation.challenge.controls import CONTROLS, Asked, Control
+from study.evaluation.challenge.rig import Rig
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.recording_file import write_recording
+from study.store.strict_json import load_json
+from study.store.text_file import read_text, write_text
+
+SHORT = Rig((0,), 1000, 3, steps=80)
+
+
+def run_controls(
+    path: Path,
+    seed: int,
+    workers: int,
+    on_done: Callable[[int, int], None],
+    controls: Sequence[Control] = CONTROLS,
+    rig: Rig = SHORT,
+) -> tuple[Controlled, ...]:
+    """`on_done(answers so far, of all)`. In `path`; interrupted, the same call goes on. Raises StudyError."""
+    folder = ProofFolder(path)
+    folder.open.mkdir(parents=True, exist_ok=True)
+    names = {control.name: _given(folder, seed, control, rig) for control in controls}
+    every = [name for each in names.values() for name in each]
+    done = sum(is_answered(folder.open / name) for name in every)
+    on_done(done, len(every))
+
+    def on_answered(name: str) -> None:
+        nonlocal done
+        done += 1
+        forget_recording(folder.open / name)
+        on_done(done, len(every))
+
+    ask_engine(folder, every, workers, on_answered)
+    return tuple(
+        controlled(f"{one.name}, seed {seed}", one.claim, [_said(folder.open / name) for name in names[one.name]])
+        for one in controls
+    )
+
+
+def _given(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[str, ...]:
+    """Writes what is not written yet; the settings come last."""
+    known = folder.path / f"{control.name.replace(' ', '-')}.json"
+    begun = f"{CONTROLS.index(control):02d}"
+    if (written := _names(known, begun)) is not None:
+        return written
+    asked = control.draw(seed, rig)
+    names = tuple(f"{begun}{number}" for number in range(len(asked)))
+    for name, one in zip(names, asked, strict=True):
+        _write(folder.open / name, one)
+    write_text(known, json.dumps(names) + "\n", overwrite=True)
+    return names
+
+
+def _names(known: Path, begun: str) -> tuple[str, ...] | None:
+    """None where they are not written yet, or are not those that this program writes: they are then drawn again."""
+    try:
+        names = load_json(read_text(known))
+    except (StudyError, ValueError):
+        return None
+    ours = isinstance(names, list) and names == [f"{begun}{number}" for number in range(len(names))]
+    return tuple(names) if ours and names else None
+
+
+def _write(place: Path, one: Asked) -> None:
+    place.mkdir(exist_ok=True)
+    write_recording(place / RECORDING, one.recording, precision="float32", overwrite=True)
+    write_mechanical_model(place / MODEL, one.model, overwrite=True)
+    write_text(place / SETTINGS, json.dumps({"without": list(one.without)}) + "\n", overwrite=True)
+
+
+def _said(place: Path) -> Diagnosis | None:
+    answer = answer_at(place)
+    return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])

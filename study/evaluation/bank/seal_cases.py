@@ -1,0 +1,109 @@
+"""A bank's cases as files: what a diagnosis gets, and apart from it the truth, under a seal that comes first."""
+
+import json
+import secrets
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from study.errors import StudyError
+from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.evaluation.bank.proof_seals import label_at, seal
+from study.evaluation.bank.write_cases import truths
+from study.evaluation.challenge import second_engine
+from study.evaluation.challenge.draw_bank import Draw, case_of, draw
+from study.evaluation.challenge.draw_case import Case
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.provenance import sha256_of
+from study.store.recording_file import write_recording
+from study.store.text_file import write_text
+from study.workflows.worker_processes import worker_processes
+
+SALT_BYTES = 16
+PROCESSOR_S = 60.0
+"""For the search of one case: what was found until then is its answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class BankPlan:
+    seed: int
+    cases: int
+    brief: bool = False
+    """One axis and short periods: for tests, and for a quick look."""
+
+
+def to_draw(plan: BankPlan) -> tuple[Draw, ...]:
+    """All that can be drawn here: without the second engine its cases are left out."""
+    whole = (draw(plan.seed, number, plan.brief) for number in range(plan.cases))
+    return tuple(one for one in whole if one.bank != "engine" or second_engine.is_installed())
+
+
+def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
+    """Draws, writes and seals what is not sealed yet, calling `on_sealed(how many are)`. Returns the SHA-256 of
+    labels.sha256, to be kept elsewhere before anything is diagnosed. Raises StudyError."""
+    drawn = to_draw(plan)
+    left = [one for one in drawn if not folder.label(one.number).exists()]
+    done = len(drawn) - len(left)
+    on_sealed(done)
+    with worker_processes(workers if len(left) > 1 else 1) as pool:
+        for finished in as_completed([pool.submit(seal_one, folder, one) for one in left]):
+            finished.result()
+            done += 1
+            on_sealed(done)
+    return seal(folder)
+
+
+def seal_one(folder: ProofFolder, one: Draw) -> None:
+    """The label comes last: a case without one is drawn again."""
+    name = secrets.token_hex(6)
+    case, place = case_of(one, name), folder.open / name
+    place.mkdir()
+    write_recording(place / RECORDING, case.recording, precision="float32")
+    write_mechanical_model(place / MODEL, case.model)
+    write_text(place / SETTINGS, settings_text(one.without, PROCESSOR_S))
+    write_text(folder.label(one.number), json.dumps(_label(one, case, place), indent=1, allow_nan=False) + "\n")
+
+
+def settings_text(without: Sequence[str], processor_s: float | None = None) -> str:
+    """What a process of the diagnosis is told beside the files: effects that it must not consider, and how long the
+    search may take."""
+    return json.dumps({"without": list(without), "processor_s": processor_s}) + "\n"
+
+
+def redrawn(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
+    """Writes the recording of a sealed case again. Raises StudyError where it is not the one that was sealed."""
+    case = case_of(draw(plan.seed, label["number"], plan.brief), label["name"])
+    write_recording(place / RECORDING, case.recording, precision="float32", overwrite=True)
+    if sha256_of(place / RECORDING) != label["recording_sha256"]:
+        raise StudyError(
+            "A device of the bank cannot be drawn again",
+            f"Case {label['number']} gives another recording than the one that was sealed.",
+            "Run the bank with the versions that it was begun with (proof.json names them), or anew.",
+            saved="All answers are kept.",
+        )
+    return case
+
+
+def _label(one: Draw, case: Case, place: Path) -> dict[str, Any]:
+    """All that is concealed. The salt keeps a hash from being guessed: there are few effects."""
+    drawn = asdict(one)
+    return {
+        "name": place.name,
+        **{key: drawn[key] for key in ("number", "seed", "kind", "bank", "strengths", "concealed")},
+        "axes": ["xyz"[axis] for axis in one.rig.axes],
+        "extras": one.rig.extras,
+        "without": list(one.without),
+        "truth": truths(case),
+        "adds": case.adds,
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "salt": secrets.token_hex(SALT_BYTES),
+    }
+
+
+def sealed_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
+    """What the cases are called under `open`, in the order of their numbers."""
+    found = [label_at(folder.label(number)) for number in numbers]
+    return tuple(str(label["name"]) for label in found)

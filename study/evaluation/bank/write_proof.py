@@ -1,0 +1,168 @@
+"""What a proof leaves behind: a document, a table with one row per case, a page, and a small table to keep."""
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import analysis.diagnosis
+from analysis.figures.proof_pictures import proof_pictures
+from analysis.proof.outcome import Outcome
+from analysis.proof.score import main_error
+from analysis.reports.proof_report import ProofFacts, render_proof_report
+from study.evaluation.bank.answer_cases import engine_digest
+from study.evaluation.bank.proof_summary import remarks
+from study.evaluation.bank.prove import Proof
+from study.local_clock import local_now
+from study.store.csv_rows import rows_to_csv
+from study.store.json_document import read_json, write_json
+from study.store.provenance import command_line, gather_provenance, versions
+from study.store.text_file import write_text
+from study.workflows.picture_files import write_pictures
+
+FORMAT, VERSION = "hapteq-proof", 1
+DOCUMENT, TABLE, PAGE = "proof.json", "proof.csv", "report.html"
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRow:
+    number: int
+    seed: int
+    kind: str
+    bank: str
+    axes: str
+    model: str
+    concealed: str
+    at: str
+    strength: str
+    adds: float
+    detectable: bool
+    verdict: str
+    named: str
+    named_at: str
+    probability: str
+    returned: str
+    main_error: float | None
+    retuned: float | None
+    after: float | None
+    seconds: float | None
+    miss: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FigureRow:
+    figure: str
+    value: float | None
+    low: float | None
+    high: float | None
+    of: int
+
+
+def write_proof(proof: Proof) -> None:
+    """Anew each time: what it is made from stays. Raises StudyError."""
+    folder, at = proof.folder.path, answered_at(proof)
+    score = proof.score
+    document = {
+        "seed": proof.plan.seed,
+        "cases": proof.plan.cases,
+        "brief": proof.plan.brief,
+        "left_out": proof.left_out,
+        "seal": proof.seal,
+        "engines": list(proof.engines),
+        "engines_beside": list(proof.beside),
+        "commit": at,
+        "figures": [asdict(figure) for figure in score.figures],
+        "calibration": asdict(score.calibration),
+        "followed": [asdict(one) for one in proof.followed],
+        "controls": [asdict(one) for one in proof.controls],
+        "misses": [one.number for one in score.misses],
+    }
+    write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
+    rows = [_row(one, one in score.misses) for one in proof.outcomes]
+    write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
+    pictures = proof_pictures(proof.outcomes, score.calibration)
+    write_pictures(folder / "figures", pictures)
+    facts = ProofFacts(
+        seeds(proof), proof.seal, at, proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
+    )
+    page = render_proof_report(
+        proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, local_now()
+    )
+    write_text(folder / PAGE, page, overwrite=True)
+
+
+def write_table(path: Path, proof: Proof) -> None:
+    """Figures with what they were measured on, small enough to be kept beside the code. Raises StudyError."""
+    calibration = proof.score.calibration
+    figures = [FigureRow(one.name, one.value, one.low, one.high, one.of) for one in proof.score.figures]
+    named = sum(part.of for part in calibration.bins)
+    figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
+    failed = [one.name for one in proof.controls if not one.held]
+    held = f"{len(proof.controls) - len(failed)} of {len(proof.controls)} held" if proof.controls else "not asked"
+    lines = [
+        f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
+        f"# commit {answered_at(proof)}, code of the diagnosis {' '.join(proof.engines)}",
+        f"# follow-ups and controls by code {' '.join(proof.beside) or 'none'}",
+        f"# seal of the labels {proof.seal}",
+        f"# versions {json.dumps(versions())}",
+        f"# controls {', not '.join((held, *failed))}",
+    ]
+    write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
+    misses = [_row(one, True) for one in proof.score.misses]
+    write_text(misses_table(path), rows_to_csv(misses, CaseRow), overwrite=True)
+
+
+def misses_table(path: Path) -> Path:
+    """Beside the table of figures."""
+    return path.with_name(f"{path.stem}-misses{path.suffix}")
+
+
+def answered_at(proof: Proof) -> str:
+    """The commit at which the answers were first written down; this checkout's where they are its own."""
+    document = proof.folder.path / DOCUMENT
+    if document.exists():
+        before = read_json(document, FORMAT, VERSION)
+        if before.get("engines") == list(proof.engines) and isinstance(before.get("commit"), str):
+            return str(before["commit"])
+    return commit() if proof.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
+
+
+def seeds(proof: Proof) -> str:
+    return f"{proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}"
+
+
+def commit() -> str:
+    """Of the checkout that runs, "+" where files of it are changed; "unknown" where it is none."""
+    root = Path(analysis.diagnosis.__path__[0]).parent
+    try:
+        at = _git(root, "rev-parse", "HEAD")
+        return at + ("+" if _git(root, "status", "--porcelain", "--untracked-files=no", ".", "../equalizer") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def _git(folder: Path, *words: str) -> str:
+    done = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=60)
+    return done.stdout.strip()
+
+
+def _row(one: Outcome, miss: bool) -> CaseRow:
+    known = one.kind == "single" and one.right and bool(one.concealed)
+    return CaseRow(
+        one.number, one.seed, one.kind, one.bank, " ".join(one.axes), one.model,
+        " ".join(one.names),
+        " ".join(c.axis or "all" for c in one.concealed),
+        " ".join(f"{value:.3f}" for value in one.strengths),
+        round(one.adds, 4), one.detectable, one.verdict,
+        " ".join(one.named_names),
+        " ".join(effect.axis or "all" for effect in one.named),
+        " ".join(f"{effect.probability:.3f}" for effect in one.named),
+        " ".join(one.returned),
+        _short(main_error(one.concealed[0], one.named[0]) if known else None),
+        _short(one.left("retuned")), _short(one.left("after")), _short(one.seconds), miss,
+    )  # fmt: skip
+
+
+def _short(value: float | None) -> float | None:
+    return None if value is None or value != value else round(value, 4)

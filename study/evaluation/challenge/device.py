@@ -1,0 +1,89 @@
+"""A device as it really is: a bench with everything that a model of it may lack. `record` reads it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge import handle_force_kernel as handle
+from study.evaluation.challenge.actuator_kernel import GAIN, drive
+from study.evaluation.challenge.bench import Bench
+from study.evaluation.challenge.drive_plan import RATE_HZ
+from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, move
+from study.evaluation.challenge.sensor import Sensor, read
+
+STEPS = 20
+"""Of the integrator in a sample, where nothing else is said."""
+
+
+def _no_forces() -> FloatArray:
+    forces = np.zeros((3, 11))
+    forces[:, handle.ABOVE], forces[:, handle.BELOW] = np.inf, -np.inf
+    return forces
+
+
+def _exact_amplifiers() -> FloatArray:
+    amplifiers = np.zeros((3, 9))
+    amplifiers[:, GAIN] = 1.0
+    return amplifiers
+
+
+def _no_play() -> FloatArray:
+    return np.array([-1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Device:
+    """Columns of the arrays are named in the kernels that read them."""
+
+    bench: Bench
+    amplifiers: FloatArray = field(default_factory=_exact_amplifiers)
+    """(3, 9)"""
+    friction: FloatArray = field(default_factory=lambda: np.zeros((3, 7)))
+    forces: FloatArray = field(default_factory=_no_forces)
+    """(3, 11)"""
+    inertia_per_m: FloatArray = field(default_factory=lambda: np.zeros(3))
+    axis_mass_per_m: FloatArray = field(default_factory=lambda: np.zeros(3))
+    varying: FloatArray = field(default_factory=lambda: np.zeros((3, 5)))
+    play: FloatArray = field(default_factory=_no_play)
+    creep_stiffness: FloatArray = field(default_factory=lambda: np.zeros((3, 1)))
+    creep_time_s: FloatArray = field(default_factory=lambda: np.ones(1))
+    coupling: float = 0.0
+    skipped: int = 0
+    """Every so many commands one is not written; 0 = never."""
+    sensor: Sensor = field(default_factory=Sensor)
+    steps: int = STEPS
+    """Of the integrator in a sample."""
+
+    def mechanism(self) -> Mechanism:
+        mass, damping, stiffness = self.bench.matrices()
+        axis = int(self.play[AXIS])
+        if axis >= 0:
+            mass[axis, axis] -= self.play[MOTOR_MASS]
+        inverse_mass = np.linalg.inv(mass).astype(np.float64)
+        return Mechanism(
+            inverse_mass, damping, stiffness,
+            self.friction, self.forces, self.inertia_per_m, self.axis_mass_per_m, self.varying, self.play,
+            self.creep_stiffness, 1.0 / (RATE_HZ * self.steps * self.creep_time_s), self.coupling,
+        )  # fmt: skip
+
+
+def motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What the handle really does: acceleration and position at the samples, (samples, 3) each.
+
+    Raises ValueError where the device does not stay in one place: its parts contradict each other.
+    """
+    written = command.copy()
+    if device.skipped:
+        written[device.skipped :: device.skipped] = written[device.skipped - 1 : -1 : device.skipped]
+    force = drive(written, device.amplifiers, device.steps, RATE_HZ)
+    acceleration, position = move(device.mechanism(), force, device.steps, RATE_HZ)
+    if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
+        raise ValueError("the simulated device ran away: a stiffness, mass or per_m is too large for its step")
+    return acceleration, position
+
+
+def record(device: Device, command: FloatArray, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Response and position as read, (samples, 3) each."""
+    acceleration, position = motion(device, command)
+    return read(device.sensor, acceleration, position, RATE_HZ, random)

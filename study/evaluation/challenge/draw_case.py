@@ -1,0 +1,190 @@
+"""Concealed-physics cases: a recording, a model that lacks something, and what it lacks. All from one seed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
+from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
+from study.evaluation.challenge.extras import with_extras
+from study.evaluation.challenge.hidden import Circumstances, HiddenEffect
+from study.evaluation.challenge.nominal import as_model, calibrated, retuned
+from study.evaluation.challenge.rig import WHOLE, Rig
+from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read
+
+EFFECTS: dict[str, HiddenEffect] = {
+    effect.name: effect
+    for group in (friction, springs, inertia_and_drag, hand, actuator, sensor)
+    for effect in group.EFFECTS
+}
+"""The whole vocabulary."""
+DECOYS: dict[str, HiddenEffect] = {effect.name: effect for effect in decoys.DECOYS}
+"""Outside of it."""
+
+Concealed = Literal["calibrated", "retuned"]
+Moved = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Acceleration and position of one device, then of another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """One effect that the device has and the model lacks."""
+
+    effect: str
+    place: str
+    axis: str | None
+    values: dict[str, float]
+    """By the vocabulary's names; of a decoy, its own."""
+    unseen: dict[str, float]
+    """Numbers that the vocabulary has no name for: which of several readings of the effect was drawn."""
+
+
+Again = Callable[[FloatArray, str, float, int], Recording]
+"""One more recording of the same device: commands (samples, axes) in N, their kind, a mass in kg, the noise's seed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    recording: Recording
+    model: MechanicalModel
+    truth: tuple[Truth, ...]
+    again: Again
+    adds: float = 0.0
+    """What the concealed effects change of the readings, in the worst channel: rms over that of the noise."""
+
+
+NOISE = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_M / 12**0.5))] * 3])
+"""Of acceleration, then position."""
+
+
+def draw_case(
+    seed: int,
+    effects: Sequence[str] = (),
+    concealed: Concealed = "calibrated",
+    strength: float | Sequence[float] | None = None,
+    name: str = "",
+    rig: Rig = WHOLE,
+) -> Case:
+    """effects: names, of the vocabulary or of DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, for all
+    or one each; None draws it evenly. The same arguments give the same case.
+
+    Raises ValueError for an unknown name, a strength outside 0..1, or a hand behind a re-tuned model, which would
+    take it for the device's own.
+    """
+    hidden = [_known(effect) for effect in effects]
+    if concealed == "retuned" and any(effect.name == "hand_impedance" for effect in hidden):
+        raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
+    random = np.random.default_rng([seed, len(hidden)])
+    bench, plan = draw_bench(random), draw_plan(random, rig)
+    bare = with_extras(Device(bench, steps=rig.steps), rig.extras, seed)
+    strengths = _strengths(strength, len(hidden), random)
+    free = motion(bare, plan.command)
+    device, truth = _concealed(bare, free, (hidden, strengths), random, rig)
+    moved = motion(device, plan.command) if hidden else free
+    response, position = read(device.sensor, *moved, RATE_HZ, random)
+    if concealed == "calibrated":
+        known, tolerance = calibrated(bench, random, rig.axes)
+    else:
+        known, tolerance = retuned(bench, response, plan, rig.axes)
+    label = name or f"bench {seed}"
+    model = as_model(label, known, tolerance, rig.axes)
+    recording = recording_of(label, plan, response, position, rig)
+
+    def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+        further = further_plan(command, kind, rig)
+        heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
+        seen = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(recording_of(label, further, *seen, rig), meta=carried(added_kg))
+
+    return Case(recording, model, truth, again, added(bare, device, (free, moved), rig) if hidden else 0.0)
+
+
+def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
+    """By which two devices' readings differ: rms over that of the noise, in the worst channel. moved: how both move."""
+    readings = []
+    for one, (acceleration, position) in zip((bare, device), moved, strict=True):
+        # The same noise and the same losses for both: what is left is the difference of the devices.
+        seen, _ = read(one.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0))
+        readings.append(np.hstack([seen[:, rig.axes], position[:, rig.axes]]))
+    noise = NOISE[[*rig.axes, *(3 + axis for axis in rig.axes)]]
+    power = np.mean(((readings[1] - readings[0]) / noise) ** 2, axis=0)
+    return float(np.sqrt(power.max()))
+
+
+def _known(name: str) -> HiddenEffect:
+    found = EFFECTS.get(name) or DECOYS.get(name)
+    if found is None:
+        raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
+    return found
+
+
+def _strengths(given: float | Sequence[float] | None, count: int, random: np.random.Generator) -> FloatArray:
+    drawn = random.random(count) if given is None else np.broadcast_to(np.asarray(given, dtype=np.float64), (count,))
+    if ((drawn < 0.0) | (drawn > 1.0)).any():
+        raise ValueError(f"strength is {given}; it must lie between 0 and 1")
+    return drawn
+
+
+def _concealed(
+    device: Device,
+    free: tuple[FloatArray, FloatArray],
+    wanted: tuple[Sequence[HiddenEffect], FloatArray],
+    random: np.random.Generator,
+    rig: Rig,
+) -> tuple[Device, tuple[Truth, ...]]:
+    """free: how the device moves without them."""
+    (hidden, strengths), (acceleration, position) = wanted, free
+    bench, truth = device.bench, []
+    peak = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
+    for effect, strength in zip(hidden, strengths, strict=True):
+        axis = rig.axes[int(random.integers(len(rig.axes)))]
+        travel = np.abs(position).max(axis=0)
+        at = Circumstances(random, float(strength), bench, axis, travel, peak, rig.axes)
+        values = effect.draw(at)
+        device = effect.build(device, axis, values)
+        truth.append(truth_of(effect, axis, values))
+    return device, tuple(truth)
+
+
+def further_plan(command: FloatArray, kind: str, rig: Rig) -> DrivePlan:
+    """command: (samples, axes)"""
+    whole = np.zeros((len(command), 3))
+    whole[:, rig.axes] = command
+    return DrivePlan(whole, (Segment(0, len(whole), kind, float(np.abs(whole).max()), 0, "fit"),))
+
+
+def carried(added_kg: float) -> dict[str, float]:
+    """As a recording says it."""
+    return {"added_mass_kg": added_kg} if added_kg else {}
+
+
+def truth_of(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:
+    known = EFFECTS_BY_NAME.get(effect.name)
+    names = set(values) if known is None else {parameter.name for parameter in known.parameters}
+    return Truth(
+        effect.name,
+        effect.place,
+        AXES[axis] if effect.of_axis else None,
+        {name: float(value) for name, value in values.items() if name in names},
+        {name: float(value) for name, value in values.items() if name not in names},
+    )
+
+
+def recording_of(name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, rig: Rig) -> Recording:
+    """response, position: (samples, 3)"""
+    axes, names = list(rig.axes), tuple(AXES[axis] for axis in rig.axes)
+    return Recording(
+        device=name,
+        command=Signal(plan.command[:, axes], RATE_HZ, "force", "N", tuple(f"f{axis}" for axis in names)),
+        response=Signal(response[:, axes], RATE_HZ, "acceleration", "m/s^2", tuple(f"a{axis}" for axis in names)),
+        position=Signal(position[:, axes], RATE_HZ, "position", "m", names),
+        segments=plan.segments,
+    )

@@ -1,0 +1,135 @@
+"""Faults of a drive, put into a recording by way of its recorded command; see `force_injections`."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.moved_axis import Moved
+
+Numbers = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ForceInjection:
+    effect: str
+    """As the vocabulary calls it, or a new name written like it."""
+    draw: Callable[[Moved, float, np.random.Generator], dict[str, float]]
+    """Numbers from the strength, 0 (weakest) to 1."""
+    command: Callable[[Moved, Numbers], FloatArray]
+    """(n,): what had to be commanded."""
+    actuator: bool = False
+    """It sits in the drive: where a motion is imposed, there is none."""
+    turns: bool = True
+    """It has a meaning where a shaft goes round and round."""
+
+
+def rms(samples: FloatArray) -> float:
+    return float(np.sqrt(np.mean((samples - samples.mean()) ** 2)))
+
+
+def level_of(moved: Moved, strength: float) -> float:
+    """Rms of a force: from a fiftieth of the command's to all of it."""
+    return rms(moved.command) * float(0.02 * 50.0**strength)
+
+
+def _later(samples: FloatArray, by: float) -> FloatArray:
+    at = np.arange(len(samples), dtype=np.float64)
+    return np.asarray(np.interp(at - by, at, samples))
+
+
+def _cubed(moved: Moved, of: Numbers) -> FloatArray:
+    """The command whose own and cubed share are the force: Newton's steps from the force itself."""
+    found = moved.command.copy()
+    for _ in range(60):
+        found -= (found + of["cubic"] * found**3 - moved.command) / (1 + 3 * of["cubic"] * found**2)
+    return found
+
+
+def _draw_limit(moved: Moved, strength: float, random: np.random.Generator) -> dict[str, float]:
+    limit = float(np.quantile(np.abs(moved.command), 0.98))
+    return {"limit": limit, "more": float(0.05 * 20.0**strength)}
+
+
+def _beyond_limit(moved: Moved, of: Numbers) -> FloatArray:
+    """More was commanded wherever the force was at its largest."""
+    over = np.abs(moved.command) >= 0.97 * of["limit"]
+    return np.asarray(np.where(over, moved.command * (1 + of["more"]), moved.command))
+
+
+def _draw_rate(moved: Moved, strength: float, random: np.random.Generator) -> dict[str, float]:
+    steps = np.abs(np.diff(moved.command))
+    top = float(np.quantile(steps[steps > 0], 0.98)) if steps.any() else 0.0
+    return {"rate": top * moved.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
+
+
+def _hurried(moved: Moved, of: Numbers) -> FloatArray:
+    """Wherever the force changed about as fast as it ever did, the command had got there at once."""
+    steps = np.diff(moved.command)
+    fast = np.abs(steps) * moved.rate_hz >= of["from"] * of["rate"]
+    goes_on = fast[1:] & fast[:-1] & (steps[1:] * steps[:-1] > 0)
+    found = moved.command.copy()
+    for k in np.flatnonzero(goes_on)[::-1]:
+        found[k + 1] = found[k + 2]
+    return found
+
+
+def _gain(moved: Moved, strength: float, random: np.random.Generator) -> dict[str, float]:
+    return {"gain": float(1 + random.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)}
+
+
+def _middle_turn(samples: FloatArray, rate_hz: float) -> float:
+    """rad/s, below which half of the rate of change's power lies."""
+    power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
+    middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
+    return 2 * np.pi * max(middle, 1) * rate_hz / len(samples)
+
+
+DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
+    ForceInjection("force_gain", _gain, lambda moved, of: moved.command / of["gain"], actuator=True),
+    ForceInjection(
+        "force_offset",
+        lambda moved, s, r: {"offset": float(r.choice((-1.0, 1.0))) * level_of(moved, s)},
+        lambda moved, of: moved.command - of["offset"],
+        actuator=True,
+    ),
+    ForceInjection(
+        "transport_delay",
+        lambda moved, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(moved.command, moved.rate_hz), 1e-9)},
+        lambda moved, of: _later(moved.command, -of["delay"] * moved.rate_hz),
+        actuator=True,
+    ),
+    ForceInjection(
+        "amplifier_lag",
+        lambda moved, s, r: {"time_constant": 0.3 * 0.02 * 50.0**s / _middle_turn(moved.command, moved.rate_hz)},
+        lambda moved, of: moved.command + of["time_constant"] * np.gradient(moved.command) * moved.rate_hz,
+        actuator=True,
+    ),
+    ForceInjection("force_saturation", _draw_limit, _beyond_limit, actuator=True),
+    ForceInjection("slew_limit", _draw_rate, _hurried, actuator=True),
+    ForceInjection(
+        "force_quantization",
+        lambda moved, s, r: {"step": level_of(moved, 0.3 + 0.7 * s)},
+        lambda moved, of: of["step"] * np.round(moved.command / of["step"]),
+        actuator=True,
+    ),
+    ForceInjection(
+        "force_deadband",
+        lambda moved, s, r: {"width": 0.5 * level_of(moved, s)},
+        lambda moved, of: moved.command + of["width"] * np.sign(moved.command),
+        actuator=True,
+    ),
+    ForceInjection(
+        "actuator_cubic",
+        lambda moved, s, r: {"cubic": 0.02 * 30.0**s / float(np.abs(moved.command).max()) ** 2},
+        _cubed,
+        actuator=True,
+    ),
+    ForceInjection(
+        "force_gain_drift",
+        lambda moved, s, r: {"change": float(r.choice((-0.5, 1.0))) * 0.05 * 20.0**s},
+        lambda moved, of: moved.command / (1 + of["change"] * moved.share_of_time),
+        actuator=True,
+    ),
+)

@@ -1,0 +1,90 @@
+"""What every challenge recording is driven with: multisines to fit, then sweeps, all axes at once and slow sines."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.recording import Segment
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.rig import WHOLE, Rig
+
+RATE_HZ = 1000.0
+AXES = ("x", "y", "z")
+LEVELS_N = (0.5, 1.5, 3.0)
+PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
+REST = 500
+FIRST_LINE, LAST_LINE = 3, 479
+"""Of a 2 s period: 1.5 to 239.5 Hz, odd lines alone."""
+SWEEP_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE = 1.8, (1.0, 240.0), 6000, 200
+SLOW_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE = 1.6, (0.9, 1.3, 2.1), 4000, 500
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivePlan:
+    command: FloatArray
+    """(samples, 3), N"""
+    segments: tuple[Segment, ...]
+
+
+def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD) -> FloatArray:
+    """One period, (period,), with peak `level_n`: odd lines of amplitude f^-1/2 and random phase, one of every four
+    neighbours left silent, so that it shows what odd distortion puts there."""
+    lines = np.arange(FIRST_LINE * period // PERIOD | 1, LAST_LINE * period // PERIOD + 1, 2)
+    silent = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
+    spectrum = np.zeros(period // 2 + 1, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / np.sqrt(lines)
+    spectrum[silent] = 0.0
+    wave = np.fft.irfft(spectrum, period)
+    shaped: FloatArray = level_n * wave / np.abs(wave).max()
+    return shaped
+
+
+def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
+    """105 s for the whole bench."""
+    blocks: list[FloatArray] = []
+    segments: list[Segment] = []
+    start = 0
+
+    def add(block: FloatArray, kind: str, level_n: float, period: int, role: str) -> None:
+        nonlocal start
+        segments.append(Segment(start, start + len(block), kind, level_n, period, role))
+        blocks.extend((block, np.zeros((REST, 3))))
+        start += len(block) + REST
+
+    for axis in rig.axes:
+        for level_n in LEVELS_N:
+            wave = np.tile(multisine(random, level_n, rig.period), rig.periods)
+            add(_along(axis, wave), "multisine", level_n, rig.period, "fit")
+    for axis in rig.axes:
+        add(_along(axis, _sweep(rig.along(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test")
+    together = np.zeros((rig.period, 3))
+    for axis in rig.axes:
+        together[:, axis] = multisine(random, LEVELS_N[1], rig.period)
+    add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], rig.period, "test")
+    add(_slow(rig), "slow", SLOW_N, 0, "test")
+    return DrivePlan(np.vstack(blocks), tuple(segments))
+
+
+def _along(axis: int, wave: FloatArray) -> FloatArray:
+    block = np.zeros((len(wave), 3))
+    block[:, axis] = wave
+    return block
+
+
+def _sweep(samples: int) -> FloatArray:
+    """Logarithmic, with a straight rise and fall."""
+    t, total = np.arange(samples) / RATE_HZ, samples / RATE_HZ
+    octaves = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
+    turns = SWEEP_HZ[0] * total / octaves * (np.exp(octaves * t / total) - 1.0)
+    rise = np.minimum(np.arange(samples) / SWEEP_FADE, 1.0)
+    wave: FloatArray = SWEEP_N * np.sin(2 * np.pi * turns) * rise * np.append(1.0, rise[:0:-1])
+    return wave
+
+
+def _slow(rig: Rig) -> FloatArray:
+    """All axes at once, each at its own frequency; it ends without a fall."""
+    samples = np.arange(rig.along(SLOW_SAMPLES))
+    rise = np.minimum(samples / SLOW_FADE, 1.0)
+    block: FloatArray = SLOW_N * np.sin(2 * np.pi * np.outer(samples / RATE_HZ, SLOW_HZ)) * rise[:, None]
+    block[:, [axis for axis in range(3) if axis not in rig.axes]] = 0.0
+    return block

@@ -1,0 +1,151 @@
+"""The mechanism's motion, compiled: semi-implicit steps, many to a sample; velocity first, then position with it.
+
+So a velocity belongs half a step before its position. What damps and rubs sees it carried on by that half step, with
+the acceleration before: otherwise all modes would seem lighter by damping times half a step.
+"""
+
+from math import pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.friction_kernel import bristle_force
+from study.evaluation.challenge.handle_force_kernel import handle_force
+
+RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, TURN, SQUARE = range(5)
+"""Of `varying`: Hz, N s/m and N/m by which the ground's damping and stiffness swing, rad; 1 = to and fro in jumps."""
+AXIS, MOTOR_MASS, GAP, CONTACT, CONTACT_DAMPING = range(5)
+"""Of `play`: the axis, or -1 for none; kg; m in all; N/m; N s/m while in contact."""
+
+
+class Mechanism(NamedTuple):
+    """Handle coordinates first, then the attached oscillators: n in all."""
+
+    inverse_mass: FloatArray
+    """(n, n); of the handle without the motor, where there is play."""
+    damping: FloatArray
+    """(n, n)"""
+    stiffness: FloatArray
+    """(n, n)"""
+    friction: FloatArray
+    """(3, 7), columns in `friction_kernel`"""
+    forces: FloatArray
+    """(3, 11), columns in `handle_force_kernel`"""
+    inertia_per_m: FloatArray
+    """(3,), of the whole handle, along each axis"""
+    axis_mass_per_m: FloatArray
+    """(3,), kg/m, of one axis's motion alone, along that axis"""
+    varying: FloatArray
+    """(3, 5), one row for each axis"""
+    play: FloatArray
+    """(5,)"""
+    creep_stiffness: FloatArray
+    """(3, elements), N/m"""
+    creep_share: FloatArray
+    """(elements,), of the way that remains, in one step"""
+    coupling: float
+    """N/m^2: the potential coupling * x^2 y / 2."""
+
+
+@njit(cache=True, nogil=True)
+def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """force: (samples * steps, 3), N. Returns acceleration and position at the samples, (samples, 3) each.
+
+    A sample is read just before the force of its own step acts: the acceleration is that of the force before.
+    """
+    n, samples, h = m.inverse_mass.shape[0], force.shape[0] // steps, 1.0 / (rate_hz * steps)
+    acceleration, position = np.zeros((samples, 3)), np.zeros((samples, 3))
+    q, v, f, a = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    bend, motor, slow = np.zeros(3), np.zeros(2), np.zeros(m.creep_stiffness.shape)
+    drive, before, now = np.zeros(3), np.zeros(3), np.zeros(n)
+    for k in range(force.shape[0]):
+        now[:] = v + 0.5 * h * a
+        _inner(m, q, now, f)
+        _ground(m, q, now, bend, h, f)
+        _slow_ground(m, q, now, slow, k * h, f)
+        for j in range(3):
+            drive[j] = force[k, j]
+        if m.play[AXIS] >= 0.0:
+            _through_play(m.play, q, v, motor, drive, h)
+        if k % steps == 0:
+            _accelerate(m, q, f, before, a)
+            for j in range(3):
+                acceleration[k // steps, j], position[k // steps, j] = a[j], q[j]
+        _accelerate(m, q, f, drive, a)
+        for i in range(n):
+            v[i] += h * a[i]
+            q[i] += h * v[i]
+        before[:] = drive
+    return acceleration, position
+
+
+@njit(cache=True, nogil=True)
+def _inner(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray) -> None:
+    n = f.shape[0]
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += m.stiffness[i, j] * q[j] + m.damping[i, j] * v[j]
+        f[i] = -total
+
+
+@njit(cache=True, nogil=True)
+def _ground(m: Mechanism, q: FloatArray, v: FloatArray, bend: FloatArray, h: float, f: FloatArray) -> None:
+    """Adds what acts between the handle and the ground."""
+    for j in range(3):
+        rubbing, bend[j] = bristle_force(m.friction[j], q[j], v[j], bend[j], h)
+        f[j] += rubbing + handle_force(m.forces[j], q[j], v[j])
+    if m.coupling != 0.0:
+        f[0] -= m.coupling * q[0] * q[1]
+        f[1] -= 0.5 * m.coupling * q[0] * q[0]
+
+
+@njit(cache=True, nogil=True)
+def _slow_ground(m: Mechanism, q: FloatArray, v: FloatArray, slow: FloatArray, t: float, f: FloatArray) -> None:
+    """Adds what remembers, and what changes with time."""
+    for j in range(3):
+        for e in range(slow.shape[1]):
+            if m.creep_stiffness[j, e] != 0.0:
+                slow[j, e] += m.creep_share[e] * (q[j] - slow[j, e])
+                f[j] -= m.creep_stiffness[j, e] * (q[j] - slow[j, e])
+        row = m.varying[j]
+        if row[RATE] > 0.0:
+            swing = sin(2.0 * pi * row[RATE] * t + row[TURN])
+            if row[SQUARE] > 0.0:
+                swing = 1.0 if swing > 0.0 else -1.0
+            f[j] -= swing * (row[DAMPING_DEPTH] * v[j] + row[STIFFNESS_DEPTH] * q[j])
+
+
+@njit(cache=True, nogil=True)
+def _through_play(
+    play: FloatArray, q: FloatArray, v: FloatArray, motor: FloatArray, drive: FloatArray, h: float
+) -> None:
+    """Moves the motor and puts the contact's force in the place of its drive."""
+    j = int(play[AXIS])
+    apart, closing = motor[0] - q[j], motor[1] - v[j]
+    into = max(apart - 0.5 * play[GAP], 0.0) + min(apart + 0.5 * play[GAP], 0.0)
+    contact = play[CONTACT] * into
+    if into != 0.0:
+        contact += play[CONTACT_DAMPING] * closing
+    motor[1] += h * (drive[j] - contact) / play[MOTOR_MASS]
+    motor[0] += h * motor[1]
+    drive[j] = contact
+
+
+@njit(cache=True, nogil=True)
+def _accelerate(m: Mechanism, q: FloatArray, f: FloatArray, drive: FloatArray, a: FloatArray) -> None:
+    n = f.shape[0]
+    heavier = 1.0 + m.inertia_per_m[0] * q[0] + m.inertia_per_m[1] * q[1] + m.inertia_per_m[2] * q[2]
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += m.inverse_mass[i, j] * (f[j] + drive[j] if j < 3 else f[j])
+        a[i] = total / heavier if i < 3 else total
+    for j in range(3):
+        more = m.axis_mass_per_m[j] * q[j]
+        if more != 0.0:
+            own = a[j] / (1.0 + more * m.inverse_mass[j, j])
+            for i in range(3):
+                a[i] -= m.inverse_mass[i, j] * more * own

@@ -1,0 +1,188 @@
+"""The bench as MuJoCo moves it: a handle on three slides, masses on springs that ride on it, and what is concealed.
+
+Dry friction is the engine's own friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
+dead band; play is a motor body behind a tendon with limits; a hand and added masses are armature, damping and stiffness
+of the slides; saturation, gain and lag are those of its actuators. Runge-Kutta of fourth order.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from xml.etree import ElementTree as Xml
+
+import mujoco
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.bench import Bench, Oscillators
+from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
+
+STEPS = 10
+"""Of the integrator in a sample."""
+STEP_S = 1.0 / (RATE_HZ * STEPS)
+HANDLE_SHARE = 0.4
+"""Of the lightest axis: the handle's body. The rest of an axis's mass moves along with that axis alone."""
+CONTACT = 0.01
+"""Impedance of a contact: small, so that its spring and damper are what they are called."""
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MujocoBench:
+    """Each array (3,), of the driven axes."""
+
+    mass_kg: FloatArray
+    damping: FloatArray
+    stiffness: FloatArray
+    riders: Oscillators
+    friction_n: FloatArray
+    force_n: FloatArray
+    gain: FloatArray
+    limit_n: FloatArray
+    """0 = none."""
+    lag_s: float = 0.0
+    delay_s: float = 0.0
+    stop: tuple[int, float, float, float] | None = None
+    """Axis, lower and upper end (m), N/m."""
+    play: tuple[int, Values] | None = None
+    """Axis, and the numbers of `backlash`."""
+
+
+def bare(bench: Bench) -> MujocoBench:
+    """As near to a bench as bodies on slides come: without its off-diagonals."""
+    mass, damping, stiffness = (np.diag(part).copy() for part in (bench.mass, bench.damping, bench.stiffness))
+    none = np.zeros(3)
+    return MujocoBench(mass, damping, stiffness, bench.oscillators, none, none, np.ones(3), none)
+
+
+def linear(bench: MujocoBench) -> Bench:
+    """The linear part. A rider is carried across its direction, which adds to the handle's mass there."""
+    mass = np.diag(bench.mass_kg)
+    for kg, along in zip(bench.riders.mass_kg, bench.riders.direction, strict=True):
+        mass += kg * (np.eye(3) - np.outer(along, along))
+    return Bench(mass, np.diag(bench.damping), np.diag(bench.stiffness), bench.riders)
+
+
+def moved(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Acceleration and position of the handle at the samples, (samples, 3) each, just before each command is written.
+
+    Raises ValueError where it does not stay in one place.
+    """
+    model = mujoco.MjModel.from_xml_string(_described(bench))
+    data = mujoco.MjData(model)
+    handle = [model.joint(axis).dofadr[0] for axis in AXES]
+    data.qfrc_applied[handle] = bench.force_n
+    late = round(bench.delay_s / STEP_S)
+    whole, part = divmod(late, STEPS)
+    acceleration, position = np.zeros((len(command), 3)), np.zeros((len(command), 3))
+    for k in range(len(command)):
+        mujoco.mj_forward(model, data)
+        acceleration[k], position[k] = data.qacc[handle], data.qpos[handle]
+        if part:
+            data.ctrl[:] = _at(command, k - whole - 1)
+            mujoco.mj_step(model, data, part)
+        data.ctrl[:] = _at(command, k - whole)
+        mujoco.mj_step(model, data, STEPS - part)
+    if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
+        raise ValueError("the device of the second engine ran away")
+    return acceleration, position
+
+
+def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
+    """In whole steps: what is said is what is done."""
+    return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
+
+
+def _at(command: FloatArray, sample: int) -> FloatArray:
+    return command[sample] if sample >= 0 else np.zeros(3)
+
+
+def _described(bench: MujocoBench) -> str:
+    root = Xml.Element("mujoco")
+    _add(root, "compiler", {"autolimits": "true"})
+    exact = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
+    _add(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | exact)
+    world = _add(root, "worldbody")
+    handle = _add(world, "body", {"name": "handle"})
+    light = HANDLE_SHARE * float(bench.mass_kg.min())
+    behind = np.zeros(3)
+    if bench.play is not None:
+        axis, values = bench.play
+        behind[axis] = values["motor_mass"]
+        motor = _add(world, "body", {"name": "motor"})
+        _slide(motor, "motor", np.eye(3)[axis], {})
+        _body(motor, float(values["motor_mass"]))
+    for j, name in enumerate(AXES):
+        more = {
+            "armature": bench.mass_kg[j] - light - behind[j], "damping": bench.damping[j],
+            "stiffness": bench.stiffness[j], "frictionloss": bench.friction_n[j],
+        }  # fmt: skip
+        _slide(handle, name, np.eye(3)[j], more)
+    _body(handle, light)
+    _riders(handle, bench.riders)
+    tendons = _add(root, "tendon")
+    if bench.stop is not None:
+        axis, low, high, stiffness = bench.stop
+        ends = f"{low:.12g} {high:.12g}"
+        held = _add(tendons, "fixed", {"name": "stop", "stiffness": stiffness, "springlength": ends})
+        _add(held, "joint", {"joint": AXES[axis], "coef": 1.0})
+    if bench.play is not None:
+        _joined(tendons, bench, *bench.play)
+    _actuators(_add(root, "actuator"), bench)
+    return Xml.tostring(root, encoding="unicode")
+
+
+def _riders(handle: Xml.Element, riders: Oscillators) -> None:
+    for k, (hz, kg, ratio, along) in enumerate(
+        zip(riders.frequency_hz, riders.mass_kg, riders.damping_ratio, riders.direction, strict=True)
+    ):
+        stiffness = kg * (2 * np.pi * hz) ** 2
+        body = _add(handle, "body", {"name": f"rider {k}"})
+        _slide(body, f"rider {k}", along, {"stiffness": stiffness, "damping": 2 * ratio * np.sqrt(stiffness * kg)})
+        _body(body, float(kg))
+
+
+def _joined(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
+    """Motor and handle, as far apart as the play lets them: a contact at either end, which can only push."""
+    motor_kg = values["motor_mass"]
+    mass, _, _ = linear(bench).matrices()
+    mass[axis, axis] -= motor_kg
+    # The engine takes a contact's spring and damper for the mass that they move.
+    reduced = 1.0 / (1.0 / motor_kg + np.linalg.inv(mass)[axis, axis])
+    spring, damper = values["contact_stiffness"] / reduced, values["contact_damping"] / reduced
+    half = 0.5 * values["gap"]
+    contact = {"solreflimit": f"{-spring:.12g} {-damper:.12g}", "solimplimit": f"{CONTACT} {CONTACT} 1"}
+    apart = _add(tendons, "fixed", {"name": "play", "range": f"{-half:.12g} {half:.12g}"} | contact)
+    _add(apart, "joint", {"joint": "motor", "coef": 1.0})
+    _add(apart, "joint", {"joint": AXES[axis], "coef": -1.0})
+
+
+def _actuators(parent: Xml.Element, bench: MujocoBench) -> None:
+    for j, name in enumerate(AXES):
+        driven = "motor" if bench.play is not None and bench.play[0] == j else name
+        made = _add(parent, "general", {"joint": driven, "gainprm": float(bench.gain[j])})
+        if bench.limit_n[j] > 0.0:
+            made.set("forcerange", f"{-bench.limit_n[j]:.12g} {bench.limit_n[j]:.12g}")
+        if bench.lag_s > 0.0:
+            made.set("dyntype", "filter")
+            made.set("dynprm", f"{bench.lag_s:.12g}")
+
+
+def _slide(body: Xml.Element, name: str, along: FloatArray, values: Mapping[str, float]) -> None:
+    joint = _add(body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{part:.15g}" for part in along)})
+    for key, value in values.items():
+        if value:
+            joint.set(key, f"{value:.15g}")
+    if "frictionloss" in joint.attrib:
+        joint.set("solreffriction", f"{2 * STEP_S:.12g} 1")
+        joint.set("solimpfriction", "0.999 0.9999 1")
+
+
+def _body(body: Xml.Element, mass_kg: float) -> None:
+    """The engine gives bodies a moment of inertia, which slides never use."""
+    _add(body, "inertial", {"pos": "0 0 0", "mass": mass_kg, "diaginertia": "1e-4 1e-4 1e-4"})
+
+
+def _add(parent: Xml.Element, kind: str, attributes: Mapping[str, str | float] | None = None) -> Xml.Element:
+    written = {key: value if isinstance(value, str) else f"{value:.15g}" for key, value in (attributes or {}).items()}
+    return Xml.SubElement(parent, kind, written)

@@ -1,0 +1,30 @@
+"""Cases from a second physics engine, MuJoCo: other integrator, other friction, other contacts than the bench's own."""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from study.evaluation.challenge.rig import Rig
+
+if TYPE_CHECKING:
+    from study.evaluation.challenge.draw_case import Case, Concealed
+
+EFFECTS = (
+    "coulomb_friction", "viscous_damping", "added_mass", "constant_force", "end_stop", "backlash", "extra_mode",
+    "hand_impedance", "force_gain", "force_saturation", "amplifier_lag", "transport_delay", "sensor_lag", "sensor_gain",
+)  # fmt: skip
+"""What it expresses in its own terms, and what happens before and behind it."""
+
+
+def is_installed() -> bool:
+    """It is an extra: `prove`."""
+    return find_spec("mujoco") is not None
+
+
+def draw_engine_case(
+    seed: int, effects: Sequence[str], concealed: "Concealed", strength: Sequence[float], name: str, rig: Rig
+) -> "Case":
+    """As `draw_case`, moved by the second engine. Raises ImportError where it is not installed."""
+    from study.evaluation.challenge.mujoco_case import draw_mujoco_case
+
+    return draw_mujoco_case(seed, effects, concealed, strength, name, rig)

@@ -1,0 +1,87 @@
+"""How the bench is read: accelerometer, position sensor, and the clock and line that carry both.
+
+Order: pole of the accelerometer, direction, gain, curve, drift, hum; the clock; noise;
+range; steps; lost samples. A clock that drifts and a line that loses samples touch acceleration and position alike.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.sensor_kernel import lagging, one_pole
+
+BANDWIDTH_HZ, RANGE_MPS2 = 500.0, 29.43
+NOISE_MPS2 = (0.042, 0.042, 0.083)
+POSITION_NOISE_M, POSITION_STEP_M = 4e-6, 1e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensor:
+    bandwidth_hz: float = BANDWIDTH_HZ
+    orientation: FloatArray = field(default_factory=lambda: np.eye(3))
+    gain: FloatArray = field(default_factory=lambda: np.ones(3))
+    cubic: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """1/(m/s^2)^2"""
+    drift: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """m/s^2, reached at the end."""
+    offset: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """m/s^2"""
+    late_s: float = 0.0
+    """By which the acceleration's record is behind the commands'."""
+    hum: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+    """m/s^2 of sine and cosine."""
+    hum_hz: float = 50.0
+    limit: FloatArray = field(default_factory=lambda: np.full(3, RANGE_MPS2))
+    step: float = 0.0
+    ppm: float = 0.0
+    lost: float = 0.0
+    """Part of the samples that repeat the one before."""
+    bend: float = 0.0
+    """1/(m/s^2): how soon a saturating curve bends."""
+    play: float = 0.0
+    """m/s^2, half the width of a hysteresis."""
+
+
+def read(
+    sensor: Sensor, acceleration: FloatArray, position: FloatArray, rate_hz: float, random: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Response and position as recorded, (samples, 3) each."""
+    smoothed = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * sensor.bandwidth_hz / rate_hz))
+    felt = _distorted(sensor, smoothed @ sensor.orientation.T)
+    part = np.linspace(0.0, 1.0, len(felt))[:, None]
+    turns = 2 * np.pi * sensor.hum_hz * np.arange(len(felt))[:, None] / rate_hz
+    felt = felt + sensor.offset + sensor.drift * part + sensor.hum[0] * np.sin(turns) + sensor.hum[1] * np.cos(turns)
+    felt = _at_other_times(felt, sensor.ppm, sensor.late_s * rate_hz)
+    where = _at_other_times(position, sensor.ppm, 0.0)
+    felt = np.clip(felt + random.normal(size=felt.shape) * NOISE_MPS2, -sensor.limit, sensor.limit)
+    if sensor.step > 0.0:
+        felt = sensor.step * np.round(felt / sensor.step)
+    where = where + POSITION_NOISE_M * random.normal(size=where.shape)
+    where = POSITION_STEP_M * np.round(where / POSITION_STEP_M)
+    kept = _last_kept(len(felt), sensor.lost, random)
+    return felt[kept], where[kept]
+
+
+def _distorted(sensor: Sensor, felt: FloatArray) -> FloatArray:
+    felt = sensor.gain * felt + sensor.cubic * felt**3
+    if sensor.bend > 0.0:
+        felt = np.tanh(sensor.bend * felt) / sensor.bend
+    return felt if sensor.play == 0.0 else lagging(felt, sensor.play)
+
+
+def _at_other_times(samples: FloatArray, ppm: float, late: float) -> FloatArray:
+    """Between samples on a straight line, as an acquisition that fills its own grid does. late: in samples."""
+    if ppm == 0.0 and late == 0.0:
+        return samples
+    k = np.arange(len(samples), dtype=np.float64)
+    times = k * (1.0 + 1e-6 * ppm) - late
+    return np.column_stack([np.interp(times, k, column) for column in samples.T])
+
+
+def _last_kept(samples: int, lost: float, random: np.random.Generator) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """For every sample the one whose value is recorded for it."""
+    there = random.random(samples) >= lost
+    there[0] = True
+    kept: np.ndarray[tuple[int], np.dtype[np.int64]] = np.maximum.accumulate(np.where(there, np.arange(samples), 0))
+    return kept

@@ -1,0 +1,3 @@
+"""A laboratory's own blind test of the diagnosis: `lab_kit` draws and seals the changes, `score_kit` scores the
+answers.
+"""

@@ -1,0 +1,130 @@
+"""A laboratory's own blind test: the revealed table against the diagnoses."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.diagnosis.document import Diagnosis
+from analysis.proof.lab_kit import MISSING, Label, Scored, kit_figures, not_answered, scored
+from analysis.proof.share import Figure
+from study.errors import StudyError, WrongUseError
+from study.evaluation.kit.lab_kit import read_labels, seal_of, sealed_hash
+from study.store.csv_rows import rows_to_csv
+from study.store.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
+from study.store.provenance import sha256_of
+from study.store.text_file import write_text
+
+UNSCORED = "Nothing was scored, and nothing written."
+
+
+@dataclass(frozen=True, slots=True)
+class KitScore:
+    rows: tuple[Scored, ...]
+    """One for every label, also of recordings without a diagnosis."""
+    figures: tuple[Figure, ...]
+    sha256: str
+    """Of the table of labels."""
+    compared_with: str
+    """What its hash was compared with."""
+
+
+def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -> KitScore:
+    """diagnoses: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over
+    before the diagnoses; None compares with the file beside the table alone. Raises StudyError."""
+    digest = sha256_of(path)
+    compared_with = _require_sealed(path, digest, seal)
+    labels = read_labels(path)
+    found = _diagnoses(diagnoses, labels)
+    rows = tuple(
+        not_answered(label) if one is None else scored(label, one) for label, one in zip(labels, found, strict=True)
+    )
+    write_text(out, rows_to_csv(rows, Scored))
+    return KitScore(rows, kit_figures(rows), digest, compared_with)
+
+
+def score_lines(score: KitScore) -> tuple[str, ...]:
+    figures = (_figure_line(one) for one in score.figures)
+    rows = (_row_line(one) for one in score.rows if not one.right)
+    return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
+
+
+def _figure_line(one: Figure) -> str:
+    if one.value is None or one.low is None or one.high is None:
+        return f"{one.name}: none"
+    return f"{one.name}: {one.hits} of {one.of}, {100 * one.value:.0f} % [{100 * one.low:.0f}, {100 * one.high:.0f}]"
+
+
+def _row_line(one: Scored) -> str:
+    if one.verdict == MISSING:
+        return f"Missing: {one.recording}, {one.change}: no diagnosis; it counts as not right."
+    return f"Missed: {one.recording}, {one.change}: {one.verdict.replace('_', ' ')}, named {one.named or 'nothing'}."
+
+
+def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
+    """In the order of the labels; None where there is none."""
+    if not folder.is_dir():
+        raise StudyError(
+            "There is no such folder",
+            f"{folder} is no folder of diagnoses.",
+            "Give --diagnoses the folder that holds one folder per recording, by its name.",
+            saved=UNSCORED,
+        )
+    found = tuple(_diagnosis(folder, label.recording) for label in labels)
+    if any(one is not None for one in found):
+        return found
+    raise StudyError(
+        "There is no diagnosis to score",
+        f"{folder} holds no {DIAGNOSIS_NAME} of any recording in the table, such as "
+        f"{labels[0].recording}/{DIAGNOSIS_NAME}.",
+        "Give --diagnoses the folder that holds one folder per recording, by its name.",
+        saved=UNSCORED,
+    )
+
+
+def _diagnosis(folder: Path, recording: str) -> Diagnosis | None:
+    place = folder / recording / DIAGNOSIS_NAME
+    if not place.is_file():
+        return None
+    try:
+        return read_diagnosis(place)
+    except StudyError as error:
+        raise StudyError(
+            f"{recording}/{error.title}",
+            error.happened,
+            f"Get {place.parent} again as `hapteq diagnose` wrote it, or move it away: then it counts as not right.",
+            saved=UNSCORED,
+        ) from error
+
+
+def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
+    """What the hash was compared with, in words. Raises StudyError where it is another."""
+    beside = seal_of(path)
+    if seal is None:
+        said, who = sealed_hash(path), f"{beside.name} says"
+        how = (
+            f"compared only with {beside.name} beside them, which can be written anew together with the table: give "
+            "--seal the hash that was handed over before the diagnoses"
+        )
+    else:
+        said, who, how = _hash(seal), "--seal gives", "the hash that --seal gives"
+    if said == digest:
+        return how
+    raise StudyError(
+        "The labels are not those that were sealed",
+        f"{path.name} has the hash {digest}; {who} {said}." if said else f"There is no seal in {beside.name}.",
+        "Score the table as it was sealed before the diagnoses; changes made to it since cannot be trusted.",
+        saved=UNSCORED,
+    )
+
+
+def _hash(typed: str) -> str:
+    """The line of the seal's file is taken, too."""
+    said = (typed.split() or [""])[0].lower()
+    if re.fullmatch("[0-9a-f]{64}", said):
+        return said
+    raise WrongUseError(
+        "That is no SHA-256",
+        f"--seal gives '{typed}'; a hash has 64 digits from 0 to 9 and a to f.",
+        "Give the whole hash, as `hapteq kit seal` printed it.",
+        saved=UNSCORED,
+    )

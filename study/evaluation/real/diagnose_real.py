@@ -1,0 +1,229 @@
+"""One real recording: imported, compared with its simple model, and tested further, as plain values."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.diagnosis.balance.plain_form import plain_form
+from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of, require_something
+from analysis.diagnosis.data.command_gaps import across_gaps
+from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.errors.played_errors import PlayedError, played_error
+from analysis.diagnosis.result.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.result.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned
+from analysis.diagnosis.settings import EXPLAINED_ERROR
+from analysis.diagnosis.types import Patience, Progress
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+from study.errors import StudyError
+from study.evaluation.real.real_folder import RealRecording
+from study.importing.build_recording import build_recording
+from study.importing.map_library import FoundMap
+from study.workflows.diagnosis.diagnosis_input import (
+    DiagnosisInput,
+    FirstModel,
+    first_model_of,
+    fitted_model,
+    nothing_to_diagnose,
+)
+from study.workflows.worker_threads import worker_threads
+
+SHORT = "too short"
+"""What is said of a recording that holds too few cycles: of a real one, for which there is no other, it is a remark."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RealDiagnosis:
+    answer: RealAnswer
+    findings: Findings | None
+    """None where the recording was refused."""
+    parents: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Read:
+    recording: Recording
+    model: MechanicalModel
+    balances: tuple[Balance, ...] | None
+    remarks: tuple[str, ...]
+    before: Recording | None
+
+
+def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progress) -> RealDiagnosis:
+    """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
+    parents = wanted.parents
+    try:
+        read = _read(wanted, patient, on_progress)
+        settings = DiagnosisSettings(
+            names=(wanted.name,),
+            clean=() if read.before is None else (read.before,),
+            fitted=wanted.model() is None,
+            balances=read.balances,
+            patient=patient,
+        )
+        with worker_threads() as threads:
+            found = diagnose((read.recording,), read.model, settings, threads.map, on_progress)
+            found = replace(found, remarks=(*read.remarks, *found.remarks))
+            diagnosis = wanted.found.source.map.diagnosis
+            names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
+            answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
+    except (StudyError, NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+        return RealDiagnosis(_refused(wanted, refusal), None, parents)
+    further = tuple(_further(each, wanted, found) for each in wanted.tests)
+    pair = None if read.before is None else _pair(wanted, read, found)
+    objections = (
+        *diagnosis.objections,
+        *(said for each in wanted.tests for said in each.source.map.diagnosis.objections),
+    )
+    answer = replace(answer, further=further, pair=pair, objections=objections)
+    return RealDiagnosis(answer if pair is None else _not_whole(answer, pair), found, parents)
+
+
+def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
+    """What was learned from the recording of before is wide, for one recording is little to learn from: what is more
+    than the model missed then is a remainder all the same."""
+    left, missed = pair.with_effects, pair.expected_left
+    if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED_ERROR * missed:
+        return answer
+    said = (
+        f"Still unexplained: {100 * left:.3g} % of the signal are left on held-out data, where the model missed "
+        f"{100 * missed:.3g} % before the change."
+    )
+    return replace(answer, verdict="partly_explained", left=said, pair=replace(pair, verdict="partly_explained"))
+
+
+def imported(found: FoundMap) -> Recording:
+    """One recording of force-driven kind. Raises StudyError."""
+    recording = build_recording(found.source.map, found.files, lambda share: None).recording
+    return all_force_driven([recording])[0]
+
+
+def _read(wanted: RealRecording, patient: Patience, on_progress: Progress) -> _Read:
+    """Raises StudyError where there is nothing to diagnose."""
+    on_progress("importing", 0.0)
+    if why := wanted.found.source.map.diagnosis.skip:
+        raise nothing_to_diagnose((why,))
+    driven, formed = _formed(wanted, imported(wanted.found))
+    (recording,), gaps = across_gaps(driven, (wanted.name,))
+    remarks: tuple[str, ...] = ()
+    try:
+        require_something((recording,), (wanted.name,))
+    except NothingToDiagnose as refusal:
+        if not all(SHORT in problem for problem in refusal.problems):
+            raise nothing_to_diagnose(refusal.problems) from refusal
+        remarks = tuple(f"{problem}." for problem in refusal.problems)
+    before = None if wanted.before is None else imported(wanted.before)
+    first = _model(wanted, recording, patient, on_progress)
+    return _Read(recording, first.model, first.balances, (*formed, *gaps, *remarks, *first.remarks), before)
+
+
+def _formed(wanted: RealRecording, recording: Recording) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """In the form in which forces can be balanced, where no model says what its commands and responses are."""
+    if wanted.before is not None or wanted.model() is not None:
+        return (recording,), ()
+    formed, said = plain_form((recording,))
+    return all_force_driven(formed), said
+
+
+def _model(wanted: RealRecording, recording: Recording, patient: Patience, on_progress: Progress) -> FirstModel:
+    given = wanted.model()
+    if given is None:
+        alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
+        if wanted.before is not None:
+            return FirstModel(*fitted_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share)))
+        return first_model_of(alone, (), patient, lambda what, share: on_progress(what, 0.1 * share))
+    try:
+        require_model_of(given, (recording,))
+    except NothingToDiagnose as refusal:
+        raise nothing_to_diagnose(refusal.problems) from refusal
+    return FirstModel(given, ())
+
+
+def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
+    diagnosis = wanted.found.source.map.diagnosis
+    return RealAnswer(
+        folder=wanted.folder.name,
+        recording=wanted.name,
+        title=wanted.found.source.map.title,
+        device=wanted.found.source.map.device,
+        verdict="refused",
+        answer=f"{refusal.title}: {refusal.happened}"
+        if isinstance(refusal, StudyError)
+        else f"The fits broke down: {refusal}.",
+        model="",
+        error="",
+        fitted=None,
+        held_out=None,
+        black_box=None,
+        where=(),
+        named=(),
+        effects=(),
+        left="",
+        remarks=(),
+        numbers=(),
+        stretches=(),
+        excerpt=None,
+        further=(),
+        pair=None,
+        objections=diagnosis.objections,
+        seconds=0.0,
+    )
+
+
+def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
+    """Nothing is fitted to it but, where the map says so, its volume."""
+    title, free = test.source.map.title, test.source.map.diagnosis.volume_free
+    try:
+        (recording,), _ = _formed(wanted, imported(test))
+        retuned, after = (played_error(recording, model, "all") for model in (retuned_model(found), found.improved))
+    except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
+        said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
+        return FurtherTest(test.name, title, "", None, None, problem=said)
+    without, with_it = (each.with_gain if free else each.as_it_is for each in (retuned, after))
+    said = after.error + (", one factor fitted" if free else "")
+    stretches = () if free or after.error == "predicted force" else _whole(test.name, recording, retuned, after)
+    return FurtherTest(test.name, title, said, without, with_it, stretches)
+
+
+def _whole(name: str, recording: Recording, retuned: PlayedError, after: PlayedError) -> tuple[HeldOutStretch, ...]:
+    seconds = len(recording) / recording.sample_rate_hz
+    return tuple(
+        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.left, two.left)
+        for channel, two in zip(retuned.channels, after.channels, strict=False)
+    )
+
+
+def retuned_model(found: Findings) -> MechanicalModel:
+    """Re-tuned without new physics."""
+    assert found.tuning is not None
+    return found.tuning.tuned(found.explanation.retuned.fitted.deviations)
+
+
+def _pair(wanted: RealRecording, read: _Read, found: Findings) -> PairOutcome:
+    assert wanted.before is not None and read.before is not None
+    given = played_error(read.recording, read.model, "test")
+    missed = played_error(read.before, read.model, "test")
+    errors = found.diagnosis.fit.test
+    return PairOutcome(
+        changed=wanted.changed,
+        before=_file(wanted.before.files),
+        after=_file(wanted.found.files),
+        verdict=found.diagnosis.verdict,
+        named=named_sentences(found),
+        returned=found.diagnosis.returned_set,
+        as_before=given.as_it_is,
+        gain=given.with_gain,
+        retuned=errors.retuned,
+        with_effects=errors.after if found.diagnosis.effects else None,
+        expected_left=missed.as_it_is,
+    )
+
+
+def _file(files: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in files)

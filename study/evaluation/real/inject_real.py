@@ -1,0 +1,151 @@
+"""Faults injected into real recordings under a seal, diagnosed by processes that know nothing of them, and counted."""
+
+import json
+import secrets
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.proof.injected import InjectedOutcome, outcome_of
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from study.errors import StudyError
+from study.evaluation.bank.answer_cases import others_sha256
+from study.evaluation.bank.ask_engine import ask_engine, is_answered
+from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, opened
+from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seal
+from study.evaluation.bank.seal_cases import settings_text
+from study.evaluation.challenge.injections import fitting_injections, inject, place_of
+from study.evaluation.real.diagnose_real import imported
+from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
+from study.evaluation.real.real_folder import RealRecording
+from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
+from study.store.provenance import sha256_of
+from study.store.recording_file import write_recording
+from study.store.text_file import write_text
+
+NOTHING = 0.5
+"""Share of draws into which nothing is injected: a name there is the worst answer."""
+TWO = 0.15
+"""Share of the others into which two faults are injected."""
+PROCESSOR_S = 180.0
+"""For the search of one case: real recordings take longer than a bank's."""
+KEPT = ("feedback", "imposed", "parts")
+"""Notes that a diagnosis goes by."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrier:
+    """A real recording that faults can be put into."""
+
+    name: str
+    model: MechanicalModel
+    """What the device is known to be by now, effects and all."""
+    recording: Recording
+
+
+def carriers(out: Path, wanted: Sequence[RealRecording], answers: Sequence[RealAnswer]) -> tuple[Carrier, ...]:
+    """Of the recordings that were diagnosed into `out`."""
+    return tuple(
+        Carrier(
+            each.name,
+            read_mechanical_model(out / each.folder.name / each.name / "improved.toml"),
+            imported(each.found),
+        )
+        for each, answer in zip(wanted, answers, strict=True)
+        if answer.verdict != "refused"
+    )
+
+
+def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int, seed: int) -> tuple[str, ...]:
+    """Draws and writes what is not there yet; names under `open`, in order. Raises StudyError."""
+    if not carried:
+        raise StudyError(
+            "There is nothing to inject faults into",
+            "None of the recordings was diagnosed by its motion, by a model that explains some of it.",
+            "Give recordings of open loops, or leave --inject out.",
+            saved="The diagnoses are written.",
+        )
+    names = [_sealed(folder, carried, number, seed) for number in range(count)]
+    seal(folder)
+    return tuple(names)
+
+
+def _sealed(folder: ProofFolder, carried: Sequence[Carrier], number: int, seed: int) -> str:
+    label = folder.label(number)
+    if label.exists():
+        return str(label_at(label)["name"])
+    random = np.random.default_rng([seed, number])
+    carrier = carried[number % len(carried)]
+    sound, rest = drawn_halves(carrier.recording, random)
+    effects = () if random.random() < NOTHING else _drawn_effects(rest, random)
+    strength = float(random.random())
+    spoiled, values = rest, dict[str, float]()
+    for effect in effects:
+        done = inject(spoiled, effect, strength, random)
+        spoiled, values = done.recording, values | done.values
+    sound, rest, spoiled = (_nameless(without_lead(each)) for each in (sound, rest, spoiled))
+    change = held_out_change(sound, rest, spoiled) if effects else 1.0
+    name = secrets.token_hex(6)
+    place = folder.open / name
+    (place / CLEAN).mkdir(parents=True)
+    write_recording(place / RECORDING, spoiled, precision="float64")
+    write_recording(place / CLEAN / RECORDING, sound, precision="float64")
+    write_mechanical_model(place / MODEL, carrier.model)
+    write_text(place / SETTINGS, settings_text((), PROCESSOR_S))
+    said = {
+        "name": name,
+        "number": number,
+        "seed": seed,
+        "recording": carrier.name,
+        "effects": list(effects),
+        "places": [place_of(effect) for effect in effects],
+        "strength": strength if effects else 0.0,
+        "values": values,
+        "change": change,
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+        "others_sha256": others_sha256(place),
+        "salt": secrets.token_hex(16),
+    }
+    write_text(label, json.dumps(said, indent=1, allow_nan=False) + "\n")
+    return name
+
+
+def _drawn_effects(recording: Recording, random: np.random.Generator) -> tuple[str, ...]:
+    known = fitting_injections(recording)
+    count = 2 if random.random() < TWO else 1
+    drawn = [str(effect) for effect in random.choice(known, count, replace=False)]
+    # What a sensor makes of a motion comes after it.
+    return tuple(sorted(drawn, key=lambda effect: place_of(effect) == "sensor"))
+
+
+def _nameless(recording: Recording) -> Recording:
+    """Without the notes that say where it is from."""
+    return replace(recording, meta={key: recording.meta[key] for key in KEPT if key in recording.meta})
+
+
+def injected_outcomes(
+    path: Path, carried: Sequence[Carrier], draws: tuple[int, int], on_done: Callable[[int, int], None]
+) -> tuple[InjectedOutcome, ...]:
+    """draws: how many, and their seed. Interrupted, the same call goes on. Raises StudyError."""
+    count, seed = draws
+    folder = opened(path, seed, False)
+    names = seal_injections(folder, carried, count, seed)
+    answered = sum(is_answered(folder.open / name) for name in names)
+    on_done(answered, count)
+
+    def one_more(name: str) -> None:
+        nonlocal answered
+        answered += 1
+        on_done(answered, count)
+
+    ask_engine(folder, names, 2, one_more)
+    labels = [label_at(folder.label(number)) for number in range(len(names))]
+    answers = [answer_at(folder.open / name) for name in names]
+    if broken := [label["name"] for label, said in zip(labels, answers, strict=True) if not is_of(label, said)]:
+        raise broken_seal(broken, folder.path)
+    return tuple(outcome_of(label, said) for label, said in zip(labels, answers, strict=True))

@@ -1,0 +1,95 @@
+"""Answers to real recordings that an earlier run left: taken where they were made from what is there now, else refused
+before anything is done."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.result.real_answer import RealAnswer
+from study.errors import StudyError
+from study.evaluation.real.real_folder import RealRecording
+from study.store.provenance import Provenance, gather_provenance
+from study.store.real_answer_file import read_answer_and_origin
+
+ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    place: Path
+    answer: RealAnswer
+    changes: tuple[str, ...]
+    """What is otherwise than when it was made."""
+
+
+def answer_place(out: Path, one: RealRecording) -> Path:
+    """Folder of one recording's results."""
+    return out / one.folder.name / one.name
+
+
+def origin_of_answer(one: RealRecording, seconds: float) -> Provenance:
+    """Everything that an answer hangs on. Raises CannotReadError."""
+    files = tuple(dict.fromkeys((*one.parents, *one.tested_on)))
+    return gather_provenance(parents=files, settings={"seconds": seconds})
+
+
+def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float) -> dict[Path, RealAnswer]:
+    """By their place; nothing is written. Raises StudyError where one is torn, or was made from something else."""
+    there = [one for one in wanted if (answer_place(out, one) / ANSWER_NAME).is_file()]
+    kept = [_kept(answer_place(out, one), one, seconds) for one in there]
+    if outdated := [one for one in kept if one.changes]:
+        raise _made_otherwise(out, outdated)
+    return {one.place: one.answer for one in kept}
+
+
+def _kept(place: Path, one: RealRecording, seconds: float) -> _Kept:
+    try:
+        answer, origin = read_answer_and_origin(place / ANSWER_NAME)
+    except StudyError as error:
+        raise StudyError(
+            f"{one.folder.name}/{one.name}/{error.title}",
+            error.happened,
+            f"Move {place} away to have it answered anew, or choose another --out.",
+            saved="Nothing was written.",
+        ) from error
+    now = origin_of_answer(one, seconds)
+    files = {(parent.file, parent.sha256) for parent in now.parents}
+    return _Kept(place, answer, (*_file_changes(_files_in(origin), files), *_setting_changes(origin, seconds)))
+
+
+def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
+    said = origin.get("parents")
+    parents = said if isinstance(said, list) else []
+    return {(str(one.get("file")), str(one.get("sha256"))) for one in parents if isinstance(one, dict)}
+
+
+def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iterator[str]:
+    names_then, names_now = ({name for name, _ in files} for files in (then, now))
+    for name in sorted({name for name, _ in then ^ now}):
+        if name not in names_then:
+            yield f"{name} is not among what it says it was made from"
+        else:
+            yield f"{name} has changed" if name in names_now else f"{name} is gone"
+
+
+def _setting_changes(origin: Mapping[str, Any], seconds: float) -> Iterator[str]:
+    settings = origin.get("settings")
+    then = settings.get("seconds") if isinstance(settings, dict) else None
+    if not isinstance(then, int | float):
+        yield "it does not say its --seconds"
+    elif then != seconds:
+        yield f"--seconds was {then:g}, and is {seconds:g}"
+
+
+def _made_otherwise(out: Path, outdated: Sequence[_Kept]) -> StudyError:
+    said = (f"{one.place.relative_to(out) / ANSWER_NAME}: {', '.join(one.changes)}." for one in outdated)
+    places = [str(one.place) for one in outdated]
+    if (injected := out / INJECTED_NAME).exists():
+        places.append(f"{injected}, which was made with them")
+    return StudyError(
+        "Answers that are there were made from something else",
+        " ".join(said),
+        f"Choose another --out; or, to have them answered anew, move away {'; '.join(places)}.",
+        saved="The old answers are kept as they are, and nothing was written.",
+    )

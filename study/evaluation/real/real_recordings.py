@@ -1,0 +1,163 @@
+"""`hapteq real`: all recordings of a folder, one after the other. Answers that are there already are kept."""
+
+import errno
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import process_time
+
+from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.proof.injected import InjectedOutcome
+from study.devices.clock import Clock, RealClock
+from study.errors import LeftError, StudyError, WrongUseError
+from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, retuned_model
+from study.evaluation.real.inject_real import carriers, injected_outcomes
+from study.evaluation.real.kept_answers import (
+    ANSWER_NAME,
+    INJECTED_NAME,
+    answer_place,
+    kept_answers,
+    origin_of_answer,
+)
+from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
+from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
+from study.local_clock import machine_zone
+from study.session.local_time import local_time
+from study.store.file_errors import CannotWriteError
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.new_folder import new_folder
+from study.store.provenance import Provenance
+from study.store.real_answer_file import write_real_answer
+from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
+
+RETUNED_NAME = "retuned.toml"
+DIAGNOSED_OF_BOTH = 0.5
+"""Share of the work that is done when faults begin to be injected."""
+SECONDS = 180.0
+"""Of processor time, for a folder's recordings together: a search that is not done by then ends with what it has. The
+clock on the wall would make answers hang on what else the machine does."""
+BESIDE_S = 25.0
+"""What fitting a model, a page and figures take beside the search."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class RealPlan:
+    folder: Path
+    out: Path
+    seconds: float = SECONDS
+    inject: int = 0
+    """Faults to inject into what was diagnosed; 0 = none."""
+    seed: int = 1
+    """Of their draws."""
+
+
+def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None = None) -> WrittenReal:
+    """`on_progress(what is being done, share)`. Interrupted (LeftError), the same call goes on. Raises StudyError."""
+    found = _found(plan)
+    time = clock or RealClock()
+    kept = kept_answers(plan.out, found.recordings, plan.seconds)
+    _make_writable(plan.out)
+    try:
+        answers = _answers(plan, found, kept, on_progress, time)
+        injected = _injected(plan, found, answers, on_progress)
+        on_progress("writing the page", 0.98)
+        return write_real(
+            plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
+        )
+    except (KeyboardInterrupt, LeftError) as interruption:
+        raise LeftError(
+            "Interrupted",
+            "Not all recordings were diagnosed.",
+            "Run the same command again: it goes on where it stopped.",
+            saved=f"What was answered so far is in {plan.out}.",
+        ) from interruption
+
+
+def _found(plan: RealPlan) -> RealFolder:
+    """Raises StudyError where there is nothing to diagnose, or no time for it."""
+    if not math.isfinite(plan.seconds):
+        raise WrongUseError(
+            "That is no number of seconds",
+            f"--seconds is {plan.seconds}.",
+            f"Give a number of 1 or more, such as {SECONDS:g}.",
+            saved="Nothing was written.",
+        )
+    found = read_real_folder(plan.folder)
+    if found.recordings:
+        return found
+    raise StudyError(
+        "There is no recording to diagnose",
+        " ".join(f"{one.where}: {one.why}" for one in found.troubles),
+        "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
+        saved="Nothing was written.",
+    )
+
+
+def _make_writable(out: Path) -> None:
+    """What cannot be written is said before the work, not after it. Raises CannotWriteError."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(out, problem) from problem
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise CannotWriteError(out / PAGE_NAME, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+
+
+def _injected(
+    plan: RealPlan, found: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress
+) -> tuple[InjectedOutcome, ...]:
+    if plan.inject == 0:
+        return ()
+    begun = DIAGNOSED_OF_BOTH
+    on_progress("injecting faults", begun)
+    carried = carriers(plan.out, found.recordings, answers)
+
+    def show(done: int, of: int) -> None:
+        on_progress(f"injected faults, {done} of {of}", begun + (0.98 - begun) * done / max(of, 1))
+
+    return injected_outcomes(plan.out / INJECTED_NAME, carried, (plan.inject, plan.seed), show)
+
+
+def _answers(
+    plan: RealPlan, found: RealFolder, kept: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
+) -> tuple[RealAnswer, ...]:
+    answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
+    left = dict.fromkeys((one.folder.name for one in found.recordings), plan.seconds)
+    for number, one in enumerate(found.recordings):
+        rest = sum(other.folder == one.folder for other in found.recordings[number:])
+        begun = process_time()
+        budget = max(left[one.folder.name] / rest - BESIDE_S, 0.1 * plan.seconds)
+
+        def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
+            on_progress(f"{one.folder.name}, {one.name}: {what}", end * (number + min(share, 1.0)) / count)
+
+        there = kept.get(answer_place(plan.out, one))
+        answers.append(there or _answer(plan, one, budget, show, clock))
+        left[one.folder.name] -= process_time() - begun
+    return tuple(answers)
+
+
+def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Progress, clock: Clock) -> RealAnswer:
+    """budget_s: of processor time, that the search may take."""
+    begun_s, worked = clock.now_s(), process_time()
+    done = diagnose_real(one, lambda: process_time() - worked < budget_s, on_progress)
+    answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
+    _write(answer_place(plan.out, one), replace(done, answer=answer), origin_of_answer(one, plan.seconds))
+    return answer
+
+
+def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
+    """Whole or not at all."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CannotWriteError(folder, problem) from problem
+    with new_folder(folder) as part:
+        if done.findings is not None:
+            write_diagnosis_into(part, done.findings, done.parents)
+            write_mechanical_model(part / RETUNED_NAME, retuned_model(done.findings))
+        write_real_answer(part / ANSWER_NAME, done.answer, origin)

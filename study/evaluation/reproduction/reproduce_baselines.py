@@ -1,0 +1,73 @@
+"""Other ways of driving the device, played on it: at the centre, at the edge, in a simulated hand."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.reproduction.played_response import PlayedResponse, lines_of_band
+from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.baselines import Inverse
+from equalizer.tracking.comparison import baseline_inverses
+from equalizer.tracking.workspace.blended_inverse import blended_at
+from study.evaluation.reproduction.reproduce_equalized import PlacedModels, only, through
+from study.evaluation.reproduction.reproduce_playback import Driver, Playing, play_row
+from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place, ReproductionPlan
+
+
+@dataclass(frozen=True, slots=True)
+class _Where:
+    words: str
+    place_m: Place
+    hand: bool
+
+
+_WHERE = (_Where("centre", CENTRE, False), _Where("edge", EDGE, False), _Where("in the hand", CENTRE, True))
+
+
+def play_baselines(
+    plan: ReproductionPlan, models: PlacedModels, estimate: FrequencyResponse, on_share: Callable[[float], None]
+) -> tuple[PlayedResponse, ...]:
+    """All from what was identified at the centre, without a hand; at the end of each place ours for that place.
+
+    estimate: of the centre, its spring a part of the device.
+    """
+    inverses = baseline_inverses(models.centre, estimate, _lines_hz(plan, models.centre.sample_rate_hz))
+    wanted = len(_WHERE) * len(inverses) + 2
+    found: list[PlayedResponse] = []
+    for where in _WHERE:
+        for inverse in inverses:
+            playing = Playing(f"{inverse.name}, {where.words}", _driver(plan, inverse), where.place_m, hand=where.hand)
+            played = replace(play_row(plan, playing), multiply_adds=inverse.multiply_adds)
+            found.append(played)
+            on_share(len(found) / wanted)
+        found += [play_row(plan, playing) for playing in _for_the_place(where, models)]
+        on_share(len(found) / wanted)
+    return tuple(found)
+
+
+def _for_the_place(where: _Where, models: PlacedModels) -> tuple[Playing, ...]:
+    if where.hand:
+        return (Playing("model identified in the hand", only(models.hand), hand=True),)
+    if where.place_m == EDGE:
+        return (Playing("models of other places, blended, edge", through(blended_at(models.workspace, EDGE)), EDGE),)
+    return ()
+
+
+def _lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
+    period = round(plan.period_s * rate_hz)
+    return np.asarray(
+        np.fft.rfftfreq(period, 1 / rate_hz)[lines_of_band(plan.band_hz, period, rate_hz)], dtype=np.float64
+    )
+
+
+def _driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
+    def drive(wanted: Signal) -> FloatArray:
+        used = lines_of_band(plan.band_hz, len(wanted), wanted.sample_rate_hz)
+        spectrum = np.fft.rfft(wanted.samples, axis=0)
+        forces = np.zeros((len(spectrum), inverse.response.shape[1]), dtype=complex)
+        forces[used] = np.einsum("lmp,lp->lm", inverse.response, spectrum[used])
+        return np.asarray(np.fft.irfft(forces, len(wanted), axis=0), dtype=np.float64)
+
+    return drive

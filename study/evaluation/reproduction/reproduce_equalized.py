@@ -1,0 +1,114 @@
+"""The rows of figure 5: which models drive the device where."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from analysis.reproduction.equalized_findings import EqualizedRows
+from analysis.reproduction.played_response import PlayedResponse, scaled
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.periodic_inverse import periodic_command
+from equalizer.tracking.workspace.blended_inverse import blended_at
+from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
+from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+from equalizer.tracking.workspace.workspace_models import WorkspaceModels
+from study.devices.opening import FRICTIONLESS
+from study.evaluation.reproduction.reproduce_playback import Driver, Playing, not_equalized, play_row
+from study.evaluation.reproduction.reproduction_plan import EDGE, ReproductionPlan
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedModels:
+    """All hold the spring that acts while they play."""
+
+    centre: IdentifiedModel
+    between: tuple[IdentifiedModel, ...]
+    """Identified beside the centre, not at the edge."""
+    frictionless: IdentifiedModel
+    """Of the centre of the device without friction."""
+    hand: IdentifiedModel
+    """Of the centre, in a hand."""
+
+    @property
+    def workspace(self) -> WorkspaceModels:
+        return WorkspaceModels((self.centre, *self.between))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    rows: EqualizedRows
+    others: tuple[PlayedResponse, ...]
+    """For the table alone."""
+    remarks: tuple[str, ...]
+
+
+def play_equalized(plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]) -> Played:
+    blended = blended_at(models.workspace, EDGE)
+    interpolated, remarks = _interpolated(models.workspace)
+    playings = _playings(models, blended) | interpolated
+    found: dict[str, PlayedResponse] = {}
+    for number, (key, playing) in enumerate(playings.items(), start=1):
+        played = play_row(plan, playing)
+        plain = playing.driver is not_equalized
+        found[key] = replace(played, response=scaled(played.response)) if plain else played
+        on_share(number / len(playings))
+    return _sorted(found, (*blended.remarks, *remarks, *_clipped(found)))
+
+
+def through(models: ModelsAtPlace) -> Driver:
+    """Every model computes its forces, and the forces are blended."""
+
+    def drive(wanted: Signal) -> FloatArray:
+        return models.forces(lambda model: periodic_command(model, wanted).samples)
+
+    return drive
+
+
+def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playing]:
+    centre = only(models.centre)
+    slick = only(models.frictionless)
+    return {
+        "plain": Playing("Not equalized, centre", not_equalized),
+        "equalized": Playing("Equalized, centre", centre),
+        "edge_plain": Playing("Not equalized, edge", not_equalized, EDGE),
+        "edge": Playing("Edge, model of the centre", centre, EDGE),
+        "edge_blended": Playing("Edge, models blended (ours)", through(blended), EDGE),
+        "broad_plain": Playing("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
+        "broad": Playing("Equalized, centre, all frequencies", centre, signal="multisine"),
+        "edge_broad": Playing(
+            "Edge, models blended (ours), all frequencies", through(blended), EDGE, signal="multisine"
+        ),
+        "slick_plain": Playing("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
+        "slick": Playing("Equalized, centre, without friction", slick, device=FRICTIONLESS),
+        "frictionless": Playing(
+            "Equalized, centre, all frequencies, without friction", slick, device=FRICTIONLESS, signal="multisine"
+        ),
+    }
+
+
+def only(model: IdentifiedModel) -> Driver:
+    return lambda wanted: periodic_command(model, wanted).samples
+
+
+def _interpolated(workspace: WorkspaceModels) -> tuple[dict[str, Playing], tuple[str, ...]]:
+    try:
+        at_edge = modal_interpolation(workspace).at(EDGE)
+    except ModesDoNotMatchError as doubt:
+        return {}, (f"No modes were interpolated: {doubt}.",)
+    playing = Playing("Edge, modes interpolated (ours)", through(at_edge), EDGE)
+    return {"edge_modal": playing}, at_edge.remarks
+
+
+def _clipped(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
+    return [
+        f"{row.name} ({row.signal}): a cap cut the force off at {row.clipped_ticks} ticks."
+        for row in found.values()
+        if row.clipped_ticks
+    ]
+
+
+def _sorted(found: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> Played:
+    named = EqualizedRows.__dataclass_fields__
+    rows = EqualizedRows(**{name: found[name] for name in named})
+    return Played(rows, tuple(row for name, row in found.items() if name not in named), remarks)

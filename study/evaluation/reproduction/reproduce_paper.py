@@ -1,0 +1,149 @@
+"""The published figures 1 to 5 on the simulated omega.3: everything that takes long is kept, and used again."""
+
+from collections.abc import Callable, Mapping
+
+from analysis.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.reproduction.measured_device import MeasuredDevice
+from analysis.study_analysis import analyse_study
+from equalizer.identification.coupling_onset import coupling_onset
+from equalizer.identification.resonances import find_resonances
+from equalizer.identification.transfer_estimate import TransferEstimateError, transfer_estimate
+from equalizer.signals.recording import Recording
+from study.devices.opening import FRICTIONLESS
+from study.errors import LeftError, StudyError
+from study.evaluation.reproduction.reproduce_baselines import play_baselines
+from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
+from study.evaluation.reproduction.reproduce_models import ReproducedModel, from_excitation, modelled
+from study.evaluation.reproduction.reproduce_recordings import Recorded, Wanted, recorded
+from study.evaluation.reproduction.reproduction_plan import BETWEEN, ReproductionPlan, Steps
+from study.evaluation.reproduction.reproduction_results import Results
+from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
+from study.store.file_errors import CannotWriteError
+from study.store.protocol_files import read_study_protocol
+from study.workflows.results.analyze_data import sensor_frame
+from study.workflows.results.collect_sessions import Collected, collect_sessions
+from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
+
+SUBJECT_S, RECORDING_S, MODEL_S, PLAYING_S, BASELINES_S, WRITING_S = 5.0, 2.0, 12.0, 8.0, 12.0, 8.0
+"""About what each takes: for the progress alone."""
+
+CENTRE_NAME, SLICK_NAME, HAND_NAME = "centre", "frictionless", "hand"
+
+
+def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
+    """`on_progress(share)`, 0 to 1. Interrupted (LeftError), the same call goes on. Raises StudyError."""
+    wanted = _wanted(plan)
+    models = _modelled_names()
+    steps = Steps(_weights(plan, wanted, models), on_progress)
+    try:
+        _make_folders(plan)
+        recordings = {name: recorded(plan, one, steps.of(f"recording {name}")) for name, one in wanted.items()}
+        collected = _sit(plan, steps)
+        identified = {name: modelled(plan, recordings[name], steps.of(f"model {name}")) for name in models}
+        results = _results(plan, recordings, identified, collected, steps)
+        return write_reproduction_folder(plan, results, steps.of("writing"))
+    except (KeyboardInterrupt, LeftError) as interruption:
+        raise LeftError(
+            "Interrupted",
+            "The reproduction is not finished.",
+            "Run the same command again: it goes on where it stopped.",
+            saved=f"Sessions, recordings and models so far are in {plan.out}.",
+        ) from interruption
+
+
+def _wanted(plan: ReproductionPlan) -> Mapping[str, Wanted]:
+    asked = plan.protocols
+    wanted = (
+        Wanted("ellipsoid", asked.ellipsoid),
+        Wanted("sweep", asked.sweep),
+        Wanted(CENTRE_NAME, asked.band),
+        *(Wanted(name, asked.band, place) for name, place in zip(_between_names(), BETWEEN, strict=True)),
+        Wanted(SLICK_NAME, asked.band, device=FRICTIONLESS),
+        Wanted(HAND_NAME, asked.hand),
+    )
+    return {one.name: one for one in wanted}
+
+
+def _between_names() -> tuple[str, ...]:
+    return tuple(f"between_{number}" for number in range(1, len(BETWEEN) + 1))
+
+
+def _modelled_names() -> tuple[str, ...]:
+    return (CENTRE_NAME, *_between_names(), SLICK_NAME, HAND_NAME)
+
+
+def _weights(plan: ReproductionPlan, wanted: Mapping[str, Wanted], models: tuple[str, ...]) -> dict[str, float]:
+    return {
+        **{f"recording {name}": RECORDING_S for name in wanted},
+        "study": SUBJECT_S * plan.subjects / plan.workers,
+        **{f"model {name}": MODEL_S for name in models},
+        "playing": PLAYING_S,
+        "baselines": BASELINES_S,
+        "writing": WRITING_S,
+    }
+
+
+def _make_folders(plan: ReproductionPlan) -> None:
+    for folder in (plan.study, plan.recordings, plan.models):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise CannotWriteError(folder, problem) from problem
+
+
+def _sit(plan: ReproductionPlan, steps: Steps) -> Collected:
+    source = read_study_protocol(plan.protocols.study, plan.study)
+    rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
+    tell = steps.of("study")
+    rehearse_study(rehearsal, plan.workers, lambda done: tell(done / plan.subjects))
+    return collect_sessions(plan.study, source.protocol.name)
+
+
+def _results(
+    plan: ReproductionPlan,
+    recordings: Mapping[str, Recorded],
+    identified: Mapping[str, ReproducedModel],
+    collected: Collected,
+    steps: Steps,
+) -> Results:
+    models = PlacedModels(
+        centre=identified[CENTRE_NAME].model,
+        between=tuple(identified[name].model for name in _between_names()),
+        frictionless=identified[SLICK_NAME].model,
+        hand=identified[HAND_NAME].model,
+    )
+    centre = recordings[CENTRE_NAME].recording
+    try:
+        device = _measured(recordings["sweep"].recording)
+        shapes = _ellipsoids(recordings["ellipsoid"].recording)
+        estimate = transfer_estimate((from_excitation(centre),))
+    except (TransferEstimateError, ValueError) as problem:
+        raise StudyError(
+            "The recordings do not carry the figures",
+            f"{problem}.",
+            "Take other recording protocols, or another folder with --out.",
+            saved=f"Sessions, recordings and models are in {plan.out}.",
+        ) from problem
+    return Results(
+        study=analyse_study(collected.trials, collected.protocol),
+        ellipsoids=shapes,
+        device=device,
+        device_name=centre.device,
+        played=play_equalized(plan, models, steps.of("playing")),
+        baselines=play_baselines(plan, models, estimate, steps.of("baselines")),
+        models=tuple(one.used(name) for name, one in identified.items()),
+        tested=identified[CENTRE_NAME].tested,
+        tested_frictionless=identified[SLICK_NAME].tested,
+        remarks=tuple(f"{name}: {said}" for name, one in recordings.items() for said in one.warnings),
+        sources=tuple(one.path for one in recordings.values()),
+        protocol_hash=collected.protocol_hash,
+    )
+
+
+def _measured(recording: Recording) -> MeasuredDevice:
+    response = transfer_estimate((recording,))
+    return MeasuredDevice(response, find_resonances(response), coupling_onset(response))
+
+
+def _ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:
+    return ellipsoids(recording, sensor_frame(recording))

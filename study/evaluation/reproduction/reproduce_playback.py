@@ -1,0 +1,106 @@
+"""What the simulated device plays of what is wanted, axis by axis, measured on its true acceleration (figure 5)."""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.reproduction.played_response import PlayedResponse, SignalKind, delivered_over_wanted, wanted_wave
+from equalizer.signals.excitation import faded
+from equalizer.signals.signal import FloatArray, Signal
+from study.devices.clock import VirtualClock
+from study.devices.device import Device, DeviceSettings
+from study.devices.opening import SIMULATED, open_device
+from study.errors import StudyError
+from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
+from study.session.limits import limits_of_recording
+from study.store.protocol_files import read_recording_protocol
+
+AXES = ("ax", "ay", "az")
+OF_CAP = 0.93
+"""Peak force of everything that is played: far above friction, and below the cap."""
+PERIODS = 2
+"""The first for the transient."""
+FADE_S = 0.5
+WAVE_SEED = 5
+
+Driver = Callable[[Signal], FloatArray]
+"""From one loop of wanted accelerations (period, 3) to one of forces."""
+
+
+@dataclass(frozen=True, slots=True)
+class Playing:
+    """One row: where, on what, and what is done to the wanted signal."""
+
+    name: str
+    driver: Driver
+    place_m: Place = CENTRE
+    device: str = SIMULATED
+    hand: bool = False
+    signal: SignalKind = "sweep"
+
+
+def not_equalized(wanted: Signal) -> FloatArray:
+    """The force follows the wanted acceleration."""
+    return wanted.samples
+
+
+def play_row(plan: ReproductionPlan, playing: Playing) -> PlayedResponse:
+    """Raises DeviceError, or StudyError where the device does not tell its true acceleration."""
+    protocol = read_recording_protocol(plan.protocols.band).protocol
+    settings = DeviceSettings(
+        limits=limits_of_recording(protocol),
+        spring_frequency_hz=protocol.spring.natural_frequency_hz,
+        spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
+        keep_s=1.0,
+        hand_on_handle=playing.hand,
+        place_m=playing.place_m,
+    )
+    peak_n = OF_CAP * protocol.safety.stimulus_cap_n
+    with contextlib.closing(open_device(playing.device, settings, VirtualClock(), plan.seed)) as device:
+        return _play_axes(plan, playing, device, peak_n)
+
+
+def _play_axes(plan: ReproductionPlan, playing: Playing, device: Device, peak_n: float) -> PlayedResponse:
+    rate_hz = device.info.sample_rate_hz
+    wave = wanted_wave(playing.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
+    wanted, delivered, clipped = [], [], 0
+    for axis in range(3):
+        samples = np.zeros((len(wave), 3))
+        samples[:, axis] = wave
+        loop = playing.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
+        scale = peak_n / float(np.linalg.norm(loop, axis=1).max())
+        played, limited = _steady(device, scale * loop)
+        wanted.append(scale * wave)
+        delivered.append(played)
+        clipped += limited
+    frequency_hz, response = delivered_over_wanted(np.array(wanted), delivered, plan.band_hz, rate_hz)
+    return PlayedResponse(
+        name=playing.name,
+        device=device.info.name,
+        place_m=playing.place_m,
+        hand=playing.hand,
+        signal=playing.signal,
+        frequency_hz=frequency_hz,
+        response=response,
+        peak_force_n=peak_n,
+        clipped_ticks=clipped,
+    )
+
+
+def _steady(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
+    """The last period of the handle's true acceleration, (period, 3), and the ticks at which a cap cut in."""
+    rate_hz = device.info.sample_rate_hz
+    forces = faded(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
+    played = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))
+    if played.truth is None or played.recording is None:
+        raise StudyError(
+            "The device did not play it through",
+            f"{device.info.name}: {played.health.fault.value}; its true acceleration is not known.",
+            "Run the command again.",
+            saved="Recordings and models so far are in the folder.",
+        )
+    health = played.health
+    clipped = health.stimulus_clipped + health.feedback_clipped + health.total_clipped
+    return played.truth.samples[-len(loop) :], clipped

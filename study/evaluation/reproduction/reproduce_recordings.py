@@ -1,0 +1,89 @@
+"""The recordings behind the figures: made once, and used again by the next run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from equalizer.signals.recording import Recording
+from protocols.hashing import protocol_hash
+from protocols.recording_protocol import RecordingProtocol
+from study.devices.opening import SIMULATED
+from study.errors import StudyError
+from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
+from study.store.file_errors import UnusableFileError
+from study.store.protocol_files import read_recording_protocol
+from study.store.recording_file import read_recording
+from study.workflows.recording.record_device import RecordingPlan, record_device
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """name: of the file, without its ending."""
+
+    name: str
+    protocol: str
+    place_m: Place = CENTRE
+    device: str = SIMULATED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    path: Path
+    recording: Recording
+    warnings: tuple[str, ...]
+
+
+def recorded(plan: ReproductionPlan, wanted: Wanted, on_share: Callable[[float], None]) -> Recorded:
+    """Raises StudyError where the folder holds a recording of another run."""
+    path = plan.recordings / f"{wanted.name}.h5"
+    protocol = read_recording_protocol(wanted.protocol).protocol
+    found = _kept(path, plan, wanted, protocol)
+    if found is None:
+        recording = RecordingPlan(protocol, wanted.device, wanted.place_m, plan.seed, path)
+        total_s = recording.total_s
+        record_device(recording, lambda seconds: on_share(seconds / total_s))
+        found = read_recording(path)
+    on_share(1.0)
+    return Recorded(path, found, _lowered(found))
+
+
+def _kept(path: Path, plan: ReproductionPlan, wanted: Wanted, protocol: RecordingProtocol) -> Recording | None:
+    """None where there is none yet, or only a part of one, which is then removed."""
+    if not path.exists():
+        return None
+    try:
+        found = read_recording(path)
+    except UnusableFileError as problem:
+        raise _foreign(path, "it cannot be read") from problem
+    meta = found.meta
+    origin: dict[str, Any] = meta.get("provenance", {})
+    if origin.get("protocol_hash") != protocol_hash(protocol):
+        raise _foreign(path, "it follows another protocol")
+    if origin.get("seeds") != {"device": plan.seed}:
+        raise _foreign(path, "it was made with another seed")
+    if tuple(meta.get("place_m", ())) != wanted.place_m:
+        raise _foreign(path, "it was made at another place")
+    if meta.get("interrupted"):
+        path.unlink()
+        return None
+    return found
+
+
+def _lowered(recording: Recording) -> tuple[str, ...]:
+    """What was played with less than the protocol asks for: said again on every run."""
+    return tuple(
+        f"Played at {about['played_amplitude_n']:.3g} N instead of {about['requested_amplitude_n']:.3g} N along "
+        f"{about['along']}, because something was at its limit."
+        for about in recording.meta.get("segments", ())
+        if about["played_amplitude_n"] < about["requested_amplitude_n"]
+    )
+
+
+def _foreign(path: Path, why: str) -> StudyError:
+    return StudyError(
+        "This folder holds another reproduction",
+        f"{path} is in the way: {why}.",
+        "Choose another folder with --out, or the same --seed to go on.",
+        saved="Nothing was changed.",
+    )

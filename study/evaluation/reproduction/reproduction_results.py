@@ -1,0 +1,32 @@
+"""Everything that the five figures are made from, once it is there."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.ellipsoid import EllipsoidResult
+from analysis.reproduction.document import UsedModel
+from analysis.reproduction.measured_device import MeasuredDevice
+from analysis.reproduction.played_response import PlayedResponse
+from analysis.study_analysis import StudyAnalysis
+from equalizer.identification.held_out import HeldOut
+from study.evaluation.reproduction.reproduce_equalized import Played
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Results:
+    study: StudyAnalysis
+    ellipsoids: tuple[EllipsoidResult, ...]
+    device: MeasuredDevice
+    device_name: str
+    played: Played
+    baselines: tuple[PlayedResponse, ...]
+    models: tuple[UsedModel, ...]
+    tested: HeldOut | None
+    """The centre's model on what was kept from it."""
+    tested_frictionless: HeldOut | None
+    remarks: tuple[str, ...]
+    """Of recordings and models, in sentences."""
+    sources: tuple[Path, ...]
+    """Files that all this comes from."""
+    protocol_hash: str
+    """Of the study."""

@@ -1,0 +1,101 @@
+"""The folder of a reproduction: figures, the document of numbers, the page."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.figures.reproduction_pictures import reproduction_pictures
+from analysis.reports.reproduction_report import overview_lines, render_reproduction_report
+from analysis.reproduction.document import FigureFindings, Reproduction
+from analysis.reproduction.ellipsoid_findings import ellipsoid_findings
+from analysis.reproduction.equalized_findings import equalized_findings
+from analysis.reproduction.played_response import played_row
+from analysis.reproduction.response_findings import band_findings, response_findings
+from analysis.reproduction.study_findings import direction_limit_hz, study_findings
+from equalizer.identification.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, FrequencyBand, frequency_bands
+from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
+from study.evaluation.reproduction.reproduction_results import Results
+from study.local_clock import local_now
+from study.store.provenance import Provenance, gather_provenance
+from study.store.reproduction_file import REPRODUCTION_NAME, write_reproduction
+from study.store.text_file import write_text
+from study.workflows.picture_files import write_pictures
+
+PAGE_NAME = "report.html"
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenReproduction:
+    reproduction: Reproduction
+    lines: tuple[str, ...]
+    """One per figure, for a terminal."""
+    document: Path
+    report: Path
+
+
+def write_reproduction_folder(
+    plan: ReproductionPlan, results: Results, on_share: Callable[[float], None]
+) -> WrittenReproduction:
+    """What is there from an earlier run is replaced. Raises CannotWriteError."""
+    limit_hz = direction_limit_hz(results.study)
+    used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
+    bands = frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
+    reproduction = _document(plan, results, bands, limit_hz, used_limit_hz)
+    pictures = reproduction_pictures(
+        results.study, results.ellipsoids, results.device, bands, used_limit_hz, results.played.rows
+    )
+    on_share(0.2)
+    write_pictures(plan.figures, [picture for several in pictures.values() for picture in several])
+    on_share(0.8)
+    origin = gather_provenance(
+        protocol_hash=results.protocol_hash, seeds={"reproduction": plan.seed}, parents=results.sources
+    )
+    document, report = plan.out / REPRODUCTION_NAME, plan.out / PAGE_NAME
+    write_reproduction(document, reproduction, origin)
+    page = render_reproduction_report(reproduction, pictures, _shown(origin), local_now())
+    write_text(report, page, overwrite=True)
+    on_share(1.0)
+    return WrittenReproduction(reproduction, overview_lines(reproduction), document, report)
+
+
+def _document(
+    plan: ReproductionPlan,
+    results: Results,
+    bands: tuple[FrequencyBand, ...],
+    limit_hz: float | None,
+    used_limit_hz: float,
+) -> Reproduction:
+    played = results.played
+    return Reproduction(
+        device=results.device_name,
+        subjects=plan.subjects,
+        seed=plan.seed,
+        band_hz=plan.band_hz,
+        order=plan.order,
+        figures=(
+            band_findings(bands, limit_hz, used_limit_hz),
+            study_findings(results.study),
+            ellipsoid_findings(results.ellipsoids),
+            response_findings(results.device.response, results.device.resonances, results.device.onset),
+            _equalized(results),
+        ),
+        played=tuple(played_row(row) for row in (*played.rows.all, *played.others)),
+        baselines=tuple(played_row(row) for row in results.baselines),
+        models=results.models,
+    )
+
+
+def _equalized(results: Results) -> FigureFindings:
+    with_it, without = results.tested, results.tested_frictionless
+    tested = (with_it.error, without.error) if with_it and without else None
+    return equalized_findings(results.played.rows, tested, (*results.remarks, *results.played.remarks))
+
+
+def _shown(origin: Provenance) -> dict[str, str]:
+    """What the page's last section shows."""
+    return {
+        "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
+        "study protocol": f"hash {origin.protocol_hash}",
+        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
+        "command": " ".join(origin.command),
+    }

@@ -1,0 +1,85 @@
+"""All that can be checked before a study day: the installation, the device, and how well 1 kHz is kept."""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from study.devices.clock import Clock, RealClock
+from study.devices.device import Device, DeviceSettings
+from study.devices.opening import open_device
+from study.errors import DeviceError, ExitCode
+from study.session.timing_verdict import judge_load
+from study.session.views import DeviceFinding, DeviceReport
+from study.store.protocol_files import read_study_protocol
+from study.workflows.checks.check_device import check_device
+from study.workflows.checks.check_installation import Terminal, check_installation
+from study.workflows.checks.check_timing import Timing, check_timing
+from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.device_settings import device_settings
+
+PROTOCOL = "direction_threshold"
+"""Its limits are those that the device is opened with."""
+
+SPARE_S = 5.0
+"""Beyond the timing's length, before the safety layer ends it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    installation: tuple[DeviceFinding, ...]
+    device: DeviceReport
+    timing: Timing | None
+    """None where it was not asked for, or the device could not be used."""
+
+    @property
+    def findings(self) -> tuple[DeviceFinding, ...]:
+        timing = self.timing.findings if self.timing is not None else ()
+        return (*self.installation, *self.device.findings, *timing)
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """By the worst verdict: DEVICE where device or timing is wrong, whatever else is. A warning changes nothing."""
+        timing = self.timing.findings if self.timing is not None else ()
+        if any(finding.wrong for finding in (*self.device.findings, *timing)):
+            return ExitCode.DEVICE
+        return ExitCode.ERROR if any(finding.wrong for finding in self.installation) else ExitCode.DONE
+
+
+def examine_setup(
+    device: str, data: Path, timing_s: float, terminal: Terminal | None, on_progress: Callable[[float], None]
+) -> Examination:
+    """In real time. timing_s: 0 for none. A device that cannot be opened, or is lost, is a finding and no error."""
+    installation = check_installation(data, terminal)
+    report, timing = _examine_device(device, timing_s, on_progress)
+    return Examination(installation, report, timing)
+
+
+def _examine_device(
+    name: str, timing_s: float, on_progress: Callable[[float], None]
+) -> tuple[DeviceReport, Timing | None]:
+    clock, settings = RealClock(), _settings(timing_s)
+    report = DeviceReport(name, simulated=False, findings=())
+    try:
+        with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
+            total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL).protocol.safety
+            report = check_device(device, clock, settings.place_m, total_cap_n, safety)
+            timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
+            return report, timing
+    except DeviceError as error:
+        trouble = DeviceFinding("Device", f"{error.title}. {error.happened}", fine=False, advice=error.do_now)
+        return replace(report, findings=(*report.findings, trouble)), None
+
+
+def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
+    load = judge_load(load_per_processor())
+    timing = check_timing(device, clock, seconds, on_progress)
+    return replace(timing, findings=(*timing.findings, load))
+
+
+def _settings(timing_s: float) -> DeviceSettings:
+    """As for a study, but without the centring spring: nothing is to move while the loop is timed."""
+    settings = device_settings(read_study_protocol(PROTOCOL).protocol)
+    longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
+    limits = replace(settings.limits, longest_hold_s=longest_s)
+    return replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)

@@ -1,0 +1,15 @@
+"""What a study protocol asks of the device: limits, spring, what is kept of each recording."""
+
+from protocols.study_protocol import StudyProtocol
+from study.devices.device import DeviceSettings
+from study.session.limits import limits_of_study
+
+
+def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
+    return DeviceSettings(
+        limits=limits_of_study(protocol),
+        spring_frequency_hz=protocol.spring.natural_frequency_hz,
+        spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
+        keep_s=protocol.measurement.keep_s,
+        hand_on_handle=hand_on_handle,
+    )

@@ -1,0 +1,43 @@
+"""Recordings of the device when it was in order, beside those to diagnose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from analysis.diagnosis.data.belonging import NothingToDiagnose, require_alike
+from study.errors import StudyError
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose, read_input, same_position
+
+NOT_ALIKE = "Give clean recordings of the same device, with the same channels, units and rate, or leave --clean out."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WithClean:
+    found: DiagnosisInput
+    clean: DiagnosisInput
+
+
+def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int) -> WithClean:
+    """sources: what was found is from. clean: recordings, or one session's folder. Raises StudyError."""
+    known = {source.resolve() for source in sources}
+    if (both := next((path for path in clean if path.resolve() in known), None)) is not None:
+        raise StudyError(
+            f"{both} cannot be diagnosed and be clean at the same time",
+            "What it differs by from the model would be learned, and then found to be nothing.",
+            "Give another recording with --clean, of the device when it was in order.",
+            saved="Nothing was written.",
+        )
+    beside = read_input(clean, seed)
+    try:
+        require_alike(
+            (found.recordings[0], *beside.recordings),
+            (found.names[0] if found.names else "the recording", *beside.names),
+            "one says nothing of the other",
+        )
+    except NothingToDiagnose as refusal:
+        raise nothing_to_diagnose(refusal.problems, NOT_ALIKE) from refusal
+    number = len(found.recordings)
+    every = same_position(replace(found, recordings=(*found.recordings, *beside.recordings)))
+    return WithClean(
+        replace(every, recordings=every.recordings[:number]), replace(beside, recordings=every.recordings[number:])
+    )

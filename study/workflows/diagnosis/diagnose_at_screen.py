@@ -1,0 +1,29 @@
+"""A diagnosis that somebody started on the screen, and may stop there."""
+
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+from study.errors import LeftError
+from study.store.diagnosis_file import DIAGNOSIS_NAME
+from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
+
+
+def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:
+    """Of the diagnosis.json. Raises StudyError; LeftError where it was stopped."""
+    try:
+        return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
+    except KeyboardInterrupt as stopped:
+        raise LeftError(
+            "The diagnosis was stopped",
+            "It was not at its end.",
+            "Start it again when there is time.",
+            saved="Nothing was written.",
+        ) from stopped
+
+
+def free_out(source: Path) -> Path:
+    """A new folder in a session's, or beside a recording."""
+    folder, name = (source, "diagnosis") if source.is_dir() else (source.parent, f"{source.stem}-diagnosis")
+    numbered = (folder / (name if number == 1 else f"{name}-{number}") for number in count(1))
+    return next(path for path in numbered if not path.exists())

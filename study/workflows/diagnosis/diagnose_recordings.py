@@ -1,0 +1,237 @@
+"""From recordings and a model to a folder that says what physics the model lacks."""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import process_time
+from typing import Protocol
+
+import numpy as np
+
+from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.errors.choose_measure import Compared
+from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned
+from analysis.diagnosis.types import Mapper, Patience, Progress
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel, nearest
+from equalizer.signals.recording import Recording
+from study.errors import WrongUseError
+from study.store.new_folder import new_folder, require_new_folder
+from study.store.written_elsewhere import note_written
+from study.workflows.diagnosis.clean_recordings import with_clean
+from study.workflows.diagnosis.diagnosis_input import (
+    DiagnosisInput,
+    FirstModel,
+    first_model_of,
+    fitted_model,
+    given_model,
+    nothing_to_diagnose,
+    read_input,
+)
+from study.workflows.diagnosis.effect_file import read_entry
+from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
+from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
+from study.workflows.worker_threads import worker_threads
+
+READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
+"""Shares of the work at which the recordings are read, a model is fitted where none was given, and all is computed."""
+
+TWIN_SAID = (
+    "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
+    "recordings without a hand at the handle, as `hapteq twin` writes it."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosePlan:
+    sources: tuple[Path, ...]
+    """Recordings, or one session's folder."""
+    out: Path
+    """A folder that is not there yet, or is empty."""
+    model: Path | None = None
+    without: tuple[str, ...] = ()
+    """Effects that are not to be considered."""
+    clean: tuple[Path, ...] = ()
+    """Recordings of the device when it was in order, or one session's folder."""
+    seed: int = 1
+    """Of what is drawn: which trials of a session are taken, and which are kept for the test."""
+    compare: Compared = "auto"
+    effect_files: tuple[Path, ...] = ()
+    """Of laws that were found elsewhere and are kept, as `hapteq effect` writes them."""
+    seconds: float | None = None
+    """Of processor time, after which the search ends with what it has."""
+    discovery: bool = False
+    """Laws that have no name are looked for, too."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DiagnosedRecordings:
+    findings: Findings
+    out: Path
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What is found, before any of it is written."""
+
+    findings: Findings
+    plan: DiagnosePlan
+    parents: tuple[Path, ...]
+    """Files that it was made from."""
+
+
+class Engine(Protocol):
+    def __call__(
+        self,
+        recordings: Sequence[Recording],
+        model: MechanicalModel,
+        settings: DiagnosisSettings,
+        map_: Mapper,
+        progress: Progress,
+    ) -> Findings: ...
+
+
+def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> DiagnosedRecordings:
+    """`on_progress(what is being done, share)`. Interrupted or refused (StudyError), nothing is written."""
+    return written(answered(plan, on_progress, engine), on_progress)
+
+
+def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
+    """The first part, which writes nothing: figures and page take seconds that an answer need not wait for."""
+    check_names(plan.without)
+    require_new_folder(plan.out)
+    on_progress("reading", 0.0)
+    found = read_input(plan.sources, plan.seed, plain=plan.model is None and not plan.clean)
+    clean: DiagnosisInput | None = None
+    if plan.clean:
+        both = with_clean(found, plan.sources, plan.clean, plan.seed)
+        found, clean = both.found, both.clean
+    on_progress("reading", READ)
+    patient = _patience(plan)
+    first = _model(plan, found, clean, patient, on_progress)
+    # A model that was fitted to these recordings has the spring in it.
+    spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
+    held = with_spring(first.model, spring)
+    begun = FITTED if plan.model is None else READ
+    _check_compared(plan, found, held)
+    settings = _settings(plan, found, clean, patient, first.balances)
+    try:
+        with worker_threads() as threads:
+            findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+    except NothingLearned as refusal:
+        raise nothing_to_diagnose(
+            (str(refusal),), "Leave --clean out, or record the sound device in the same way."
+        ) from refusal
+    except np.linalg.LinAlgError as problem:
+        raise nothing_to_diagnose(
+            (f"The fits broke down ({problem}): near the given numbers the model runs away from what was recorded",),
+            "State narrower tolerances in the model, or give one that is nearer to the device.",
+        ) from problem
+    findings = replace(
+        findings,
+        improved=with_spring(findings.improved, -spring),
+        remarks=(*found.remarks, *spring_words(spring), *first.remarks, *findings.remarks),
+    )
+    return Answer(
+        findings, plan, (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
+    )
+
+
+def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
+    """The second part: document, improved model, figures and page, whole or not at all."""
+    # Here, for drawing takes long to import, and the answer comes first.
+    from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
+
+    on_progress("writing the report", DIAGNOSED)
+    plan = answer.plan
+    for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
+        note_written(session, plan.out)
+    with new_folder(plan.out) as folder:
+        write_diagnosis_into(folder, answer.findings, answer.parents)
+    on_progress("done", 1.0)
+    return DiagnosedRecordings(answer.findings, plan.out)
+
+
+def _patience(plan: DiagnosePlan) -> Patience:
+    worked = process_time()
+    return lambda: plan.seconds is None or process_time() - worked < plan.seconds
+
+
+def _settings(
+    plan: DiagnosePlan,
+    found: DiagnosisInput,
+    clean: DiagnosisInput | None,
+    patient: Patience,
+    balances: tuple[Balance, ...] | None,
+) -> DiagnosisSettings:
+    return DiagnosisSettings(
+        without=plan.without,
+        names=found.names,
+        clean=() if clean is None else clean.recordings,
+        fitted=plan.model is None and not found.simulated,
+        balances=balances,
+        compared=plan.compare,
+        kept=tuple(read_entry(path) for path in plan.effect_files),
+        discovery=plan.discovery,
+        patient=patient,
+    )
+
+
+def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: MechanicalModel) -> None:
+    """Raises WrongUseError."""
+    if plan.compare == "force" and plan.clean:
+        happened = "Beside clean recordings errors are measured by the rule, so that both are measured alike."
+    elif plan.compare == "force" and not all(has_motion(each, model) for each in found.recordings):
+        happened = "Neither positions nor velocities of every driven axis were measured, so no force can be told."
+    else:
+        return
+    raise WrongUseError(
+        "Forces cannot be compared", happened, "Leave --compare out, or ask for motion.", saved="Nothing was written."
+    )
+
+
+def check_names(without: Sequence[str]) -> None:
+    """Raises WrongUseError for a name that no effect has."""
+    for name in without:
+        if name not in EFFECTS_BY_NAME:
+            raise WrongUseError(
+                f"There is no effect '{name}' to do without",
+                f"The catalogue does not know it{nearest(name, tuple(EFFECTS_BY_NAME))}.",
+                f"Its names are {', '.join(EFFECTS_BY_NAME)}.",
+                saved="Nothing was written.",
+            )
+
+
+def _model(
+    plan: DiagnosePlan,
+    found: DiagnosisInput,
+    clean: DiagnosisInput | None,
+    patient: Patience,
+    on_progress: Progress,
+) -> FirstModel:
+    within = _within(on_progress, READ, FITTED)
+    if plan.model is not None:
+        return FirstModel(given_model(plan.model, found), ())
+    if found.simulated:
+        return FirstModel(_twin(within), (TWIN_SAID,))
+    if clean is None:
+        return first_model_of(found, plan.without, patient, within)
+    what = "fitting a linear model, as none was given"
+    on_progress(what, READ)
+    return FirstModel(*fitted_model(clean, lambda share: within(what, share), "the clean recordings"))
+
+
+def _twin(on_progress: Progress) -> MechanicalModel:
+    what = "identifying the simulated device's twin"
+    on_progress(what, 0.0)
+    with tempfile.TemporaryDirectory() as folder:
+        plan = TwinPlan(Path(folder) / "twin.toml")
+        return write_twin(plan, lambda share: on_progress(what, share)).model
+
+
+def _within(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
+    return lambda what, share: on_progress(what, begin + (end - begin) * min(max(share, 0.0), 1.0))

@@ -1,0 +1,125 @@
+"""`hapteq model`: a first mechanical model from recordings, written with its tolerances."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.balance.choose_structure import Choice, first_structure
+from analysis.diagnosis.balance.model_structures import KINDS, Kind, Number, StructureRefused
+from analysis.diagnosis.data.carried_weight import weighted
+from analysis.wording import typeset
+from equalizer.plant.mechanical_model import nearest
+from study.errors import StudyError, WrongUseError
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.provenance import gather_provenance
+from study.workflows.diagnosis.diagnosis_input import read_input
+from study.workflows.free_name import require_free
+
+TITLE = "The model was not made"
+
+
+@dataclass(frozen=True, slots=True)
+class FirstModelPlan:
+    recordings: tuple[Path, ...]
+    out: Path
+    structure: str = "auto"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstModel:
+    plan: FirstModelPlan
+    choice: Choice
+    remarks: tuple[str, ...]
+
+
+def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) -> FirstModel:
+    """Fits and writes. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    wanted = _wanted(plan.structure)
+    require_free(plan.out, title=TITLE, kind="models")
+    if folders := [path for path in plan.recordings if path.is_dir()]:
+        raise StudyError(
+            TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.", "Give its recordings, REC.h5.",
+            saved="Nothing was written.",
+        )  # fmt: skip
+    found = read_input(plan.recordings, 1)
+    if weighted(found.recordings):
+        raise _refused("A recording was made with a weight on, and the model would hold the weight.")
+    try:
+        choice = first_structure(found.recordings, wanted, on_progress)
+    except StructureRefused as refusal:
+        what = "no structure" if wanted is None else f"the structure {wanted}"
+        raise _refused(f"The recordings do not carry {what}: {refusal}.") from refusal
+    origin = {
+        **gather_provenance(parents=found.parents).as_dict(),
+        "structure": choice.fit.kind,
+        "reason": choice.reason,
+        "compared": choice.fit.compared,
+        "held_out_error": max(choice.fit.held_out),
+    }
+    write_mechanical_model(plan.out, replace(choice.fit.model, provenance=origin))
+    on_progress(1.0)
+    return FirstModel(plan, choice, (*found.remarks, *choice.fit.remarks))
+
+
+def first_model_lines(done: FirstModel) -> tuple[str, ...]:
+    """For a person: what was chosen and why, the numbers, and what remains."""
+    choice, fit = done.choice, done.choice.fit
+    rows = [_row(one) for one in fit.numbers]
+    errors = [
+        f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
+        for name, error in zip(fit.channels, fit.held_out, strict=True)
+    ]
+    others = [
+        f"  {one.kind}: " + (one.why_not if one.error is None else f"{100 * one.error:.3g} %") for one in choice.tried
+    ]
+    return (str(done.plan.out), f"Structure: {fit.kind}. {choice.reason}", *others, *rows, *errors, choice.remains)
+
+
+def first_model_summary(done: FirstModel) -> dict[str, Any]:
+    """As one JSON document."""
+    choice, fit = done.choice, done.choice.fit
+    return {
+        "model": str(done.plan.out),
+        "structure": fit.kind,
+        "reason": choice.reason,
+        "numbers": [
+            {"name": one.name, "unit": one.unit, "value": one.value,
+             "ci95": None if one.half is None else [one.value - one.half, one.value + one.half]}
+            for one in fit.numbers
+        ],
+        "compared": fit.compared,
+        "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
+        "tried": [{"structure": one.kind, "error": one.error, "why_not": one.why_not} for one in choice.tried],
+        "remains": choice.remains,
+        "remarks": list(done.remarks),
+    }  # fmt: skip
+
+
+def _row(one: Number) -> str:
+    value = typeset(f"{one.value:.4g}")
+    if one.half is None:
+        return f"  {one.name}: {value} {one.unit}"
+    low, high = (typeset(f"{one.value + sign * one.half:.4g}") for sign in (-1, 1))
+    return f"  {one.name}: {value} {one.unit} (95 %: {low} to {high})"
+
+
+def _wanted(structure: str) -> Kind | None:
+    if structure == "auto":
+        return None
+    for kind in KINDS:
+        if kind == structure:
+            return kind
+    raise WrongUseError(
+        f"There is no structure '{structure}'",
+        f"A first model has none of that name{nearest(structure, KINDS)}.",
+        f"Its names are auto, {', '.join(KINDS)}.",
+        saved="Nothing was written.",
+    )
+
+
+def _refused(happened: str) -> StudyError:
+    return StudyError(
+        TITLE, happened, "Choose another --structure, or record positions or velocities along every command.",
+        saved="Nothing was written.",
+    )  # fmt: skip

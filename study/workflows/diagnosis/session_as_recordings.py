@@ -1,0 +1,210 @@
+"""The trials of a session as one recording to be diagnosed, one after the other, by frequency and level.
+
+A trial's recording holds the middle of a vibration that was on before. A simulation starts from rest, so before each
+trial a full cycle of its own command is played, over and over and fading in, with nothing to compare with.
+
+What is played is what was decided beforehand. The virtual spring that held the handle at its place goes into the model:
+a simulation by forces that a spring made of what really happened would drift away from it. Positions are left out: they
+are encoders', in front of the cables, and where a handle that sticks comes to rest is chance.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+from study.errors import StudyError
+from study.session.events import TrialMeasured
+from study.store.archive import SessionFolder, find_session
+from study.store.provenance import sha256_of
+from study.store.recording_file import read_recording
+from study.workflows.results.fold_session import fold_session
+
+MOST_S = 60.0
+"""Of vibration, over all trials that are taken: more would cost time without telling much more."""
+LEAD_S = 0.4
+"""Before each trial: a handle that is held settles in less."""
+REPEAT_S = 0.2
+"""Cycles are counted in groups so long where they fit: more of what was played is then compared."""
+LEVEL_STEP_DB = 4.0
+"""Levels within so many decibels count as one: a staircase's own are too many to be compared one by one."""
+TESTED_OF = 4
+"""Every so many-th trial of a frequency and a level is kept for the test."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionRecordings:
+    recording: Recording
+    name: str
+    parents: tuple[Path, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    """The device was the simulated omega.3."""
+    spring_n_per_m: float
+    """Of the virtual spring, which is no part of the recording's command; 0 = none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    path: Path
+    recording: Recording
+    frequency_hz: float
+    level_n: float
+
+
+def session_recordings(session: Path, seed: int) -> SessionRecordings:
+    """seed: draws which trials are taken where there are many, and which are kept for the test. Raises StudyError."""
+    folder = find_session(str(session), session.absolute().parent)
+    folded = fold_session(folder)
+    opened = folded.state.opened
+    logged = {e.recording: e.sha256 for e in folded.contents.events if isinstance(e, TrialMeasured) and e.recording}
+    found = [_trial(path, logged) for path in sorted(folder.recordings.glob("*.h5"))]
+    usable = [trial for trial in found if trial is not None]
+    if not usable:
+        raise StudyError(
+            "This session holds nothing to diagnose",
+            f"{folder.name} has {len(found)} recordings of trials, and none is whole.",
+            "Give a session in which trials were measured, or recordings of `hapteq record`.",
+            saved="Nothing was written.",
+        )
+    draw = np.random.default_rng(seed)
+    taken = _taken(usable, draw)
+    spring = spring_of([trial.recording for trial in taken])
+    return SessionRecordings(
+        recording=_merged(taken, folder, draw),
+        name=folder.name,
+        parents=(folder.log, *(trial.path for trial in taken)),
+        remarks=tuple(_remarks(folder, found, usable, taken)),
+        simulated=opened.device.simulated,
+        spring_n_per_m=spring,
+    )
+
+
+def _trial(path: Path, logged: Mapping[str, str | None]) -> _Trial | None:
+    """None where samples are missing, something was wrong while it was played, or it is not the file that was written
+    under its name."""
+    name = f"{path.parent.name}/{path.name}"
+    if name in logged and sha256_of(path) != logged[name]:
+        return None
+    recording = read_recording(path)
+    meta = recording.meta
+    whole = np.isfinite(recording.command.samples).all() and np.isfinite(recording.response.samples).all()
+    if not whole or meta.get("flags") or not isinstance(meta.get("frequency_hz"), int | float):
+        return None
+    if not recording.segments or not isinstance(meta.get("level_n"), int | float):
+        return None
+    return _Trial(path, recording, float(meta["frequency_hz"]), float(meta["level_n"]))
+
+
+def _taken(trials: Sequence[_Trial], draw: np.random.Generator) -> list[_Trial]:
+    """By frequency and level. Where there are too many, the same share of each group is drawn, and one at least."""
+    seconds = sum(trial.recording.response.duration_s for trial in trials)
+    share = min(1.0, MOST_S / seconds)
+    taken: list[_Trial] = []
+    for _, members in groupby(sorted(trials, key=_key), key=_key):
+        group = list(members)
+        count = max(1, round(share * len(group)))
+        taken += [group[place] for place in sorted(draw.permutation(len(group))[:count])]
+    return taken
+
+
+def _key(trial: _Trial) -> tuple[float, int]:
+    return trial.frequency_hz, _rung(trial.level_n)
+
+
+def _rung(level_n: float) -> int:
+    return round(20 * math.log10(max(level_n, 1e-6)) / LEVEL_STEP_DB)
+
+
+def _merged(trials: Sequence[_Trial], folder: SessionFolder, draw: np.random.Generator) -> Recording:
+    first = trials[0].recording
+    lead = round(LEAD_S * first.sample_rate_hz)
+    parts: list[Mapping[str, FloatArray]] = []
+    segments: list[Segment] = []
+    begin = 0
+    for (_, rung), members in groupby(trials, key=_key):
+        group = list(members)
+        tested = set(draw.permutation(len(group))[: len(group) // TESTED_OF].tolist())
+        for place, trial in enumerate(group):
+            parts.append(_with_lead(trial.recording, lead))
+            own = trial.recording.segments[0]
+            start, stop = begin + lead + own.start, begin + lead + own.stop
+            role = "test" if place in tested else "fit"
+            period = _repeating(own.period, trial.recording.sample_rate_hz)
+            segments.append(Segment(start, stop, "sine", 10 ** (rung * LEVEL_STEP_DB / 20), period, role))
+            begin += lead + len(trial.recording)
+    decided = _joined("command", parts, _decided(first))
+    return Recording(
+        device=first.device,
+        command=decided,
+        response=_joined("response", parts, first.response),
+        excitation=decided,
+        hold=first.hold,
+        segments=tuple(segments),
+        meta={"session": folder.name, "hand": "held"},
+    )
+
+
+def _decided(recording: Recording) -> Signal:
+    return recording.command if recording.excitation is None else recording.excitation
+
+
+def _repeating(period: int, sample_rate_hz: float) -> int:
+    longer = round(REPEAT_S * sample_rate_hz)
+    return longer if period > 0 and longer % period == 0 else period
+
+
+def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
+    """Both signals, (lead + n, channels): what was commanded goes on backwards, what came out is not known there."""
+    played, answered = _decided(recording).samples, recording.response.samples
+    period = recording.segments[0].period or len(recording)
+    fade = np.minimum(1.0, np.arange(lead) / max(1, lead // 2))[:, None]
+    before = fade * played[np.arange(-lead, 0) % min(period, len(played))]
+    return {
+        "command": np.vstack([before, played]),
+        "response": np.vstack([np.full((lead, answered.shape[1]), np.nan), answered]),
+    }
+
+
+def spring_of(recordings: Sequence[Recording]) -> float:
+    """N/m, from what was commanded beyond what was decided, over the way; 0 where that is not known."""
+    pushed, way = 0.0, 0.0
+    for one in recordings:
+        if one.excitation is None or one.position is None:
+            return 0.0
+        place = one.position.samples
+        if place.shape != one.command.samples.shape or not np.isfinite(place).all():
+            return 0.0
+        pushed -= float(np.sum((one.command.samples - one.excitation.samples) * place))
+        way += float(np.sum(place**2))
+    return pushed / way if way > 0 else 0.0
+
+
+def _joined(name: str, parts: Sequence[Mapping[str, FloatArray]], like: Signal) -> Signal:
+    return replace(like, samples=np.vstack([part[name] for part in parts]))
+
+
+def _remarks(
+    folder: SessionFolder, found: Sequence[Any], usable: Sequence[_Trial], taken: Sequence[_Trial]
+) -> Iterator[str]:
+    seconds = sum(trial.recording.response.duration_s for trial in taken)
+    yield (
+        f"{len(taken)} of the {len(found)} trials of {folder.name} were used, {seconds:.0f} s in all, with a hand on "
+        "the handle: they show single frequencies at the levels of the staircases, and nothing slow, nothing strong "
+        "and nothing in between. What shows only there cannot be found here."
+    )
+    if len(usable) < len(found):
+        yield (
+            f"{len(found) - len(usable)} trials were left out: samples were missing, something was wrong while "
+            "they were played, or the file was changed since."
+        )
+    yield (
+        f"Levels within {LEVEL_STEP_DB:g} dB of each other count as one. Of each frequency and level, one trial in "
+        f"{TESTED_OF} is kept for the test."
+    )

@@ -1,0 +1,75 @@
+"""What `hapteq twin` says: the numbers of the model, and how well it predicts."""
+
+from typing import Any
+
+import numpy as np
+
+from analysis.wording import typeset
+from equalizer.plant.mechanical_model import Tolerance
+from equalizer.signals.signal import FloatArray
+from study.workflows.diagnosis.write_twin import WrittenTwin
+
+
+def twin_summary(written: WrittenTwin) -> dict[str, Any]:
+    """As one JSON document."""
+    model, fit, tolerance = written.model, written.fit, written.model.tolerance
+    return {
+        "model": str(written.plan.out),
+        "coordinates": model.coordinates,
+        "as_one_piece": {
+            "up_to_hz": written.piece.up_to_hz,
+            "mass_kg": written.piece.mass.tolist(),
+            "damping_n_s_per_m": written.piece.damping.tolist(),
+            "of_friction_n_s_per_m": written.piece.of_friction.tolist(),
+        },
+        "modes_hz": _modes_hz(written),
+        "tolerance": None
+        if tolerance is None
+        else {
+            "mass_kg": tolerance.mass_kg,
+            "damping_n_s_per_m": tolerance.damping_n_s_per_m,
+            "stiffness_n_per_m": tolerance.stiffness_n_per_m,
+            "modes": tolerance.modes,
+        },
+        "band_hz": list(fit.band_hz),
+        "held_out": fit.held_out,
+        "noise": fit.noise,
+        "channels": [
+            {"channel": one.channel, "fit": one.fit, "held_out": one.held_out, "noise": one.noise} for one in fit.errors
+        ],
+        "notes": list(written.notes),
+    }
+
+
+def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
+    """For a person."""
+    model, fit, tolerance = written.model, written.fit, written.model.tolerance
+    piece = written.piece
+    lines = [
+        f"As one piece, up to {piece.up_to_hz:.3g} Hz: mass {_words(piece.mass)} kg{_about(tolerance, 'mass_kg')}, "
+        f"damping {_words(piece.damping)} N s/m, {_words(piece.of_friction)} N s/m of it friction's and taken off"
+        f"{_about(tolerance, 'damping_n_s_per_m')}",
+    ]
+    if modes := _modes_hz(written):
+        swing = ", ".join(f"{each:.3g}" for each in modes)
+        lines.append(f"{model.coordinates} coordinates; what hangs on the driven axes swings at {swing} Hz")
+    for one in fit.errors:
+        held = "" if one.held_out is None else f", {one.held_out:.1%} on what was kept for a test"
+        noise = "" if one.noise is None else f" (noise {one.noise:.1%})"
+        lines.append(f"{one.channel}: error {one.fit:.1%}{held}{noise}, {fit.band_hz[0]:g} to {fit.band_hz[1]:g} Hz")
+    return tuple(lines)
+
+
+def _modes_hz(written: WrittenTwin) -> list[float]:
+    model, m = written.model, written.model.inputs
+    ratio = np.diag(model.stiffness)[m:] / np.diag(model.mass)[m:]
+    return sorted(float(each) for each in np.sqrt(np.maximum(ratio, 0.0)) / (2 * np.pi))
+
+
+def _words(values: FloatArray) -> str:
+    return ", ".join(typeset(f"{value:.3g}") for value in values)
+
+
+def _about(tolerance: Tolerance | None, name: str) -> str:
+    value = None if tolerance is None else getattr(tolerance, name)
+    return "" if value is None else f" (± {value:.2g})"

@@ -1,0 +1,180 @@
+"""A device's nominal mechanical model, as a laboratory would write it down: excited well above friction, fitted, freed
+of what friction put into its dampers, and given tolerances."""
+
+import math
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from equalizer.identification.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical_fit_result import MechanicalFit, MechanicalFitRefused, MechanicalFitSettings
+from equalizer.identification.mechanical_level import AsOnePiece, as_one_piece, without_friction
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.signals.recording import Recording
+from protocols.recording_protocol import RecordingProtocol
+from study.errors import StudyError, WrongUseError
+from study.store.mechanical_model_file import write_mechanical_model
+from study.store.protocol_files import read_recording_protocol
+from study.store.provenance import gather_provenance
+from study.store.recording_file import read_recording
+from study.workflows.free_name import require_free
+from study.workflows.recording.record_device import RecordingPlan, record_device
+
+TITLE = "The model was not made"
+STANDARD_GRAVITY = 9.80665
+SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
+"""ADXL335 as its data sheet has it, behind the capacitors of its board."""
+ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
+"""Current loops as they commonly are."""
+LOWER_LEVEL = 0.6
+"""Of the protocol's: what the damping grows by at less force is friction's."""
+
+
+@dataclass(frozen=True, slots=True)
+class TwinPlan:
+    out: Path
+    device: str = "simulated"
+    seed: int = 1
+    protocol: str = "multisine"
+    """Multisines along every axis: a shipped recording protocol's name, or a file."""
+    band_hz: tuple[float, float] = (3.0, 60.0)
+    """The study's stimuli with room about them; modes above would cost time at each simulation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenTwin:
+    plan: TwinPlan
+    model: MechanicalModel
+    """As written."""
+    fit: MechanicalFit
+    piece: AsOnePiece
+    notes: tuple[str, ...]
+    """Sentences: what was assumed, what friction did."""
+
+
+def write_twin(
+    plan: TwinPlan,
+    on_progress: Callable[[float], None],
+    before_moving: Callable[[str], None] = lambda notice: None,
+) -> WrittenTwin:
+    """Records, fits and writes. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
+    is written then."""
+    check_free(plan)
+    protocol = read_recording_protocol(plan.protocol).protocol
+    _check_protocol(plan, protocol)
+    with tempfile.TemporaryDirectory() as folder:
+        ways = [
+            RecordingPlan(level, plan.device, (0.0, 0.0, 0.0), plan.seed, Path(folder) / f"{name}.h5")
+            for name, level in (("strong", protocol), ("weaker", _lowered(protocol)))
+        ]
+        strong = _recorded(ways[0], lambda share: on_progress(0.15 * share), before_moving)
+        weaker = _recorded(ways[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
+    settings = MechanicalFitSettings(
+        band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
+    )
+    try:
+        fit = fit_mechanical_model([strong], settings, lambda share: on_progress(0.3 + 0.6 * share), plan.device)
+        piece = as_one_piece(fit, strong, weaker, settings)
+    except MechanicalFitRefused as refusal:
+        raise StudyError(
+            TITLE,
+            f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.",
+            "Record more strongly or for longer, or choose another band with --band.",
+            saved="Nothing was written.",
+        ) from refusal
+    model = replace(
+        without_friction(fit.model, piece.of_friction),
+        name=f"{plan.device} omega.3, as identified" if plan.device == "simulated" else f"{plan.device}, as identified",
+        tolerance=piece.tolerance,
+        provenance=_provenance(plan, protocol, strong, fit),
+    )
+    write_mechanical_model(plan.out, model)
+    on_progress(1.0)
+    return WrittenTwin(plan, model, fit, piece, _notes(strong, fit, piece))
+
+
+def check_free(plan: TwinPlan) -> None:
+    """Before anything moves. Raises StudyError."""
+    require_free(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
+    low, high = plan.band_hz
+    if not (math.isfinite(low) and math.isfinite(high) and 0 < low < high):
+        raise WrongUseError(
+            "There is no such band",
+            f"--band is {low:g} to {high:g} Hz; it must rise, from above zero.",
+            "Correct --band.",
+            saved="Nothing moved and nothing was written.",
+        )
+
+
+def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
+    driven = {segment.along for segment in protocol.segments if segment.kind == "multisine"}
+    if not {"x", "y", "z"} <= driven and "all" not in driven:
+        raise WrongUseError(
+            TITLE,
+            f"The protocol {plan.protocol} does not play multisines along x, y and z, so that masses and coupling "
+            "cannot be told.",
+            "Choose the protocol multisine, or one like it.",
+            saved="Nothing moved and nothing was written.",
+        )
+
+
+def _lowered(protocol: RecordingProtocol) -> RecordingProtocol:
+    segments = tuple(replace(one, amplitude_n=LOWER_LEVEL * one.amplitude_n) for one in protocol.segments)
+    return replace(protocol, segments=segments)
+
+
+def _recorded(
+    plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: Callable[[str], None]
+) -> Recording:
+    total = max(plan.total_s, 1e-9)
+    record_device(plan, lambda seconds: on_progress(min(seconds / total, 1.0)), before_moving)
+    return _last_realisation_tests(read_recording(plan.out))
+
+
+def _last_realisation_tests(recording: Recording) -> Recording:
+    """Of every direction the last realisation is kept for the test, where there is more than one."""
+    facts: list[Mapping[str, Any]] = recording.meta["segments"]
+    last: dict[str, int] = {}
+    for fact in facts:
+        last[fact["along"]] = max(last.get(fact["along"], 0), fact["realisation"] or 0)
+    segments = tuple(
+        replace(segment, role="test" if 1 < last[fact["along"]] == fact["realisation"] else "fit")
+        for segment, fact in zip(recording.segments, facts, strict=True)
+    )
+    return replace(recording, segments=segments)
+
+
+def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, fit: MechanicalFit) -> dict[str, Any]:
+    return {
+        **gather_provenance(seeds={"device": plan.seed}, parents=()).as_dict(),
+        "device": plan.device,
+        "protocol": protocol.name,
+        "from": "command, the virtual spring's force in it",
+        "to": "acceleration at the handle",
+        "band_hz": list(fit.band_hz),
+        "sensor": "data sheet",
+        "actuator": "assumed",
+        "held_out_error": fit.held_out,
+        "noise": fit.noise,
+        "feedback": strong.meta.get("feedback"),
+        "reason": fit.reason,
+    }
+
+
+def _notes(strong: Recording, fit: MechanicalFit, piece: AsOnePiece) -> tuple[str, ...]:
+    spring = strong.meta.get("feedback") or {}
+    stiffness = float(spring.get("stiffness_n_per_m", 0.0))
+    return (
+        f"The model is from the whole command to the acceleration: the virtual spring of {stiffness:.0f} N/m pushed as "
+        "a part of the command, so it is not in the model's stiffness.",
+        f"The sensor's bandwidth and range are those of its data sheet; of the current loops {ACTUATOR.bandwidth_hz:g} "
+        "Hz are assumed.",
+        "Cables lie between drives and handle. From force to acceleration nothing tells how the mass is shared between "
+        "their sides: half each is taken.",
+        "Dry friction is no part of a linear model: it reads as extra damping, which shrinks as the force grows. By "
+        f"what changed when the force was lowered to {LOWER_LEVEL:.0%}, "
+        f"{', '.join(f'{each:.3g}' for each in piece.of_friction)} N s/m were friction's, and were taken off.",
+        fit.reason,
+    )

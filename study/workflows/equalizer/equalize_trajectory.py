@@ -1,0 +1,203 @@
+"""From a table of wanted accelerations and models of the device to a table of forces."""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.tracking.feedforward import Feedforward, FeedforwardSettings
+from equalizer.tracking.known_physics import Compensation, compensate
+from equalizer.tracking.limits import ForceLimitError, Peaks, require_within
+from equalizer.tracking.trajectory import TRAJECTORY, Trajectory, require_rate
+from equalizer.tracking.two_models import BandFacts, banded_feedforward
+from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
+from study.errors import StudyError, WrongUseError
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing, peak_gain
+from study.workflows.free_name import require_free
+
+HIGHEST_MPS2 = 1e4
+"""A thousand times gravity: what is wanted beyond it is a slip of the pen."""
+NOT_REACHED = 0.5
+"""Predicted error beyond which forces are no answer to what is wanted."""
+NO_WEIGHT = 1e-7
+"""Root of the weight over the model's gain below which it is lost in rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class EqualizePlan:
+    models: tuple[Path, ...]
+    trajectory: Path
+    out: Path
+    at_m: Vector | None = None
+    weight: float = 1e-3
+    cap_n: float = 3.0
+    constrain: bool = False
+    physics: Path | None = None
+    """Mechanical model whose named effects are compensated."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EqualizedTrajectory:
+    plan: EqualizePlan
+    wanted: Trajectory
+    forces: Trajectory
+    """All that enters the device: a spring's share is still in them."""
+    models: ModelsForPlaying
+    solved: Feedforward
+    """By the models alone."""
+    peaks: Peaks
+    """Of `forces`."""
+    bands: BandFacts | None
+    compensation: Compensation | None
+
+
+def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
+    """Reads, solves and writes. Raises StudyError; nothing is written then."""
+    check_free(plan.out)
+    solved = solve_trajectory(plan)
+    write_trajectory(plan.out, solved.forces)
+    return solved
+
+
+def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
+    """Without writing. Raises StudyError."""
+    wanted = _wanted(plan.trajectory)
+    models = models_for_playing(plan.models, plan.at_m, plan.weight)
+    physics = None if plan.physics is None else read_mechanical_model(plan.physics)
+    amplitude_n = None if physics is None else _amplitude_n(models.nearest)
+    try:
+        require_rate(wanted, models.largest.sample_rate_hz)
+        solved, bands = _solved(plan, wanted, models)
+    except ForceLimitError as limit:
+        raise StudyError(
+            "The forces would be too strong",
+            f"{plan.trajectory.name}: {limit}.",
+            "Scale the accelerations, give --constrain, or raise --cap for a device that no hand holds.",
+            saved="Nothing was written.",
+        ) from limit
+    except ValueError as problem:
+        _require_weight(plan, models)
+        raise _not_equalized(f"{plan.trajectory.name}: {problem}.") from problem
+    _require_reached(plan, solved, in_bands=bands is not None)
+    compensation = None
+    if physics is not None:
+        compensation = _compensated(plan, solved, models.largest, physics, amplitude_n)
+    samples = solved.forces.samples if compensation is None else compensation.forces
+    forces = replace(solved.forces, samples=samples)
+    peaks = require_within(samples, plan.cap_n, forces.sample_rate_hz)
+    return EqualizedTrajectory(
+        plan, wanted, Trajectory(forces, wanted.start_s), models, solved, peaks, bands, compensation
+    )
+
+
+def check_free(out: Path, *more: Path) -> None:
+    """Before any work. Raises StudyError."""
+    require_free(out, *more, title="The forces were not computed", kind="tables")
+
+
+def _wanted(path: Path) -> Trajectory:
+    trajectory = read_trajectory(path)
+    if trajectory.kind is not TRAJECTORY:
+        raise WrongUseError(
+            "This is no table of accelerations",
+            f"{path.name} holds {trajectory.kind.name}; its header must be {','.join(TRAJECTORY.header)}.",
+            "Give the wanted accelerations in m/s^2, as the last file.",
+            saved="Nothing was written.",
+        )
+    sizes = np.abs(trajectory.signal.samples)
+    if not sizes.max() <= HIGHEST_MPS2:
+        row, axis = np.unravel_index(int(sizes.argmax()), sizes.shape)
+        found = trajectory.signal.samples[row, axis]
+        raise _not_equalized(
+            f"{path.name} wants {found:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; no more than "
+            f"{HIGHEST_MPS2:g} m/s^2 is taken for an acceleration."
+        )
+    return trajectory
+
+
+def _require_weight(plan: EqualizePlan, models: ModelsForPlaying) -> None:
+    if math.sqrt(plan.weight) < NO_WEIGHT * max(peak_gain(model) for model in models.given):
+        raise StudyError(
+            "The forces were not computed",
+            f"With --weight {plan.weight:g} nothing keeps forces finite that the model hardly answers.",
+            "Give a weight above zero, such as --weight 0.001.",
+            saved="Nothing was written.",
+        )
+
+
+def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) -> None:
+    """Where the cap costs something the loss is stated: without the cap what is wanted must be in reach."""
+    missed = solved.error if solved.loss is None else solved.loss.error_free
+    if not missed <= NOT_REACHED and in_bands:
+        raise StudyError(
+            "The forces were not computed",
+            f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: three bands have "
+            "to run in and out, and the table begins or ends too close to it.",
+            "Put 3 s of zeros before and after what is wanted, or give one model.",
+            saved="Nothing was written.",
+        )
+    if not missed <= NOT_REACHED:
+        raise StudyError(
+            "The forces were not computed",
+            f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: along some "
+            f"direction it answers hardly anything, for --weight {plan.weight:g}.",
+            "Check units and axes of the recording that it was made from and identify it again, or lower --weight.",
+            saved="Nothing was written.",
+        )
+
+
+def _solved(plan: EqualizePlan, wanted: Trajectory, models: ModelsForPlaying) -> tuple[Feedforward, BandFacts | None]:
+    settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
+    if models.two is None:
+        return feedforward_at(models.at, wanted.signal, settings), None
+    banded = banded_feedforward(models.two, wanted.signal, settings)
+    return banded.feedforward, banded.facts
+
+
+def _amplitude_n(model: IdentifiedModel) -> float | None:
+    """With which force the model was identified; None = on recordings that were freed of the effects."""
+    found = model.provenance.get("amplitude_n", 0.0)
+    if found is None:
+        return None
+    if not found > 0:
+        raise StudyError(
+            "Known physics cannot be compensated with this model",
+            "The model does not say with which force it was identified, and friction acts on it by that force: some of "
+            "it is in the model already and would be counted twice.",
+            "Identify it again from recordings whose segments say their amplitude, or leave out --physics.",
+            saved="Nothing was written.",
+        )
+    return float(found)
+
+
+def _compensated(
+    plan: EqualizePlan,
+    solved: Feedforward,
+    model: IdentifiedModel,
+    physics: MechanicalModel,
+    amplitude_n: float | None,
+) -> Compensation:
+    try:
+        found = compensate(solved.forces.samples, solved.wanted, model, physics, amplitude_n, plan.cap_n)
+    except ValueError as problem:
+        raise StudyError(
+            "The known physics do not go with the model",
+            f"{plan.physics}: {problem}.",
+            "Correct the [[effect]] sections, or leave out --physics.",
+            saved="Nothing was written.",
+        ) from problem
+    return found
+
+
+def _not_equalized(happened: str) -> StudyError:
+    return StudyError(
+        "The forces were not computed",
+        happened,
+        "Correct what is named, or give a table and a model that go together.",
+        saved="Nothing was written.",
+    )

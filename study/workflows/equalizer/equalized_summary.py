@@ -1,0 +1,162 @@
+"""What an equalized table is worth, for a person's lines and a program's JSON alike."""
+
+from typing import Any
+
+import numpy as np
+
+from equalizer.plant.model_quality import quality_document, quality_sentence
+from equalizer.tracking.feedforward import within_band
+from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
+
+WORTH_SAYING = 0.01
+"""Share of what is wanted that may be left out without a word."""
+
+
+def summary(done: EqualizedTrajectory) -> dict[str, Any]:
+    solved, bands, compensation = done.solved, done.bands, done.compensation
+    found: dict[str, Any] = {
+        "forces": str(done.plan.out),
+        "quality": quality_document(done.models.quality),
+        "quality_of_models": [quality_document(model.quality) for model in done.models.given],
+        "band_hz": list(done.models.band_hz),
+        "predicted_error": predicted_error(done),
+        "left_out": solved.left_out,
+        "peak_n": done.peaks.peak_n,
+        "cap_n": done.peaks.cap_n,
+        "capped": None,
+        "place_m": list(done.models.at.place_m),
+        "remarks": [*done.models.held_out, *done.models.remarks],
+    }
+    if solved.loss is not None:
+        found["capped"] = {
+            "error_free": solved.loss.error_free,
+            "error_capped": solved.loss.error_capped,
+            "error_clipped": solved.loss.error_clipped,
+        }
+    found |= _interpolated(done)
+    if bands is not None:
+        found["bands"] = {
+            "edges_hz": list(bands.edges_hz),
+            "middle_error_if_only_cut": bands.cut_error,
+            "middle_error_with_run_in": bands.whole_error,
+            "high_level_error": bands.level_error,
+            "high_direction": list(bands.direction),
+            "travel_m": bands.travel_m,
+        }
+    if compensation is not None:
+        found["compensated"] = [effect.kind for effect in compensation.used]
+        found["not_compensated"] = {effect.kind: why for effect, why in compensation.not_used}
+        found["compensated_share"] = compensation.share
+    return found
+
+
+def _interpolated(done: EqualizedTrajectory) -> dict[str, Any]:
+    choice = done.models.choice
+    if choice is None:
+        return {}
+    return {
+        "interpolation": choice.interpolation,
+        "held_out": [
+            {
+                "place_m": list(check.place_m),
+                "blended_held_out_error": check.blended_error,
+                "modal_held_out_error": check.modal_error,
+            }
+            for check in choice.checks
+        ],
+    }
+
+
+def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
+    solved = done.solved
+    lines = [*_quality_lines(done), *done.models.held_out, _predicted_line(done), *done.models.remarks]
+    lines += _band_lines(done)
+    if solved.left_out > WORTH_SAYING:
+        lines.append(
+            f"{100 * solved.left_out:.0f} % of what is wanted (rms) lies outside the "
+            f"{'bands' if done.bands else 'band'} and is not played."
+        )
+    if solved.loss is not None and done.bands is None and (outside := _force_outside(done)) > WORTH_SAYING:
+        lines.append(
+            f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
+            "band, where the model does not know what the device makes of it."
+        )
+    lines += _physics_lines(done)
+    lines.append(_spring_line(done))
+    return tuple(lines)
+
+
+def _quality_lines(done: EqualizedTrajectory) -> list[str]:
+    """What was measured of the models comes before what they predict of themselves."""
+    models = done.models
+    known = models.quality
+    if len(models.given) == 1:
+        return [quality_sentence(known), *(known.remarks if known else ())]
+    where = "narrower" if models.two is not None else "nearest"
+    nearest, worst = models.nearest.quality, known
+    lines = [f"Of the {where} model: {quality_sentence(nearest)}"]
+    if worst != nearest:
+        lines.append(f"Of the worst of the {len(models.given)} models: {quality_sentence(worst)}")
+    return [*lines, *dict.fromkeys(remark for one in (nearest, worst) if one for remark in one.remarks)]
+
+
+def predicted_error(done: EqualizedTrajectory) -> float:
+    """Under a cap that costs something, the figure that can be compared with those without it: corners count too."""
+    loss = done.solved.loss
+    return done.solved.error if loss is None else loss.error_capped
+
+
+def _predicted_line(done: EqualizedTrajectory) -> str:
+    loss, (low, high) = done.solved.loss, done.models.band_hz
+    who = "the model itself predicts" if len(done.models.given) == 1 else "the models themselves predict"
+    cost = ""
+    if loss is not None:
+        cost = (
+            f" under the cap, {100 * loss.error_free:.2f} % without it (clipping would have given "
+            f"{100 * loss.error_clipped:.2f} %)"
+        )
+    return (
+        f"As {who}: error {100 * predicted_error(done):.2f} % of what is wanted within {low:g} to {high:g} Hz{cost}; "
+        f"highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
+    )
+
+
+def _force_outside(done: EqualizedTrajectory) -> float:
+    forces = done.forces.signal.samples
+    outside = forces - within_band(done.models.nearest, forces)
+    return float(np.linalg.norm(outside) / np.linalg.norm(forces))
+
+
+def _band_lines(done: EqualizedTrajectory) -> list[str]:
+    bands, two = done.bands, done.models.two
+    if bands is None or two is None:
+        return []
+    low, high = bands.edges_hz
+    lines = [
+        f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower model "
+        f"up to {high:g} Hz, from there to {two.wide.band_hz[1]:g} Hz of the loudness alone, all along one direction.",
+        f"The bands begin before the table's first row and end after its last; only its rows are written, and the "
+        f"middle band is solved for them. Its error with all of it played would be {100 * bands.whole_error:.2f} %, "
+        f"were the rest only cut off {100 * bands.cut_error:.2f} %.",
+    ]
+    if bands.level_error is not None:
+        lines.append(
+            f"Loudness of the high band, compared sixth by sixth of an octave: {100 * bands.level_error:.1f} % off."
+        )
+    return lines
+
+
+def _physics_lines(done: EqualizedTrajectory) -> list[str]:
+    compensation = done.compensation
+    if compensation is None:
+        return []
+    share = f"; {100 * compensation.share:.0f} % of it fits under the cap" if compensation.share < 1 else ""
+    used = ", ".join(effect.kind for effect in compensation.used) or "nothing"
+    lines = [f"Compensated: {used}{share}."]
+    return lines + [f"Not compensated: {effect.kind}: {why}." for effect, why in compensation.not_used]
+
+
+def _spring_line(done: EqualizedTrajectory) -> str:
+    if done.models.nearest.provenance.get("input") == "excitation":
+        return "These forces are for the device under the spring that it was recorded with."
+    return "These forces are all that enters the device: a spring that holds the handle is not counted."

@@ -1,0 +1,42 @@
+"""What is said of an identified device: lines for a person, a document for a program."""
+
+from typing import Any
+
+from equalizer.plant.model_quality import quality_document, quality_sentence
+from study.workflows.equalizer.identify_model import IdentifiedDevice
+
+
+def summary(device: IdentifiedDevice) -> dict[str, Any]:
+    """The figures, for a person's lines and a program's JSON alike."""
+    model, tested = device.model, device.tested
+    low, high = model.band_hz
+    return {
+        "model": str(device.plan.out),
+        "quality": quality_document(model.quality),
+        "order": model.order,
+        "band_hz": [low, high],
+        "spectral_radius": model.spectral_radius,
+        "lines": device.identified.lines,
+        "rms_relative_error": device.identified.rms_relative_error,
+        "worst_relative_error": device.identified.worst_relative_error,
+        "held_out_error": tested.error if tested else None,
+        "held_out_noise": tested.noise if tested else None,
+        "held_out_s": tested.seconds if tested else None,
+        "freed_of": model.provenance["freed_of"],
+        "remarks": list(device.remarks),
+    }
+
+
+def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
+    found = summary(device)
+    low, high = found["band_hz"]
+    lines = [
+        quality_sentence(device.model.quality),
+        f"Order {found['order']}, {low:g} to {high:g} Hz, stable (slowest pole {found['spectral_radius']:.5f}), "
+        f"from {found['lines']} lines.",
+        f"Model against estimate: {100 * found['rms_relative_error']:.2f} % rms, worst line "
+        f"{100 * found['worst_relative_error']:.2f} %; the estimate's own noise is in both.",
+    ]
+    if found["freed_of"]:
+        lines.append(f"The recordings were freed of {', '.join(found['freed_of'])}; play with --physics.")
+    return tuple(lines)

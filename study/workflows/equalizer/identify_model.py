@@ -1,0 +1,197 @@
+"""From recordings to a model file: estimate, fit, test on what was kept for it, and a page that shows it all."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.held_out import HeldOut, held_out
+from equalizer.identification.identify import Identified
+from equalizer.identification.identify_recordings import IdentifiedRecordings, identify_recordings
+from equalizer.identification.misfit import misfit_of_estimate
+from equalizer.identification.misfit_causes import held_out_remarks
+from equalizer.identification.refusals import IdentificationRefused
+from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.transfer_estimate import TransferEstimateError
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.model_quality import ModelQuality, model_quality
+from equalizer.signals.recording import Recording
+from study.errors import StudyError, WrongUseError
+from study.store.identified_model_file import write_identified_model
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.provenance import gather_provenance
+from study.store.recording_file import read_recording
+from study.workflows.equalizer.freed_recordings import freed_of, freed_recordings
+from study.workflows.free_name import require_free
+
+NEAR_M = 0.001
+"""Places farther apart than this are two places, and a model is of one."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifyPlan:
+    recordings: tuple[Path, ...]
+    out: Path
+    band_hz: tuple[float, float] = (5.0, 35.0)
+    order: int = 26
+    smooth: bool | None = None
+    """Local polynomials over neighbouring lines before the fit; None: where lines scatter more than their noise, as
+    they do on a device that is not linear, whose distortions are no noise."""
+    with_spring: bool = False
+    """From the excitation, with the spring's force a part of the device: for playing under the same spring, without
+    trusting encoders to see what the handle does."""
+    physics: Path | None = None
+    """Mechanical model whose named effects are taken off the recordings: the model is then of the linear rest."""
+    longest_decay_s: float | None = None
+    """No pole dies out slower; None: the ordinary bound, and longer where the recordings ask for it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentifiedDevice:
+    """What was written, and everything that a page about it needs."""
+
+    plan: IdentifyPlan
+    recordings: tuple[Recording, ...]
+    estimate: FrequencyResponse
+    fitted: FrequencyResponse
+    """What the model was fitted to: the estimate, or its local averages."""
+    identified: Identified
+    model: IdentifiedModel
+    tested: HeldOut | None
+    """On recordings that are as those that were fitted: freed of known physics, where there are such."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences."""
+        known = self.model.quality.remarks if self.model.quality else ()
+        return (*known, *(_sentence(remark) for remark in self.estimate.remarks))
+
+
+def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
+    """Reads, estimates, fits and writes. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    settings = _settings(plan)
+    check_free(plan.out)
+    recordings = tuple(read_recording(path) for path in plan.recordings)
+    _check_alike(recordings, plan.with_spring)
+    if plan.with_spring:
+        recordings = tuple(_from_excitation(recording) for recording in recordings)
+    physics = None if plan.physics is None else read_mechanical_model(plan.physics)
+    if plan.physics is not None and physics is not None:
+        recordings = freed_recordings(recordings, physics, plan.physics)
+    try:
+        found = identify_recordings(recordings, settings, plan.smooth, on_progress)
+        model = _at_place(plan, recordings, found.identified.model, physics)
+        tested = held_out(model, recordings)
+        model = replace(model, quality=_quality(found, recordings, tested))
+    except (TransferEstimateError, IdentificationRefused) as refusal:
+        raise _no_model(str(refusal)) from refusal
+    except np.linalg.LinAlgError as problem:
+        raise _no_model(
+            f"The fit broke down ({str(problem).rstrip('.')}): an output answers nothing, or order {plan.order} is "
+            "more than these lines carry."
+        ) from problem
+    except ValueError as problem:
+        raise _no_model(f"{problem}.") from problem
+    write_identified_model(plan.out, model)
+    return IdentifiedDevice(plan, recordings, found.estimate, found.fitted, found.identified, model, tested)
+
+
+def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], tested: HeldOut | None) -> ModelQuality:
+    """The misfit is that of the lines themselves, even where the fit was made to local averages."""
+    identified, estimate = found.identified, found.estimate
+    misfit = misfit_of_estimate(identified.model, estimate)
+    remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
+    measured = None if tested is None else (tested.error, tested.noise, tested.seconds)
+    said = tuple(_sentence(remark) for remark in remarks)
+    return model_quality(misfit.error, identified.scatter, measured, said, misfit.most)
+
+
+def _sentence(remark: str) -> str:
+    return f"{remark[:1].upper()}{remark[1:].rstrip('.')}."
+
+
+def check_free(out: Path) -> None:
+    """Before any work. Raises StudyError."""
+    require_free(out, title="The model was not made", kind="models")
+
+
+def _settings(plan: IdentifyPlan) -> IdentificationSettings:
+    try:
+        return IdentificationSettings(plan.band_hz, plan.order, plan.longest_decay_s)
+    except ValueError as problem:
+        raise WrongUseError(
+            "There is no such model",
+            f"{problem}.",
+            "Correct --band, --order or --longest-decay.",
+            saved="Nothing was written.",
+        ) from problem
+
+
+def _at_place(
+    plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel, physics: MechanicalModel | None
+) -> IdentifiedModel:
+    """With the place where all recordings were made, and where they come from."""
+    provenance = {
+        **model.provenance,
+        **gather_provenance(parents=(*plan.recordings, *([plan.physics] if plan.physics else []))).as_dict(),
+        "device": recordings[0].device,
+        "hand": sorted({str(recording.meta.get("hand", "")) for recording in recordings}),
+        "feedback": recordings[0].meta.get("feedback"),
+        "input": "excitation" if plan.with_spring else "command",
+        # None: whoever compensates these effects adds them whole, for nothing of them is in the model.
+        "amplitude_n": _amplitude_n(recordings) if physics is None else None,
+        "freed_of": [] if physics is None else freed_of(physics),
+    }
+    return replace(model, place_m=_place(recordings), provenance=provenance)
+
+
+def _amplitude_n(recordings: Sequence[Recording]) -> float:
+    """The largest of the segments that were fitted: friction left its equivalent at that amplitude in the model."""
+    segments = (segment for recording in recordings for segment in recording.segments if segment.role != "test")
+    return max((segment.amplitude for segment in segments), default=0.0)
+
+
+def _check_alike(recordings: Sequence[Recording], with_spring: bool) -> None:
+    """One model is of one device: with a hand or without, and under one spring where that is a part of it."""
+    found = {"the hand on the handle": {str(r.meta["hand"]) for r in recordings if r.meta.get("hand") is not None}}
+    if with_spring:
+        found["the spring"] = {_spring_words(r.meta.get("feedback")) for r in recordings}
+    for name, values in found.items():
+        if len(values) > 1:
+            raise _no_model(f"The recordings differ in {name} ({'; '.join(sorted(values))}); identify each by itself.")
+
+
+def _spring_words(feedback: object) -> str:
+    if not isinstance(feedback, dict):
+        return "none"
+    stiffness, damping = (float(feedback.get(key, 0.0)) for key in ("stiffness_n_per_m", "damping_n_s_per_m"))
+    return f"{stiffness:.3g} N/m, {damping:.3g} N s/m"
+
+
+def _from_excitation(recording: Recording) -> Recording:
+    """As if the feedback were a part of the device: what was decided beforehand is what enters it."""
+    if recording.excitation is None:
+        raise _no_model("The recording does not hold its excitation, so the spring's share is not known.")
+    return replace(recording, command=recording.excitation)
+
+
+def _place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
+    places = [recording.meta["place_m"] for recording in recordings if recording.meta.get("place_m") is not None]
+    if not places:
+        return None
+    if np.ptp(np.array(places, dtype=float), axis=0).max() > NEAR_M:
+        raise ValueError("the recordings were made at different places; identify one model per place")
+    x, y, z = (float(component) for component in places[0])
+    return x, y, z
+
+
+def _no_model(happened: str) -> StudyError:
+    return StudyError(
+        "No model can be made from these recordings",
+        happened[:1].upper() + happened[1:],
+        "Record what is missing (hapteq record), or ask for another --band or --order.",
+        saved="Nothing was written.",
+    )

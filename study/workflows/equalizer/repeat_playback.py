@@ -1,0 +1,159 @@
+"""Play forces, compare what was measured with what was wanted, correct, play again: `hapteq equalize --repeat N`."""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.band_part import band_part
+from equalizer.tracking.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
+from equalizer.tracking.model_inverse import under_spring
+from equalizer.tracking.padding import CAUSAL
+from equalizer.tracking.trajectory import FORCES
+from study.devices.clock import RealClock, VirtualClock
+from study.devices.device import Device, Fault, Played
+from study.devices.opening import DEVICES, open_device
+from study.errors import DeviceError, LeftError, StudyError
+from study.session.limits import SPRING_SLEW_N_PER_S
+from study.store.repeats_file import beside
+from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, repeated, write_repeated
+
+REST_S = 2.0
+"""At rest before the first play, to hear the sensor's noise."""
+AGAIN = "Start again; a run for the same trajectory and model can go on from forces that were written."
+
+OnProgress = Callable[[int, float], None]
+"""Told the play, from 0, and the share of it that is over."""
+
+
+def repeat_playback(plan: RepeatPlan, on_progress: OnProgress) -> Repeated:
+    """Interrupted (KeyboardInterrupt) or left by the device, the best so far is written and the error says so.
+
+    Raises StudyError before anything moves for a person on the handle, forces above the cap, a name that is taken.
+    """
+    _check(plan)
+    clock = VirtualClock() if plan.device in DEVICES else RealClock()
+    with contextlib.closing(open_device(plan.device, plan.settings, clock, plan.seed)) as device:
+        played: list[Played] = []
+        states: list[IterationState] = []
+        try:
+            _play_all(plan, device, states, played, on_progress)
+        except KeyboardInterrupt as interruption:
+            saved = _write_best(plan, states, played)
+            if device.fault() is Fault.FORCE_LEFT:
+                raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, saved) from None
+            happened = f"{len(played)} of up to {plan.repeats + 1} plays were measured; the force was released."
+            raise LeftError("Interrupted", happened, AGAIN, saved) from interruption
+        except DeviceError as error:
+            error.saved = _write_best(plan, states, played)
+            raise
+        write_repeated(plan, states[-1], interrupted=False)
+        return repeated(plan, states[-1], played)
+
+
+def _check(plan: RepeatPlan) -> None:
+    if plan.settings.hand_on_handle:
+        raise _refused(
+            "A person would hold the handle. Repeats learn what one hand did in one play, and play it to the next.",
+            "Take the hand off the handle and open the device without one.",
+        )
+    if plan.repeats < 1:
+        raise _refused(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
+    for path in () if plan.out is None else (plan.out, beside(plan.out)):
+        if path.exists():
+            raise _refused(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
+    if plan.out is not None and not plan.out.absolute().parent.is_dir():
+        raise _refused(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
+
+
+def _refused(happened: str, do_now: str) -> StudyError:
+    return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")
+
+
+def _play_all(
+    plan: RepeatPlan,
+    device: Device,
+    states: list[IterationState],
+    played: list[Played],
+    on_progress: OnProgress,
+) -> None:
+    begun = _begun(plan, device)
+    rest = _measured(_play(device, np.zeros((round(REST_S * device.info.sample_rate_hz), 3)), lambda _: None))
+    repetition = replace(begun.repetition, noise_floor=noise_of_rest(rest, begun.repetition))
+    states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
+    while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:
+        number = len(played)
+        one = _play(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
+        measured = _measured(one)
+        played.append(one)
+        states.append(next_forces(states[-1], measured))
+
+
+def _begun(plan: RepeatPlan, device: Device) -> IterationState:
+    signal, rate_hz = plan.wanted.signal, device.info.sample_rate_hz
+    if signal.sample_rate_hz != rate_hz:
+        raise _refused(
+            f"The trajectory is at {signal.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz.",
+            "Resample the trajectory to the device's rate.",
+        )
+    after = CAUSAL.samples(rate_hz)[1]
+    wanted = np.pad(signal.samples, ((0, after), (0, 0)))
+    invert = under_spring(plan.inverse(len(wanted)), plan.spring, rate_hz, plan.band_hz)
+    inside, limits = band_part(wanted, rate_hz, plan.band_hz), plan.settings.limits
+    repetition = Repetition(
+        wanted=inside,
+        invert=invert,
+        sample_rate_hz=rate_hz,
+        band_hz=plan.band_hz,
+        first_gain=plan.first_gain,
+        cap=limits.stimulus_cap_n,
+        slew=max(0.0, limits.slew_n_per_s - SPRING_SLEW_N_PER_S),
+        judged=(0, len(signal)),
+    )
+    try:
+        if plan.first is None:
+            return begin(repetition)
+        if plan.first.shape != signal.samples.shape:
+            raise ValueError(f"forces of shape {plan.first.shape} do not go with {len(signal)} rows")
+        # What follows the last row is in no table: the model's own.
+        return begin(repetition, np.vstack([plan.first, invert(inside)[len(signal) :]]))
+    except ValueError as error:
+        raise _refused(
+            f"{str(error)[:1].upper()}{str(error)[1:]}.", "Make the trajectory smaller, or correct it."
+        ) from error
+
+
+def _play(device: Device, forces: FloatArray, on_progress: Callable[[float], None]) -> Played:
+    commands = Signal(forces, device.info.sample_rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
+    return device.play(commands, on_progress)
+
+
+def _measured(played: Played) -> FloatArray:
+    """The accelerometer's own rows. Raises DeviceError where corrections from them would be wrong."""
+    health = played.health
+    if played.recording is None or health.fault is not Fault.NONE:
+        raise DeviceError("The device let go", f"While repeating: {health.fault.value}.", "Check the device.")
+    spoilt = {
+        "the accelerometer clipped": health.sensor_clipped,
+        "the force was limited": health.stimulus_clipped
+        + health.feedback_clipped
+        + health.total_clipped
+        + health.slew_limited,
+        "ticks were missed": health.missed_ticks,
+    }
+    if found := [f"{what} ({count} samples)" for what, count in spoilt.items() if count]:
+        raise DeviceError(
+            "A play cannot be learnt from",
+            f"In it {' and '.join(found)}: what was measured does not say what the forces do.",
+            "Make the trajectory smaller, or the limits wider if they are meant to be.",
+        )
+    return played.recording.response.samples
+
+
+def _write_best(plan: RepeatPlan, states: list[IterationState], played: list[Played]) -> str:
+    if plan.out is None or not (states and states[-1].residuals):
+        return "Nothing was written."
+    write_repeated(plan, states[-1], interrupted=True)
+    return f"The best forces of {len(played)} plays are in {plan.out}."

@@ -1,0 +1,224 @@
+"""Forces for a table, corrected on the device: solved by the model, tested for convergence, played, improved."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.band_part import band_part
+from equalizer.tracking.convergence import Convergence
+from equalizer.tracking.iteration import LOWEST_GAIN, Verdict, fitting_share
+from equalizer.tracking.model_inverse import under_spring
+from equalizer.tracking.virtual_spring import VirtualSpring
+from equalizer.tracking.workspace.convergence_at_place import convergence_at
+from equalizer.tracking.workspace.feedforward_at_place import inverse_at
+from study.devices.device import DeviceSettings
+from study.errors import StudyError
+from study.session.limits import SPRING_SLEW_N_PER_S, Limits
+from study.store.repeats_file import beside
+from study.workflows.equalizer.equalize_trajectory import (
+    EqualizedTrajectory,
+    EqualizePlan,
+    check_free,
+    solve_trajectory,
+)
+from study.workflows.equalizer.equalized_summary import summary, summary_lines
+from study.workflows.equalizer.models_for_playing import ModelsForPlaying
+from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback
+from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
+from study.workflows.equalizer.spring_beside_model import spring_beside
+
+SPRING_HZ = 3.5
+"""As in the shipped recordings, for a model that does not say under which spring it was recorded."""
+SPRING_ROOM_N = 1.5
+HAND_CAP_N = 3.0
+SAFE_SHARE = 0.9
+"""Of the largest gain with which every error shrinks."""
+
+
+@dataclass(frozen=True, slots=True)
+class RepeatOrder:
+    repeats: int
+    device: str
+    earlier: Path | None = None
+    """Table of forces of an earlier run, to go on from."""
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RepeatedTrajectory:
+    solved: EqualizedTrajectory
+    order: RepeatOrder
+    repeated: Repeated
+    tested: Convergence | None
+    """None where the models do not say how well they are known."""
+    gain: float
+
+
+def repeat_trajectory(plan: EqualizePlan, order: RepeatOrder, on_progress: OnProgress) -> RepeatedTrajectory:
+    """Writes forces and repeats. Raises StudyError, before anything moves for what could not be repeated."""
+    check_free(plan.out, beside(plan.out))
+    solved = solve_trajectory(plan)
+    _require_repeatable(solved.models)
+    if solved.solved.loss is not None:
+        raise _refused(
+            "The forces are at the cap already, so that there is no room to correct them.",
+            "Scale the accelerations, or leave out --constrain or --repeat.",
+        )
+    spring = _acting_spring(solved.models)
+    tested = convergence_at(solved.models.at, plan.weight, spring)
+    gain = _gain(tested)
+    repeat_plan = RepeatPlan(
+        wanted=solved.wanted,
+        inverse=inverse_at(solved.models.at, plan.weight),
+        band_hz=solved.models.band_hz,
+        model_sha256=solved.models.sha256,
+        settings=_settings(plan, solved.models),
+        device=order.device,
+        repeats=order.repeats,
+        first_gain=gain,
+        spring=spring,
+        first=_first(solved, order, spring),
+        seed=order.seed,
+        out=plan.out,
+    )
+    return RepeatedTrajectory(solved, order, repeat_playback(repeat_plan, on_progress), tested, gain)
+
+
+def repeated_summary(done: RepeatedTrajectory) -> dict[str, Any]:
+    found = done.repeated
+    return {
+        **summary(done.solved),
+        "peak_n": _peak_n(found),
+        "repeats": str(beside(done.solved.plan.out)),
+        "errors": list(found.errors),
+        "noise_floor": found.noise_floor,
+        "kept": found.kept,
+        "verdict": found.verdict.name.lower(),
+        "remark": found.remark,
+        "gain": done.gain,
+        "surviving_error": None if done.tested is None else float(done.tested.surviving.max()),
+    }
+
+
+def repeated_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
+    found = done.repeated
+    *alone, _ = summary_lines(done.solved)  # the last is about forces that no spring adds to
+    lines = [*alone, _tested_line(done)]
+    for number, error in enumerate(found.errors):
+        kept = ", kept" if number == found.kept else ""
+        lines.append(f"Play {number}: error {100 * error:.2f} % as measured{kept}.")
+    lines.append(f"Noise alone: {100 * found.noise_floor:.2f} %. {_verdict(done)}")
+    if found.remark:
+        lines.append(f"{found.remark[:1].upper()}{found.remark[1:]}.")
+    strongest = f"The highest of the kept forces is {_peak_n(found):.3g} N"
+    return (*lines, f"{strongest}; they are for the device under the spring that they were played under.")
+
+
+def _peak_n(found: Repeated) -> float:
+    return float(np.linalg.norm(found.forces.signal.samples, axis=1).max())
+
+
+def _verdict(done: RepeatedTrajectory) -> str:
+    found = done.repeated
+    if found.verdict is Verdict.BEST_KEPT and len(found.errors) > done.order.repeats:
+        return "All repeats were played; the best forces are kept."
+    return f"{found.verdict.value[:1].upper()}{found.verdict.value[1:]}."
+
+
+def _tested_line(done: RepeatedTrajectory) -> str:
+    if done.tested is None:
+        return "Convergence was not tested before playing: the model does not hold how well it is known."
+    return (
+        f"If the device is linear and within the models, at most {100 * done.tested.surviving.max():.1f} % of an error "
+        f"survives a repeat ({done.tested.worst_hz:.1f} Hz); friction lets more survive. Gain {done.gain:.2f}."
+    )
+
+
+def _require_repeatable(models: ModelsForPlaying) -> None:
+    if models.two is not None:
+        raise _refused(
+            "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",
+            "Give the one model whose band shall be repeated.",
+        )
+    if any("held" in model.provenance.get("hand", ()) for model in models.given):
+        raise _refused(
+            "The model was recorded with a hand on the handle. Repeats learn what one hand did in one play, and play "
+            "it to the next.",
+            "Take a model of the device alone, and leave the handle alone.",
+        )
+
+
+def _acting_spring(models: ModelsForPlaying) -> VirtualSpring:
+    """Under which the device is played, and which is not in the model."""
+    feedback = _feedback(models)
+    acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
+    if not feedback:
+        raise _refused(
+            "The model does not say under which spring it was recorded, so the spring's share of the forces is not "
+            "known.",
+            "Identify it from recordings that hapteq record made.",
+        )
+    return spring_beside(models.nearest, acting)
+
+
+def _feedback(models: ModelsForPlaying) -> dict[str, Any]:
+    found = models.nearest.provenance.get("feedback")
+    return found if isinstance(found, dict) else {}
+
+
+def _gain(tested: Convergence | None) -> float:
+    if tested is None:
+        return 1.0
+    gain = min(1.0, SAFE_SHARE * tested.safe_beta)
+    if gain < LOWEST_GAIN:
+        raise _refused(
+            f"Repeats would not converge: at {tested.worst_hz:.1f} Hz {tested.surviving.max():.2f} of an error can "
+            "survive each, by what the device may be within the models.",
+            "Record and identify at the place itself, or with more sweeps.",
+        )
+    return gain
+
+
+def _settings(plan: EqualizePlan, models: ModelsForPlaying) -> DeviceSettings:
+    """The spring of the recordings; steps up to what forces at the upper end of the band do at the cap."""
+    feedback = _feedback(models)
+    steepest = 2 * math.pi * models.band_hz[1] * plan.cap_n
+    return DeviceSettings(
+        limits=Limits(
+            stimulus_cap_n=plan.cap_n,
+            total_cap_n=plan.cap_n + SPRING_ROOM_N,
+            slew_n_per_s=2 * steepest + SPRING_SLEW_N_PER_S,
+            longest_hold_s=600.0,
+            watchdog_s=0.5,
+            release_s=0.05,
+            feedback_cap_n=plan.cap_n + SPRING_ROOM_N,  # no hand is there; beyond its cap the spring stretches further
+        ),
+        spring_frequency_hz=float(feedback.get("natural_frequency_hz", SPRING_HZ)),
+        spring_damping_n_s_per_m=float(feedback.get("damping_n_s_per_m", 0.0)),
+        keep_s=1.0,
+        hand_on_handle=False,
+        place_m=models.at.place_m,
+        beyond_hand_ceiling=plan.cap_n > HAND_CAP_N,
+    )
+
+
+def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
+    """None = the model's own, which the first play computes together with what follows the last row."""
+    if order.earlier is not None:
+        return earlier_forces(order.earlier, solved.wanted, solved.models.sha256)
+    if solved.compensation is None:
+        return None
+    rate_hz, band_hz = solved.wanted.signal.sample_rate_hz, solved.models.band_hz
+    forces = solved.forces.signal.samples
+    wanted = band_part(solved.wanted.signal.samples, rate_hz, band_hz)
+    held = under_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(wanted)
+    # Forces at the cap leave no room to carry the spring too; what then lacks is an error like any other.
+    return forces + fitting_share(forces, held, solved.plan.cap_n) * held
+
+
+def _refused(happened: str, do_now: str) -> StudyError:
+    return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")

@@ -1,0 +1,237 @@
+"""docs/formats.md, docs/importing.md and docs/schemas/*.json, made from the code that reads and writes the files.
+
+`python -m study.workflows.files.format_docs docs` writes them again; a test says when that is due.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from pydantic import TypeAdapter
+
+from analysis.diagnosis import document
+from analysis.diagnosis.result import real_answer
+from analysis.reproduction import document as reproduction_document
+from analysis.thresholds import Threshold
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
+from equalizer.signals.units import ALLOWED
+from equalizer.tracking.trajectory import STEP_TOLERANCE, TABLE_KINDS
+from protocols.schema import protocol_schema
+from protocols.trial import Trial
+from study.session.live import Live
+from study.store import (
+    identified_model_file,
+    live_file,
+    log_seal,
+    mechanical_model_file,
+    recording_layout,
+    repeats_file,
+)
+from study.store.csv_rows import columns, in_words
+from study.store.layout import Entry
+from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
+from study.store.text_file import write_text
+from study.workflows.files.importing_docs import importing_markdown
+from study.workflows.files.law_docs import LAWS
+from study.workflows.files.session_log_docs import event_schema, session_log_markdown
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """One file of docs/schemas."""
+
+    file: str
+    describes: str
+    make: Callable[[], dict[str, Any]]
+
+
+def document_schema(payload: Mapping[str, Any], format_name: str, version: int) -> dict[str, Any]:
+    """The schema of a whole JSON document, from the schema of what it holds beside format, version, provenance."""
+    own = {"format": {"const": format_name}, "version": {"const": version}}
+    return {
+        **payload,
+        "properties": {**own, **payload["properties"], "provenance": {"type": "object"}},
+        "required": ["format", "version", *payload.get("required", ())],
+    }
+
+
+def request_schema() -> dict[str, Any]:
+    """One alternative for each thing that can be asked."""
+    schemas = {kind: TypeAdapter(asked).json_schema() for kind, asked in KINDS.items()}
+    for kind, schema in schemas.items():
+        schema["properties"]["request"] = {"const": kind}
+        schema["required"].append("request")
+    return {"oneOf": [document_schema(schema, REQUEST_FORMAT, REQUEST_VERSION) for schema in schemas.values()]}
+
+
+SCHEMAS: tuple[Schema, ...] = (
+    Schema("study_protocol.json", "study protocols, read from TOML", lambda: protocol_schema("study")),
+    Schema("session_event.json", "one line of `events.jsonl`", event_schema),
+    Schema(
+        "seal.json",
+        "`seal.json`, beside the log of a closed session",
+        lambda: document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
+    ),
+    Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: protocol_schema("recording")),
+    Schema(
+        "diagnosis.json",
+        "`diagnosis.json`",
+        lambda: document_schema(document.diagnosis_schema(), document.FORMAT, document.VERSION),
+    ),
+    Schema(
+        "real_answer.json",
+        "`answer.json`, what `hapteq real` says of one recording",
+        lambda: document_schema(real_answer.real_answer_schema(), real_answer.FORMAT, real_answer.VERSION),
+    ),
+    Schema(
+        "repeats.json",
+        f"`*{repeats_file.SUFFIX}`, beside a table of forces that was found by repeating: errors per play, what the "
+        "forces belong to",
+        lambda: document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
+    ),
+    Schema(
+        "reproduction.json",
+        "`reproduction.json`, what `hapteq reproduce` found beside what the paper reports",
+        lambda: document_schema(
+            reproduction_document.reproduction_schema(), reproduction_document.FORMAT, reproduction_document.VERSION
+        ),
+    ),
+    Schema(
+        "live.json",
+        "`live.json`, how a running session is right now; replaced several times a second",
+        lambda: document_schema(TypeAdapter(Live).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION),
+    ),
+    Schema(
+        "request.json",
+        "one file in a session's `requests/`: what is asked of it from beside, removed when it is taken; a name that "
+        "begins with `stop` is a stop, whatever the file holds",
+        request_schema,
+    ),
+)
+"""A new JSON format adds its schema here."""
+
+
+def formats_markdown() -> str:
+    """The text of docs/formats.md."""
+    parts = [
+        "# File formats",
+        "This page is made from the code (`python -m study.workflows.files.format_docs docs`): change the code, not "
+        "the page. `hapteq validate FILE` checks any of these files and says in words what is wrong.",
+        "Every HDF5 file and every JSON document says its `format` and `version`; TOML and CSV are known by their keys "
+        f"or header. Units: {ALLOWED}. `g` is standard gravity. Time is the first dimension of every array.",
+        *_recordings(),
+        "## Identified model (`.h5`)",
+        _table(identified_model_file.LAYOUT),
+        *_mechanical_models(),
+        "## Effects",
+        "Names of physics that a model may have or lack, with the parameters in order, the main one first; units of "
+        "translational and rotational models. Further names may appear in a diagnosis.",
+        _effects(),
+        "## Laws without a name",
+        LAWS,
+        *_tables(),
+        *session_log_markdown(),
+        "## JSON documents and protocols",
+        "\n".join(f"* [`{schema.file}`](schemas/{schema.file}): {schema.describes}" for schema in SCHEMAS),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def documents() -> dict[str, str]:
+    """Every generated file: its path under docs, and its text."""
+    schemas = {f"schemas/{schema.file}": json.dumps(schema.make(), indent=2) + "\n" for schema in SCHEMAS}
+    return {"formats.md": formats_markdown(), "importing.md": importing_markdown(), **schemas}
+
+
+def write_documents(folder: Path) -> None:
+    """Raises CannotWriteError."""
+    for name, text in documents().items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        write_text(folder / name, text, overwrite=True)
+
+
+def _recordings() -> Iterable[str]:
+    yield "## Recording (`.h5`)"
+    yield _table(recording_layout.LAYOUT)
+    yield "Each of `command`, `response`, `position`, `excitation`, `condition` carries:"
+    yield _table(recording_layout.SIGNAL_ATTRIBUTES)
+    yield "A row of `segments`:"
+    yield _table(recording_layout.SEGMENT_FIELDS)
+    yield (
+        "A plant with direct feedthrough answers `command[k-1]`. When the sensor is faster than the command, the "
+        "command repeats. NaN is a missing sample; an analysis that cannot use it says so. Segments must not overlap."
+    )
+
+
+def _mechanical_models() -> Iterable[str]:
+    yield "## Mechanical model (`.toml`)"
+    yield "Further keys are refused."
+    yield _table(mechanical_model_file.LAYOUT)
+
+
+_RESPONSE = "the response's unit"
+
+
+def _parameter(part: EffectParameter) -> str:
+    unit = part.unit_in(False, _RESPONSE)
+    return f"`{part.name}` ({unit}, optional)" if part.optional else f"`{part.name}` ({unit})"
+
+
+def _effects() -> str:
+    rows = []
+    for effect in EFFECT_NAMES:
+        numbers = ", ".join(_parameter(part) for part in effect.parameters)
+        turned = ", ".join(part.unit_in(True, _RESPONSE) for part in effect.parameters)
+        rows.append((f"`{effect.name}`", effect.place, numbers, turned))
+    return _rows(("effect", "place", "parameters", "rotational units"), rows)
+
+
+_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
+    (
+        "trials.csv",
+        Trial,
+        "One row per presentation. Further columns may follow. `felt` is false where a person answered while no device "
+        "moved, and empty for simulated participants. In rows of the phase `catch` the level is the cap, and the "
+        "staircase does not move; in rows of the phase `detection`, `direction_shown` and `answer` are intervals.",
+    ),
+    (
+        "thresholds.csv",
+        Threshold,
+        "One row per run. `threshold_n` is the arithmetic mean of the averaged levels in newtons, `threshold_db` the "
+        "mean of the same levels in dB re 1 N; then the same threshold in delivered m/s² and mm. `detection.csv` has "
+        "the same columns, one row per detection run; its `d_prime` is that of two intervals.",
+    ),
+)
+
+
+def _tables() -> Iterable[str]:
+    yield "## Trajectory and forces (`.csv`)"
+    yield _rows(
+        ("header", "holds"), [(f"`{','.join(kind.header)}`", f"{kind.quantity}, {kind.unit}") for kind in TABLE_KINDS]
+    )
+    yield (
+        f"The rate is constant (each step within {STEP_TOLERANCE:.0%} of the mean one) and the model's; rows of forces "
+        "answer rows of the trajectory one to one."
+    )
+    for name, row_type, about in _TABLES:
+        yield f"## `{name}`"
+        yield about
+        hints = get_type_hints(row_type)
+        yield _rows(("column", "holds"), [(f"`{column}`", in_words(hints[column])) for column in columns(row_type)])
+
+
+def _table(entries: Iterable[Entry]) -> str:
+    rows = [(f"`{entry.name}`", entry.holds, entry.meaning, "yes" if entry.required else "no") for entry in entries]
+    return _rows(("name", "holds", "meaning", "required"), rows)
+
+
+def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [heading, tuple("---" for _ in heading), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    write_documents(Path(sys.argv[1]))

@@ -1,0 +1,197 @@
+"""docs/importing.md: how files of others are imported, with every key of a map, made from the code that reads it."""
+
+from collections.abc import Iterable
+
+from equalizer.signals.resampling import FLAT_TO
+from equalizer.signals.units import ALLOWED
+from protocols.schema import Node, resolved
+from study.importing.budget import DEEPEST, LARGEST, NUMBERS, WORK
+from study.importing.csv_arrays import MOST_ROWS
+from study.importing.functions import FUNCTIONS
+from study.importing.map_library import read_map, shipped_maps
+from study.importing.map_toml import MAP_SCHEMA, allowed_in_map
+from study.store.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
+from study.store.regular_file import TABLE_BYTES
+
+EXAMPLE = """\
+device = "one axis of our rig"
+title = "Noise at two levels, grip by hand"
+files = ["drive_*.csv", "daq_*.csv"]
+rate_hz = 2000
+hold = "zero-order"
+
+[meta]
+place_m = [0.0, 0.0, 0.02]
+grip = "light"
+
+[let]
+zero = "mean(array('load cell')[:100])"
+
+[[clock]]                      # the first clock is the reference
+name = "daq"
+file = "daq_*.csv"
+time = "time"
+time_unit = "s"
+
+[[clock]]                      # its logger was started by hand
+name = "drive"
+file = "drive_*.csv"
+time = "t"
+time_unit = "ms"
+align = "derivative(counts)"   # velocity of the encoder, in counts per second
+align_to = "velocity"          # velocity of the vibrometer
+align_within_s = 0.5
+
+[[channel]]
+role = "command"
+name = "fx"
+clock = "drive"
+value = "clip(current * 0.0231, -3, 3)"
+unit = "N"
+resample = "held"              # the drive holds its current until the next
+
+[[channel]]
+role = "response"
+name = "vx"
+value = "velocity"
+unit = "mm/s"
+resample = "band-limited"
+
+[[channel]]
+role = "response"
+name = "load"
+value = "-20 * (array('load cell') - zero)"
+unit = "N"
+resample = "band-limited"
+
+[[computed]]                   # on the recording's grid
+role = "position"
+name = "x"
+value = "integral(vx - mean(vx))"
+unit = "mm"
+
+[[segment]]
+kind = "noise"
+stop_s = 1.0
+role = "fit"
+
+[[segment]]
+kind = "noise"
+start_s = 1.0
+role = "test"
+"""
+
+_INTRODUCTION = f"""\
+# Importing recordings of others
+
+This page is made from the code (`python -m study.workflows.files.format_docs docs`): change the code, not the page.
+
+```
+hapteq import run1.npz run2.npz --map MAP.toml --out rec.h5    # any arrays, by a map
+hapteq import run1.csv --out rec.h5                            # names say it: time [s],fx [N]; t_s, fx_N, x_mm
+hapteq import data.mat --out rec.h5 > MAP.toml                 # nothing says it: a map for this file, to be completed
+hapteq import FOLDER --out rec.h5                              # the map in the folder, or the one of ours that fits
+```
+
+CSV and other tables, NPZ, NPY, MAT (both kinds) and HDF5 are read. The recording is in SI units, all channels on one
+uniform rate ([file formats](formats.md)). What was done to the samples is printed and kept in the recording
+(`meta/import`): what was resampled and how, which clock was moved and by how much, how many samples are missing. What
+cannot be understood is refused by name, and then nothing is written. `hapteq validate MAP.toml` checks a map.
+
+* **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
+  unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
+* **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
+* **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so.
+* **Resampling** is never done unasked. `held`: a command that stays until the next one. `band-limited`: a signal that
+  was sampled behind a filter; flat to {FLAT_TO:.0%} of the lower Nyquist frequency, what is above the new one is taken
+  out. `linear`: straight lines. Between uniform rates the band-limited way is exact to 1e-4 of the amplitude up to four
+  fifths of the lower Nyquist frequency; from uneven stamps to 5e-5 up to a tenth, and 2e-3 up to a fifth, of their mean
+  rate (tested with sinusoids).
+* **Missing** samples are NaN. Rows that a uniform logger has left out, and gaps in uneven stamps, become NaN; what lies
+  beside them stays.
+* **Clocks** of several loggers are brought to the first by `offset_s`, by a trigger that both saw, or by correlating
+  one motion that both saw. The offset is said. Where nothing agrees, or two offsets agree equally well, it is refused.
+* **Parts**: several files, or several groups of arrays in one file (`prefix`), go one after another; the state of the
+  device jumps between them. `meta/parts` says where each begins and ends. Where names of arrays begin alike (`run1__u`,
+  `run1__y`, `run2__u`, ...; `run1/force`, ...) the map that is proposed has a part for each run.
+* **Names** are understood in headers and in the map that is proposed: force, load, torque, position, displacement,
+  stroke, angle, theta, speed, velocity, omega, acceleration, voltage, current, temperature, with a unit in brackets or
+  at the end (`displacement_mm`, `omega_rad_s`, `torque_Nm`). Without forces, currents and voltages are commands.
+  The map that is proposed also takes `cmd`, `u` beside `y`, and `ref` or `target` (a helper) for what they say.
+* **Time** runs along the only dimension of a channel. Of a table of arrays take a row (`y[0]`) or column (`y[:, 0]`).
+
+With `hold = "zero-order"`, `command[k]` is held from t_k to t_(k+1) and `response[k]` is taken just before. With
+`"band-limited"` or `"linear"` both are samples of the same instant.
+
+## An example
+
+Two loggers write a table each: `drive_3.csv` with the columns `t,counts,current`, `daq_3.csv` with
+`time [s],velocity [mm/s],load cell [V]`."""
+
+
+def importing_markdown() -> str:
+    """The text of docs/importing.md."""
+    parts = [
+        _INTRODUCTION,
+        f"```toml\n{EXAMPLE}```",
+        "## Expressions",
+        "Numbers, names of arrays, `+ - * / ** %`, comparisons (1 where true, 0 where not), parts of arrays as in "
+        "`u[:10]`, `u[::2]`, `y[0]`, and the functions below. `pi` is known; `array('NAME')` takes an array whose name "
+        "is no word. A column `fx [N]` is also known as `fx`. Structures of Matlab are `array('data.u')`, datasets of "
+        "HDF5 `array('run1/force')`. In computed channels `clock_s` is the reference time and `rate_hz` the rate. "
+        "Nothing else is understood: an expression cannot run code.",
+        f"All expressions of an import together may hold {NUMBERS:.0e} numbers at once and 20 times as many as its "
+        f"files hold ({LARGEST:.0e} at most), compute {WORK:.0e} and 500 times as many, and nest {DEEPEST} levels "
+        "deep, definitions included; beyond that they are refused by name.",
+        _rows(("function", "gives"), ((f"`{f.usage}`", f.meaning) for f in FUNCTIONS.values())),
+        "## What is not read",
+        "Only regular files: no pipes, devices or folders. A file is held to its size on disk before any memory is "
+        f"taken for it: what it declares may be {PLAIN_BYTES // 2**20} MiB in any case, beyond that {FACTOR} times "
+        f"its bytes, and {MOST_BYTES // 2**30} GiB at most (an hour of nine channels at 10 kHz is 2.6 GB). Compress "
+        f"less, or cut the recording, where that is refused. Tables may have {TABLE_BYTES // 2**20} MiB and "
+        f"{MOST_ROWS:.0e} rows. HDF5: no external storage, no virtual datasets, no links to other files. NPY and NPZ: "
+        "versions 1.0 and 2.0, stored or deflated, no Python objects. MAT: versions 5 to 7.3 (Matlab's -v6, -v7, "
+        "-v7.3); texts, cells, sparse matrices and arrays of structures are left out.",
+        "## Keys of a map",
+        _keys("At the top", MAP_SCHEMA),
+        *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
+        "## Maps that come with hapteq",
+        "For public recordings; no data are in them. `--map NAME` takes one.",
+        _rows(("name", "files", "what"), (_shipped(name) for name in shipped_maps())),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _tables() -> list[tuple[str, Node]]:
+    return [(name, node) for name, node in MAP_SCHEMA["properties"].items() if _table_of(node)]
+
+
+def _table_of(node: Node) -> Node:
+    """The schema of a table, or of each of a list of tables; empty for plain values."""
+    inner = resolved(MAP_SCHEMA, node)
+    entries = resolved(MAP_SCHEMA, inner["items"]) if inner.get("type") == "array" else inner
+    return entries if "properties" in entries else {}
+
+
+def _title(name: str, node: Node) -> str:
+    return f"`[[{name}]]`" if resolved(MAP_SCHEMA, node).get("type") == "array" else f"`[{name}]`"
+
+
+def _keys(title: str, table: Node) -> str:
+    plain = [(key, node) for key, node in table["properties"].items() if table is not MAP_SCHEMA or not _table_of(node)]
+    needed = table.get("required", ())
+    rows = (
+        (f"`{key}`{' (needed)' if key in needed else ''}", allowed_in_map(node, key), node.get("description", ""))
+        for key, node in plain
+    )
+    return f"### {title}\n\n{_rows(('key', 'holds', 'meaning'), rows)}"
+
+
+def _shipped(name: str) -> tuple[str, str, str]:
+    found = read_map(name).map
+    return f"`{name}`", ", ".join(f"`{pattern}`" for pattern in found.files), found.title
+
+
+def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [heading, tuple("---" for _ in heading), *rows]
+    return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)

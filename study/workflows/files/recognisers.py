@@ -1,0 +1,185 @@
+"""Who knows which file: one small function per format. A new format adds its function to the tuple at the end."""
+
+from collections.abc import Callable
+
+from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
+from analysis.diagnosis.result.real_answer import FORMAT as REAL_ANSWER_FORMAT
+from analysis.look.driven_band import silent_segments
+from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
+from equalizer.plant.model_quality import quality_brief
+from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
+from equalizer.tracking.trajectory import TRAJECTORY
+from protocols.loading import ProtocolError, load_protocol
+from protocols.recording_protocol import RecordingProtocol
+from protocols.schema import ADAPTERS, protocol_schema
+from study.importing.import_map import ChannelMap, ComputedMap
+from study.importing.map_toml import KIND as MAP_KIND
+from study.importing.map_toml import is_map, parse_map
+from study.store import identified_model_file, recording_layout
+from study.store.csv_rows import header_problem
+from study.store.diagnosis_file import read_diagnosis
+from study.store.file_errors import UnusableFileError
+from study.store.identified_model_file import read_identified_model
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.real_answer_file import read_real_answer
+from study.store.recording_file import read_recording
+from study.store.repeats_file import FORMAT as REPEATS_FORMAT
+from study.store.repeats_file import read_repeats
+from study.store.reproduction_file import read_reproduction
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_HEADER, read_thresholds
+from study.store.trajectory_file import read_trajectory
+from study.store.trials_file import TRIALS_HEADER, read_trials
+from study.workflows.files.file_content import FileContent
+
+Recogniser = Callable[[FileContent], str | None]
+"""What the file is, in words; None where it is another's. Raises UnusableFileError where it is ours but wrong."""
+
+
+def recognise_recording(content: FileContent) -> str | None:
+    if content.hdf5_format != recording_layout.FORMAT:
+        return None
+    found = read_recording(content.path)
+    if silent := silent_segments(found):
+        raise UnusableFileError(content.path, recording_layout.KIND, silent)
+    parts = [
+        f"recording, {found.response.duration_s:g} s at {found.sample_rate_hz:g} Hz",
+        _count(len(found.command.channels), "command"),
+        _count(len(found.response.channels), "response"),
+    ]
+    if found.position is not None:
+        parts.append(_count(len(found.position.channels), "position"))
+    if found.condition is not None:
+        parts.append(_count(len(found.condition.channels), "condition"))
+    if found.segments:
+        parts.append(_count(len(found.segments), "segment"))
+    return ", ".join(parts)
+
+
+def recognise_identified_model(content: FileContent) -> str | None:
+    if content.hdf5_format != identified_model_file.FORMAT:
+        return None
+    found = read_identified_model(content.path)
+    stable = "stable" if found.spectral_radius < 1 else f"unstable (spectral radius {found.spectral_radius:.6g})"
+    return (
+        f"identified model of order {found.order}, {found.band_hz[0]:g} to {found.band_hz[1]:g} Hz at "
+        f"{found.sample_rate_hz:g} Hz, {_count(len(found.input_channels), 'input')}, "
+        f"{_count(len(found.output_channels), 'output')}, {stable}, {quality_brief(found.quality)}"
+    )
+
+
+def recognise_mechanical_model(content: FileContent) -> str | None:
+    if content.toml is None or not content.toml.keys() & {"model", "sensor", "actuator", "effect", "tolerance"}:
+        return None
+    found = read_mechanical_model(content.path)
+    effects = ", ".join(effect.kind for effect in found.effects) or "no effects"
+    return (
+        f"mechanical model '{found.name}', {_count(found.coordinates, 'coordinate')}, {_count(found.inputs, 'input')}, "
+        f"{_count(found.outputs, 'output')} ({found.quantity}), {effects}"
+    )
+
+
+def recognise_import_map(content: FileContent) -> str | None:
+    if content.toml is None or not is_map(content.toml):
+        return None
+    found = parse_map(content.text or "", content.path)
+    channels: list[ChannelMap | ComputedMap] = [*found.channel, *found.computed]
+    if problems := tuple(problem for channel in channels if (problem := _unit_problem(channel))):
+        raise UnusableFileError(content.path, MAP_KIND, problems)
+    return f"import map for {found.device}: {_count(len(channels), 'channel')}, {_count(len(found.clock), 'clock')}"
+
+
+def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
+    """Empty where its unit is known, or none is stated."""
+    try:
+        check_quantity(channel.quantity, parse_unit(channel.unit.strip() or UNSTATED))
+    except UnknownUnitError as error:
+        return f"{channel.role} '{channel.name}': {error}"
+    return ""
+
+
+_PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}
+
+
+def recognise_protocol(content: FileContent) -> str | None:
+    if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
+        return None
+    try:
+        found = load_protocol(content.text or "", content.path.name)
+    except ProtocolError as error:
+        raise UnusableFileError(content.path, "protocol", tuple(str(problem) for problem in error.problems)) from error
+    kind = "recording" if isinstance(found, RecordingProtocol) else "study"
+    return f"{kind} protocol '{found.name}': {found.title}"
+
+
+def recognise_diagnosis(content: FileContent) -> str | None:
+    if content.json_format != DIAGNOSIS_FORMAT:
+        return None
+    found = read_diagnosis(content.path)
+    return f"diagnosis, {found.verdict}: {', '.join(effect.effect for effect in found.effects) or 'no effects'}"
+
+
+def recognise_repeats(content: FileContent) -> str | None:
+    if content.json_format != REPEATS_FORMAT:
+        return None
+    found = read_repeats(content.path)
+    return (
+        f"repeats, {_count(len(found.errors), 'play')}, error {found.errors[0]:.2%} to {found.errors[found.kept]:.2%}, "
+        f"noise {found.noise_floor:.2%}"
+    )
+
+
+def recognise_real_answer(content: FileContent) -> str | None:
+    if content.json_format != REAL_ANSWER_FORMAT:
+        return None
+    found = read_real_answer(content.path)
+    return f"answer to the real recording {found.recording} of {found.folder}: {found.verdict.replace('_', ' ')}"
+
+
+def recognise_reproduction(content: FileContent) -> str | None:
+    if content.json_format != REPRODUCTION_FORMAT:
+        return None
+    found = read_reproduction(content.path)
+    return f"reproduction of {_count(len(found.figures), 'figure')} on the {found.device}, seed {found.seed}"
+
+
+def recognise_trajectory(content: FileContent) -> str | None:
+    if content.header[:1] != TRAJECTORY.header[:1]:
+        return None
+    found = read_trajectory(content.path)
+    signal = found.signal
+    return f"{found.kind.name}, {signal.duration_s:g} s at {signal.sample_rate_hz:g} Hz ({found.kind.unit})"
+
+
+def recognise_trials(content: FileContent) -> str | None:
+    # A header with one wrong column is still one of ours; both tables begin with the subject.
+    if content.header[:2] != TRIALS_HEADER[:2] and header_problem(content.header, TRIALS_HEADER):
+        return None
+    return f"table of {_count(len(read_trials(content.path)), 'trial')}"
+
+
+def recognise_thresholds(content: FileContent) -> str | None:
+    if content.header[:2] != THRESHOLDS_HEADER[:2] and header_problem(content.header, THRESHOLDS_HEADER):
+        return None
+    what = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"
+    return f"table of {_count(len(read_thresholds(content.path)), what)}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+RECOGNISERS: tuple[Recogniser, ...] = (
+    recognise_recording,
+    recognise_identified_model,
+    recognise_mechanical_model,
+    recognise_diagnosis,
+    recognise_real_answer,
+    recognise_reproduction,
+    recognise_repeats,
+    recognise_trajectory,
+    recognise_trials,
+    recognise_thresholds,
+    recognise_import_map,
+    recognise_protocol,
+)
+"""Asked in this order; the first answer counts."""

@@ -1,0 +1,144 @@
+"""Recognisers of what a study leaves behind: session folders and logs, summaries, statistics, locks, tombstones."""
+
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from protocols.lock import FORMAT as LOCK_FORMAT
+from protocols.lock import LockError, lock_from_json
+from study.errors import StudyError
+from study.local_clock import machine_zone
+from study.session.events import SESSION_FORMAT, TrialMeasured
+from study.session.live import Live
+from study.session.local_time import local_time
+from study.store.archive import SessionFolder
+from study.store.event_log import LOG_NAME
+from study.store.file_errors import UnusableFileError
+from study.store.json_document import read_json
+from study.store.live_file import LIVE_FORMAT
+from study.store.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
+from study.store.provenance import sha256_of
+from study.store.request_inbox import REQUEST_FORMAT
+from study.store.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
+from study.store.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
+from study.workflows.files.file_content import FileContent
+from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.session_results import result_problems
+
+KIND = "session"
+
+DOCUMENTS = {
+    SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
+    "hapteq-anova": ("statistics of a study", ("participants", "frequencies_hz", "one_way", "comparisons")),
+    SEAL_FORMAT: ("seal of a session log", ("session", "lines", "bytes", "head", "sha256")),
+    LIVE_FORMAT: ("live state of a session", tuple(field.name for field in fields(Live) if field.default is MISSING)),
+    REQUEST_FORMAT: ("request to a running session", ("request", "who")),
+    WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
+    TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
+}
+"""Format: what it is, and the keys it must have."""
+
+
+def recognise_session(content: FileContent) -> str | None:
+    """A session folder, or its log."""
+    if content.is_folder:
+        folder = SessionFolder(content.path.resolve())
+        if folder.withdrawn:
+            return _withdrawn(folder, content.path)
+        return _checked(folder, content.path) if folder.log.exists() else None
+    if content.path.name == LOG_NAME or f'"{SESSION_FORMAT}"' in (content.text or "")[:1000]:
+        return _described(_folded(SessionFolder(content.path.resolve().parent), content.path))
+    return None
+
+
+def _withdrawn(folder: SessionFolder, path: Path) -> str:
+    if finish := how_to_finish(folder):
+        raise UnusableFileError(path, "withdrawn session", ("the erasing is not finished", finish))
+    return "withdrawn session; nothing is left of it but its tombstone"
+
+
+def recognise_document(content: FileContent) -> str | None:
+    if content.json_format not in DOCUMENTS:
+        return None
+    kind, needed = DOCUMENTS[content.json_format]
+    if content.json_format == WITHDRAWAL_FORMAT:
+        finish = "the erasing is not finished; `hapteq withdraw` goes on with it"
+        raise UnusableFileError(content.path, kind, (finish,))
+    if content.json_format == SEAL_FORMAT:
+        read_seal(content.path)
+    document = read_json(content.path, content.json_format, SUMMARY_VERSION)
+    missing = [key for key in needed if key not in document]
+    if missing:
+        raise UnusableFileError(content.path, kind, (f"it lacks {', '.join(missing)}",))
+    return kind
+
+
+def recognise_lock(content: FileContent) -> str | None:
+    if content.json_format != LOCK_FORMAT:
+        return None
+    try:
+        lock = lock_from_json(content.text or "")
+    except LockError as error:
+        raise UnusableFileError(content.path, "protocol lock", (str(error),)) from error
+    return f"lock of protocol '{lock.name}', {local_time(lock.locked_utc, machine_zone)}"
+
+
+def _checked(folder: SessionFolder, path: Path) -> str:
+    """Beyond the log: every recording is the one that the log speaks of, and the table agrees with it."""
+    folded = _folded(folder, path)
+    problems = [
+        *_recording_problems(folder, folded),
+        *_result_problems(folder, folded),
+    ]
+    if problems:
+        raise UnusableFileError(path, KIND, tuple(problems))
+    return _described(folded)
+
+
+def _folded(folder: SessionFolder, path: Path) -> FoldedSession:
+    try:
+        folded = fold_session(folder)
+    except UnusableFileError:
+        raise
+    except StudyError as error:
+        raise UnusableFileError(path, KIND, (error.happened.rstrip("."),)) from error
+    if folded.contents.torn_bytes:
+        torn = f"its last line is torn ({folded.contents.torn_bytes} bytes); hapteq resume mends it"
+        raise UnusableFileError(path, KIND, (torn,))
+    return folded
+
+
+def _recording_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    problems = []
+    for event in folded.contents.events:
+        if not isinstance(event, TrialMeasured) or event.recording is None:
+            continue
+        path = folder.path / event.recording
+        if not path.is_file():
+            problems.append(f"{event.recording} is missing")
+        elif sha256_of(path) != event.sha256:
+            problems.append(f"{event.recording} is not the file that was written (its SHA-256 differs from the log)")
+    return problems
+
+
+def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+    """What is missing is due and not wrong; what differs from the log was changed, or belongs to an earlier time."""
+    said = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
+    for result in result_problems(folder, folded.state):
+        if not result.missing:
+            said += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
+    return said
+
+
+def _described(folded: FoldedSession) -> str:
+    state = folded.state
+    who = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
+    end = state.sitting.turned_away or ("finished" if state.closed else "not finished")
+    steps = "".join(
+        f". Before {local_time(step.utc, machine_zone)}: {step.sentence}" for step in state.sitting.clock_steps
+    ).rstrip(".")
+    sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
+    kind = f"session {state.opened.session} of {who}, {state.protocol.name}, {state.answers} answers, {end}"
+    return f"{kind}; log {folded.contents.chain.in_words()}{sealed}{steps}"
+
+
+SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

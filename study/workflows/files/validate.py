@@ -1,0 +1,121 @@
+"""`hapteq validate`: what a file is, and everything that is wrong with it, in words."""
+
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from study.errors import StudyError
+from study.store.archive import FOLDER
+from study.store.file_errors import UnusableFileError
+from study.store.privacy import warning
+from study.store.recording_file import read_recording
+from study.store.regular_file import DOCUMENT_BYTES
+from study.store.strict_json import load_json
+from study.store.toml_text import TOML_BYTES, too_long_key
+from study.workflows.files.file_content import FileContent, open_content
+from study.workflows.files.recognisers import RECOGNISERS, Recogniser
+from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
+
+KNOWN = (
+    "known are recordings and identified models (HDF5), mechanical models, protocols and import maps (TOML), "
+    "trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and version, "
+    "and session folders"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    path: Path
+    kind: str
+    """In words: "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""
+    problems: tuple[str, ...]
+    """One sentence each; empty = the file is sound."""
+    notes: tuple[str, ...] = ()
+    """Worth knowing of a sound file too: that others can read a session's folder."""
+
+
+def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
+    """Never raises for what is in a file or for one that is not there."""
+    found = _validated(path, recognisers)
+    folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
+    said = (warning(folder) for folder in folders if _is_folder(folder))
+    return replace(found, notes=(*filter(None, said), *_notes(found)))
+
+
+def _notes(found: Validation) -> tuple[str, ...]:
+    """Of a sound recording: axes that are not driven."""
+    if found.problems or not found.kind.startswith("recording, "):
+        return ()
+    command = read_recording(found.path).command
+    idle = [name for name, one in zip(command.channels, command.samples.T, strict=True) if not np.nan_to_num(one).any()]
+    return (f"No command drives {', '.join(idle)}.",) if idle else ()
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # a name that no file can have
+        return False
+
+
+def _validated(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
+    try:
+        content = open_content(path)
+        for recognise in recognisers:
+            kind = recognise(content)
+            if kind is not None:
+                return Validation(path, kind, ())
+    except UnusableFileError as error:
+        return Validation(path, error.kind, error.sentences)
+    except StudyError as error:
+        return Validation(path, "unreadable", (error.happened,))
+    kind, problem = _unknown(content)
+    return Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
+
+
+def _unknown(content: FileContent) -> tuple[str, str]:
+    """The best that can be said of a file that nobody knows."""
+    if content.is_folder:
+        return "folder", "this folder is not a session: it holds no events.jsonl"
+    if content.hdf5_format is not None:
+        said = f"calls itself '{content.hdf5_format}'" if content.hdf5_format else "has no attribute 'format'"
+        return "HDF5 file", f"it {said}; known formats are hapteq-recording and hapteq-model"
+    if not (content.text or "").strip():
+        return "empty file", f"it holds nothing; {KNOWN}"
+    match content.path.suffix.lower():
+        case ".json":
+            return "JSON document", _json_problem(content)
+        case ".toml":
+            return "TOML file", _toml_problem(content)
+        case ".csv":
+            return "table", f"its header, '{','.join(content.header)}', is none of ours; {KNOWN}"
+    return "unknown file", f"nothing here knows this file; {KNOWN}"
+
+
+def _json_problem(content: FileContent) -> str:
+    try:
+        load_json((content.text or "")[: DOCUMENT_BYTES + 1])
+    except ValueError as error:
+        return f"this is not JSON: {error}"
+    if content.json_format is None:
+        return "it says no format; every document of ours says its format and version"
+    return f"its format, '{content.json_format}', is not known here"
+
+
+def _toml_problem(content: FileContent) -> str:
+    text = content.text or ""
+    if len(text) > TOML_BYTES:
+        return f"it has {len(text)} characters; up to {TOML_BYTES} are read"
+    if problem := too_long_key(text):
+        return problem
+    try:
+        tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        return f"this is not TOML: {error}"
+    keys = ", ".join(content.toml or ())
+    return (
+        f"its keys ({keys}) are neither those of a mechanical model ([model] ...) nor of a protocol (kind = ...) nor "
+        "of an import map ([[channel]] ...)"
+    )

@@ -1,0 +1,53 @@
+"""Validation in a process of its own: a damaged HDF5 file can crash or hang the library that reads it."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from pathlib import Path
+
+from study.workflows.files.validate import Validation, validate_file
+
+PATIENCE_S = 60.0
+"""A recording of an hour takes seconds."""
+
+
+def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Iterator[Validation]:
+    """Each file's validation, in order. One worker serves all, and is replaced when a file takes it down."""
+    worker = _worker()
+    try:
+        for path in paths:
+            try:
+                yield worker.submit(_validated, path).result(timeout=patience_s)
+            except BrokenProcessPool:
+                yield _damaged(path, "reading it crashes the HDF5 library")
+                worker = _worker()
+            except TimeoutError:
+                yield _damaged(path, f"reading it does not end within {patience_s:g} s")
+                _kill(worker)
+                worker = _worker()
+    finally:
+        worker.shutdown(wait=False, cancel_futures=True)
+
+
+def _validated(path: Path) -> Validation:
+    """Runs in the worker. Only a death of the process may look like one."""
+    try:
+        return validate_file(path)
+    except Exception as error:  # noqa: BLE001 - a file must not be called damaged for a mistake of ours
+        return Validation(path, "unknown", (f"hapteq failed on this file ({type(error).__name__}: {error}).",))
+
+
+def _worker() -> ProcessPoolExecutor:
+    # Spawned: a forked child would inherit HDF5's locks.
+    return ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
+
+
+def _kill(worker: ProcessPoolExecutor) -> None:
+    for process in list(worker._processes.values()):  # noqa: SLF001 - the executor offers no other way before 3.14
+        process.kill()
+    worker.shutdown(wait=False, cancel_futures=True)
+
+
+def _damaged(path: Path, how: str) -> Validation:
+    return Validation(path, "damaged file", (f"The file is damaged: {how}. Restore it from a copy.",))

@@ -1,0 +1,39 @@
+"""What files say of each other: effects of a model on axes that the recordings beside it have."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from equalizer.effects.placing import PlacingError, placed_effects
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.recording_file import read_recording
+from study.workflows.files.validate import Validation
+
+
+def validated_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
+    """Of sound files; a model is held against recordings with as many commands and responses as it has."""
+    recordings = [(one.path, read_recording(one.path)) for one in _sound(found, "recording, ")]
+    if not recordings:
+        return tuple(found)
+    models = {one.path: read_mechanical_model(one.path) for one in _sound(found, "mechanical model ")}
+    return tuple(
+        replace(one, problems=(*one.problems, *_problems(models[one.path], recordings))) if one.path in models else one
+        for one in found
+    )
+
+
+def _sound(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
+    return (one for one in found if one.kind.startswith(kind) and not one.problems)
+
+
+def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
+    for path, recording in recordings:
+        commands, responses = recording.command.channels, recording.response.channels
+        if (len(commands), len(responses)) != (model.inputs, model.outputs):
+            continue
+        try:
+            placed_effects(model, commands, responses)
+        except PlacingError as error:
+            yield f"With {path.name}: {error}"

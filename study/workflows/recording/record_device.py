@@ -1,0 +1,154 @@
+"""Play a recording protocol on the device, piece by piece, and keep what came back in one file."""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from equalizer.signals.joining import join
+from protocols.hashing import protocol_hash
+from protocols.recording_protocol import RecordingProtocol
+from study.devices.clock import RealClock, VirtualClock
+from study.devices.device import Device, DeviceSettings, Fault
+from study.devices.opening import SIMULATIONS, open_device
+from study.errors import DeviceError, LeftError
+from study.session.handle_notice import handle_notice
+from study.session.limits import limits_of_recording
+from study.session.recording_plan import pieces
+from study.store.provenance import gather_provenance
+from study.store.recording_file import write_recording
+from study.workflows.free_name import require_free
+from study.workflows.recording.play_pieces import Take, play_pieces
+from study.workflows.recording.take_facts import segment_facts, spring_facts, warnings_of
+
+NOMINAL_RATE_HZ = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingPlan:
+    protocol: RecordingProtocol
+    device: str
+    place_m: tuple[float, float, float]
+    seed: int
+    out: Path
+
+    @property
+    def total_s(self) -> float:
+        return sum(piece.commands.duration_s for piece in pieces(self.protocol, NOMINAL_RATE_HZ))
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenRecording:
+    path: Path
+    warnings: tuple[str, ...]
+
+
+def _unsaid(notice: str) -> None:
+    """For whoever knows that nobody is near the device."""
+
+
+def record_device(
+    plan: RecordingPlan,
+    on_progress: Callable[[float], None],
+    before_moving: Callable[[str], None] = _unsaid,
+) -> WrittenRecording:
+    """Record everything the protocol asks for. `on_progress(seconds)` counts recorded time, and steps back where
+    something is played again. `before_moving(notice)` is called before a real device moves, with what must be said
+    to those around it; what it raises keeps the device still.
+
+    Interrupted (KeyboardInterrupt), the pieces that are whole are written, and LeftError says so.
+    Raises StudyError before anything moves where `out` exists already.
+    """
+    check_free(plan.out)
+    clock = VirtualClock() if plan.device in SIMULATIONS else RealClock()
+    with contextlib.closing(open_device(plan.device, _settings(plan), clock, plan.seed)) as device:
+        return record_on(device, plan, on_progress, before_moving)
+
+
+def record_on(
+    device: Device,
+    plan: RecordingPlan,
+    on_progress: Callable[[float], None],
+    before_moving: Callable[[str], None] = _unsaid,
+) -> WrittenRecording:
+    """As `record_device`, on a device that is open."""
+    done: list[Take] = []
+    try:
+        if not device.info.simulated:
+            before_moving(handle_notice(plan.protocol, device.info.name, plan.total_s))
+        play_pieces(plan.protocol, device, done, on_progress)
+    except KeyboardInterrupt as interruption:
+        _write_whole_pieces(plan, device, done)
+        if device.fault() is Fault.FORCE_LEFT:
+            raise _still_on(plan, len(done)) from interruption
+        raise _left(plan, len(done)) from interruption
+    except DeviceError as error:
+        _write_whole_pieces(plan, device, done)
+        error.saved = _saved(plan, len(done))
+        raise
+    return _write(plan, device, done, interrupted=False)
+
+
+def check_free(out: Path) -> None:
+    """Raises StudyError where the recording could not be written under this name."""
+    require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
+
+
+def _left(plan: RecordingPlan, done: int) -> LeftError:
+    all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
+    return LeftError(
+        "Interrupted",
+        f"{done} of {all_pieces} pieces were recorded; the force was released.",
+        "Record again under another name for the whole protocol.",
+        saved=_saved(plan, done),
+    )
+
+
+def _still_on(plan: RecordingPlan, done: int) -> DeviceError:
+    return DeviceError(
+        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_saved(plan, done)
+    )
+
+
+def _saved(plan: RecordingPlan, done: int) -> str:
+    return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
+
+
+def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[Take]) -> None:
+    if done:
+        _write(plan, device, done, interrupted=True)
+
+
+def _settings(plan: RecordingPlan) -> DeviceSettings:
+    return DeviceSettings(
+        limits=limits_of_recording(plan.protocol),
+        spring_frequency_hz=plan.protocol.spring.natural_frequency_hz,
+        spring_damping_n_s_per_m=plan.protocol.spring.damping_n_s_per_m,
+        keep_s=1.0,
+        hand_on_handle=plan.protocol.hand == "held",
+        place_m=plan.place_m,
+    )
+
+
+def _write(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bool) -> WrittenRecording:
+    parts = [replace(take.recording, segments=(take.piece.segment,)) for take in done]
+    write_recording(plan.out, join(parts, _meta(plan, device, done, interrupted)))
+    return WrittenRecording(plan.out, tuple(warning for take in done for warning in warnings_of(take)))
+
+
+def _meta(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bool) -> dict[str, Any]:
+    protocol = plan.protocol
+    return {
+        "protocol": protocol.name,
+        "place_m": list(plan.place_m),
+        "hand": protocol.hand,
+        "feedback": spring_facts(protocol.spring, device.info.effective_mass_kg),
+        # As mounted: what is off by the mounting's tolerance is not known to whoever records.
+        "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
+        "interrupted": interrupted,
+        "segments": [segment_facts(take) for take in done],
+        "provenance": gather_provenance(
+            protocol_hash=protocol_hash(protocol), seeds={"device": plan.seed}, parents=()
+        ).as_dict(),
+    }

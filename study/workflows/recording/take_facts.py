@@ -1,0 +1,70 @@
+"""What is written down about each piece of a recording and its feedback, and what is said about it."""
+
+import math
+from typing import Any
+
+from protocols.apparatus import SpringSettings
+from study.workflows.recording.play_pieces import Take, along_in_words
+
+
+def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
+    """The feedback that turns the excitation into the command: command = excitation - stiffness (position - place)."""
+    return {
+        "kind": "virtual spring about the place",
+        "natural_frequency_hz": spring.natural_frequency_hz,
+        "stiffness_n_per_m": effective_mass_kg * (2 * math.pi * spring.natural_frequency_hz) ** 2,
+        "damping_n_s_per_m": spring.damping_n_s_per_m,
+        "effective_mass_kg": effective_mass_kg,
+    }
+
+
+def segment_facts(take: Take) -> dict[str, Any]:
+    piece = take.piece
+    return {
+        "number": piece.number,
+        "frequency_hz": piece.frequency_hz,
+        "band_hz": None if piece.band_hz is None else list(piece.band_hz),
+        "along": piece.along,
+        "unit_vector": None if piece.unit_vector is None else list(piece.unit_vector),
+        "realisation": piece.realisation,
+        "requested_amplitude_n": take.requested_n,
+        "played_amplitude_n": take.played_n,
+        "tries": take.tries,
+        "sensor_clipped": take.health.sensor_clipped,
+        "total_clipped": take.health.total_clipped + take.health.feedback_clipped,
+    }
+
+
+def warnings_of(take: Take) -> list[str]:
+    """Sentences for whoever recorded."""
+    health, what = take.health, _what(take)
+    found = []
+    if take.played_n < take.requested_n:
+        found.append(_lowered(take))
+    if health.sensor_clipped:
+        found.append(f"The accelerometer clipped in {health.sensor_clipped} samples at {take.played_n:.3g} N ({what}).")
+    if health.feedback_clipped:
+        found.append(f"The spring's pull was limited at its cap at {take.played_n:.3g} N ({what}).")
+    if health.total_clipped or health.stimulus_clipped:
+        found.append(f"The force was limited at its cap at {take.played_n:.3g} N ({what}).")
+    if health.missed_ticks:
+        found.append(f"{health.missed_ticks} ticks were missed ({what}); they are NaN.")
+    if health.slew_limited:
+        found.append(f"The force was slowed by the slew limit ({what}).")
+    return found
+
+
+def _what(take: Take) -> str:
+    piece = take.piece
+    kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
+    return f"{kind} along {along_in_words(piece)}"
+
+
+def _lowered(take: Take) -> str:
+    why = []
+    if take.sensor_clipped_before:
+        why.append(f"the accelerometer clipped in {take.sensor_clipped_before} samples")
+    if take.total_clipped_before:
+        why.append(f"the force was at its cap for {take.total_clipped_before} ticks")
+    reason = " and ".join(why) if why else "as before"
+    return f"Played at {take.played_n:.3g} N instead of {take.requested_n:.3g} N ({_what(take)}): {reason}."

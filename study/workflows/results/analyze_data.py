@@ -1,0 +1,166 @@
+"""From a folder of sessions to thresholds.csv, detection.csv, anova.json, figures and one report."""
+
+import errno
+from pathlib import Path
+
+import numpy as np
+
+from analysis.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.figures.picture import Picture
+from analysis.figures.study_pictures import study_pictures
+from analysis.reports.study_report import render_study_report
+from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
+from analysis.threshold_table import ThresholdTable
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+from study.errors import StudyError
+from study.local_clock import local_now
+from study.store.file_errors import CannotWriteError
+from study.store.json_document import write_json
+from study.store.privacy import close_to_others, make_folder
+from study.store.provenance import Provenance, gather_provenance
+from study.store.recording_file import read_recording
+from study.store.text_file import write_text
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
+from study.store.written_elsewhere import note_written
+from study.workflows.picture_files import write_pictures
+from study.workflows.results.analysis_files import PAGE_NAME, written_by_analysis
+from study.workflows.results.collect_sessions import Collected, collect_sessions
+from study.workflows.results.written_analysis import WrittenAnalysis
+
+
+def analyze_data(
+    data: Path, out: Path, ellipsoid: Path | None = None, protocol_name: str | None = None
+) -> WrittenAnalysis:
+    """Analyse all sessions in `data`; what `out` holds from an earlier analysis is replaced.
+
+    Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
+    """
+    collected = collect_sessions(data, protocol_name)
+    try:
+        analysis = analyse_study(collected.trials, collected.protocol)
+    except ValueError as problem:
+        raise StudyError(
+            "The data contradict their protocol", f"{problem}.", "Nothing was written; look at the sessions named."
+        ) from problem
+    shapes = _ellipsoids(ellipsoid)
+    parents = [folder.log for folder in collected.sessions] + ([ellipsoid] if ellipsoid else [])
+    provenance = gather_provenance(
+        protocol_hash=collected.protocol_hash,
+        seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
+        parents=parents,
+    )
+    pictures = study_pictures(analysis, shapes)
+    _make_private(out, data)
+    note_written(data, out)
+    _write(out, analysis, pictures, shapes, provenance, collected)
+    return WrittenAnalysis(
+        thresholds=analysis.thresholds,
+        table=tuple(text_table(analysis)),
+        warnings=(*collected.finished, *collected.left_out, *analysis.warnings),
+        report=out / PAGE_NAME,
+    )
+
+
+def text_table(analysis: StudyAnalysis) -> list[str]:
+    """Thresholds as lines: one per frequency, with mean and number of participants."""
+    lines = ["No complete test run: there is no threshold yet."]
+    if any(row.complete for row in analysis.thresholds):
+        lines = _lines(analysis.table, "threshold")
+    if any(row.complete for row in analysis.detection):
+        lines += _lines(analysis.detection_table, "felt from")
+    return lines
+
+
+def _lines(table: ThresholdTable, heading: str) -> list[str]:
+    lines = [f"{'frequency':>10}  {heading:>10}  {'cut by cap':>10}  participants"]
+    for column, frequency_hz in enumerate(table.frequencies_hz):
+        values = [value for row in table.values if (value := row[column]) is not None]
+        censored = sum(row[column] for row in table.censored)
+        mean = f"{sum(values) / len(values):.3f} N" if values else "-"
+        lines.append(f"{frequency_hz:7g} Hz  {mean:>10}  {censored:>10}  {len(values):>12}")
+    return lines
+
+
+def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
+    if path is None:
+        return ()
+    recording = read_recording(path)
+    try:
+        return ellipsoids(recording, sensor_frame(recording))
+    except ValueError as problem:
+        raise StudyError(
+            "No ellipsoids can be computed",
+            f"{path.name}: {problem}.",
+            "Give a recording made with: hapteq record ellipsoid",
+            saved="Nothing was written.",
+        ) from problem
+
+
+def sensor_frame(recording: Recording) -> FloatArray | None:
+    """Rotation from the sensor's axes to the device's, as the recording states it; None where it states none."""
+    sensor = recording.meta.get("sensor")
+    frame = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
+    if frame is None:
+        return None
+    rotation = np.asarray(frame, dtype=np.float64)
+    if rotation.shape != (3, 3):
+        raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
+    return rotation
+
+
+def _make_private(out: Path, data: Path) -> None:
+    """Beside the sessions; a folder elsewhere has the rights that its place gives it. Raises CannotWriteError."""
+    if not out.resolve().is_relative_to(data.resolve()):
+        return
+    try:
+        make_folder(out, private=True)
+    except OSError as problem:
+        raise CannotWriteError(out, problem) from problem
+    if out.resolve() != data.resolve():
+        close_to_others(out, inside=True)
+
+
+def _write(
+    out: Path,
+    analysis: StudyAnalysis,
+    pictures: tuple[Picture, ...],
+    shapes: tuple[EllipsoidResult, ...],
+    provenance: Provenance,
+    collected: Collected,
+) -> None:
+    figures = out / "figures"
+    try:
+        make_folder(figures)
+        if figures.is_symlink():
+            raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
+        # The report is the last that is written: as long as it is not there, all else may be half of the new.
+        for stale in written_by_analysis(out):
+            if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
+                stale.unlink()
+    except OSError as problem:
+        raise CannotWriteError(figures, problem) from problem
+    write_thresholds(out / THRESHOLDS_NAME, analysis.thresholds)
+    if analysis.detection:
+        write_thresholds(out / DETECTION_NAME, analysis.detection)
+    document = anova_document(analysis)
+    format_name, version = document.pop("format"), document.pop("version")
+    write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
+    write_pictures(figures, pictures)
+    shown = _shown(provenance, collected)
+    page = render_study_report(analysis, pictures, shown, local_now(), shapes, collected.qualities)
+    write_text(out / PAGE_NAME, page, overwrite=True)
+
+
+def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:
+    """What the report's last section shows."""
+    return {
+        "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
+        "device": ", ".join(collected.devices) or "none",
+        "participants": ", ".join(collected.observers) or "people",
+        "sessions": ", ".join(folder.name for folder in collected.sessions) or "none",
+        "left out": " ".join(collected.left_out) or "nothing",
+        "seeds": ", ".join(str(seed) for seed in collected.seeds) or "none",
+        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
+        "command": " ".join(provenance.command),
+    }

@@ -1,0 +1,161 @@
+"""Which sessions enter one analysis: one protocol, one kind of participant, nothing withdrawn or contradictory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.population import Population, split_by_population
+from analysis.wording import listed
+from equalizer.plant.model_quality import NOT_STORED
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Trial
+from study.errors import StudyError, WrongUseError
+from study.session.archive_views import TURNED_AWAY
+from study.session.state import SessionState
+from study.store.archive import SessionFolder, session_folders
+from study.store.event_log import LOG_NAME
+from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.session_results import finish_tables
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    protocol: StudyProtocol
+    protocol_hash: str
+    trials: tuple[Trial, ...]
+    sessions: tuple[SessionFolder, ...]
+    seeds: tuple[int, ...]
+    devices: tuple[str, ...]
+    """Names of all devices that were used."""
+    observers: tuple[str, ...]
+    """Names of the simulated participants; empty for people."""
+    left_out: tuple[str, ...]
+    """What did not enter, and why, in sentences."""
+    qualities: tuple[tuple[str, str], ...]
+    """Of the models that stimuli went through: (sessions, sentence), by what was measured; none for plain forces."""
+    finished: tuple[str, ...]
+    """What was written now, because the program was killed before it was done, in sentences."""
+
+
+def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
+    """All sessions below `data` (or `data` itself, a session) that belong together.
+
+    Of several protocols the one named, else the one with most sessions; people before simulated participants before
+    those who felt nothing. Raises StudyError where there is nothing to analyse.
+    """
+    folders = _folders(data)
+    whole, left_out = _fold_all(folders)
+    folded = [(folder, session.state) for folder, session in whole]
+    chosen_hash = _choose_protocol(folded, protocol_name, data)
+    chosen = [(folder, state) for folder, state in folded if state.opened.protocol_hash == chosen_hash]
+    left_out += [
+        f"{folder.name} follows another protocol ('{state.protocol.name}')."
+        for folder, state in folded
+        if state.opened.protocol_hash != chosen_hash
+    ]
+    parts = split_by_population([trial for _, state in chosen for trial in state.trials])
+    kind = next((kind for kind in Population if kind in parts), None)
+    left_out += [
+        f"{len(parts[other])} trials of {other.value} are not analysed together with {kind.value}."
+        for other in parts
+        if kind is not None and other is not kind
+    ]
+    trials = parts[kind] if kind is not None else ()
+    names = {trial.session for trial in trials}
+    entering = [(folder, state) for folder, state in chosen if folder.name in names]
+    return Collected(
+        protocol=chosen[0][1].protocol,
+        protocol_hash=chosen_hash,
+        trials=trials,
+        sessions=tuple(folder for folder, _ in entering),
+        seeds=tuple(state.opened.seed for _, state in entering),
+        devices=tuple(dict.fromkeys(state.opened.device.name for _, state in entering)),
+        observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
+        left_out=tuple(left_out),
+        qualities=_qualities(entering),
+        finished=_finish(whole),
+    )
+
+
+def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[tuple[str, str], ...]:
+    """Sessions that share a model stand together."""
+    sessions: dict[tuple[str, str], list[str]] = {}
+    for folder, state in entering:
+        if (equalized := state.opened.equalized) is not None:
+            key = (equalized.sha256, equalized.quality or NOT_STORED)
+            sessions.setdefault(key, []).append(folder.name)
+    return tuple((listed(names), sentence) for (_, sentence), names in sessions.items())
+
+
+def _folders(data: Path) -> tuple[SessionFolder, ...]:
+    if (data / LOG_NAME).exists():
+        return (SessionFolder(data.resolve()),)
+    folders = session_folders(data)
+    if not folders:
+        raise WrongUseError(
+            "There is nothing to analyse",
+            f"{data} is neither a session nor a folder with sessions in it.",
+            "Give the data folder of a study; hapteq rehearse makes one with simulated participants.",
+        )
+    return folders
+
+
+def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
+    folded: list[tuple[SessionFolder, FoldedSession]] = []
+    left_out: list[str] = []
+    for folder in folders:
+        if folder.withdrawn:
+            left_out.append(f"{folder.name} was withdrawn by the participant.")
+            continue
+        try:
+            session = fold_session(folder)
+        except StudyError as problem:
+            left_out.append(f"{folder.name} cannot be used. {problem.happened}")
+            continue
+        if turned_away := session.state.sitting.turned_away:
+            left_out.append(f"{folder.name} does not take part: {TURNED_AWAY[turned_away]}.")
+        else:
+            folded.append((folder, session))
+    if not folded:
+        raise StudyError("There is nothing to analyse", " ".join(left_out), "Record new sessions.")
+    return folded, left_out
+
+
+def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
+    """Nothing here keeps an analysis from going on: the log alone is analysed."""
+    said = []
+    for folder, session in folded:
+        try:
+            written = finish_tables(folder, session)
+        except StudyError as problem:
+            said.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
+            continue
+        if written:
+            said.append(
+                f"{folder.name}: written now from its log, because missing or out of date: {', '.join(written)}."
+            )
+    return tuple(said)
+
+
+def _choose_protocol(
+    folded: Sequence[tuple[SessionFolder, SessionState]], protocol_name: str | None, data: Path
+) -> str:
+    counted: dict[str, list[SessionState]] = {}
+    for _, state in folded:
+        counted.setdefault(state.opened.protocol_hash, []).append(state)
+    named = {
+        key: states for key, states in counted.items() if protocol_name in (None, states[0].protocol.name, key[:12])
+    }
+    if not named:
+        there = ", ".join(f"{states[0].protocol.name} ({key[:12]})" for key, states in counted.items())
+        raise WrongUseError(
+            "No session follows that protocol",
+            f"'{protocol_name}' was asked for; {data} holds sessions of {there}.",
+            "Give one of these names, or the first twelve digits of its hash.",
+        )
+    # A protocol of training alone has nothing to analyse; it is chosen only where there is no other.
+    return max(named, key=lambda key: (_measures(named[key][0].protocol), len(named[key])))
+
+
+def _measures(protocol: StudyProtocol) -> bool:
+    return bool(protocol.stimulus.frequencies_hz or protocol.detection.frequencies_hz)

@@ -1,0 +1,155 @@
+"""What is written from a session's log, at will: its seal, its tables, and its own small report."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from analysis.detection import detection_thresholds
+from analysis.thresholds import Threshold, thresholds
+from protocols.trial import Trial
+from study.session.state import SessionState
+from study.store.archive import SessionFolder
+from study.store.csv_rows import Row, as_written_in
+from study.store.file_errors import CannotReadError, UnusableFileError
+from study.store.json_document import write_json
+from study.store.log_seal import SEAL_NAME, write_seal
+from study.store.provenance import gather_provenance
+from study.store.session_lock import locked
+from study.store.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
+from study.store.text_file import read_text
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds, write_thresholds
+from study.store.trials_file import TRIALS_NAME, read_trials, write_trials
+from study.workflows.results.analysis_files import ANALYSIS_NAME
+from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.written_analysis import WrittenAnalysis
+
+REPORT_NAME = f"{ANALYSIS_NAME}/report.html"
+"""The last file that the analysis of a session writes."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResultProblem:
+    """A result that is not what the log gives."""
+
+    file: str
+    missing: bool
+    problems: tuple[str, ...]
+    """Without the file's name and a full stop."""
+
+
+def write_tables(folder: SessionFolder) -> SessionState:
+    """The seal of a closed session; trials.csv, thresholds.csv, detection.csv (where there are such runs) and
+    session.json, from the log alone."""
+    folded = fold_session(folder)
+    state = folded.state
+    if folded.seal_due:
+        write_seal(folder.path, folded.contents)
+    write_trials(folder.path / TRIALS_NAME, state.trials)
+    for name, rows in _computed(state).items():
+        write_thresholds(folder.path / name, rows)
+    _write_summary(folder, state)
+    return state
+
+
+def write_results(folder: SessionFolder) -> WrittenAnalysis:
+    """The tables, and the analysis of this session alone beside them."""
+    # Statistics and plots take longer to load than all else; nobody who begins or checks a session waits for them.
+    from study.workflows.results.analyze_data import analyze_data
+
+    write_tables(folder)
+    return analyze_data(folder.path, folder.path / ANALYSIS_NAME)
+
+
+def due_results(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+    """Names of the files that a closed session still lacks, because the program was killed before it wrote them."""
+    if not folded.state.closed:
+        return ()
+    seal = (SEAL_NAME,) if folded.seal_due else ()
+    return (*seal, *(problem.file for problem in result_problems(folder, folded.state)))
+
+
+def finish_tables(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+    """Write what is due, under the session's lock. Returns the names of these files. Raises StudyError."""
+    due = due_results(folder, folded)
+    if due:
+        with locked(folder.path):
+            write_tables(folder)
+    return due
+
+
+def result_problems(folder: SessionFolder, state: SessionState) -> tuple[ResultProblem, ...]:
+    """Tables and summary that are missing, torn, or differ from what the log gives."""
+    found = [_compared(folder, TRIALS_NAME, lambda path: read_trials(path) == _as_in(path, state.trials, Trial))]
+    for name, rows in _computed(state).items():
+        agrees = partial(_thresholds_agree, rows)
+        found.append(_compared(folder, name, agrees))
+    found.append(_compared(folder, SUMMARY_NAME, lambda path: _summary_agrees(folder, state)))
+    return tuple(problem for problem in found if problem is not None)
+
+
+def _compared(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
+    path = folder.path / name
+    if not path.exists():
+        return ResultProblem(name, True, ("is missing",))
+    try:
+        return None if agrees(path) else ResultProblem(name, False, ("does not agree with the log",))
+    except UnusableFileError as error:
+        return ResultProblem(name, False, error.problems)
+    except CannotReadError as error:
+        return ResultProblem(name, False, (error.happened.rstrip("."),))
+
+
+def _thresholds_agree(rows: tuple[Threshold, ...], path: Path) -> bool:
+    return read_thresholds(path) == _as_in(path, rows, Threshold)
+
+
+def _as_in(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row, ...]:
+    """In the columns of the table: one that an older version wrote may lack some."""
+    return as_written_in(read_text(path), rows, row_type)
+
+
+def _computed(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
+    """The tables of thresholds that this session has, by their names."""
+    tables = {THRESHOLDS_NAME: thresholds(state.trials, state.protocol.staircase)}
+    if detection := detection_thresholds(state.trials, state.protocol):
+        tables[DETECTION_NAME] = detection
+    return tables
+
+
+def _summary_agrees(folder: SessionFolder, state: SessionState) -> bool:
+    """In what both know: a later version may say more."""
+    written, due = read_summary(folder.path), _summary(state)
+    if written is None or "session" not in written:
+        return False
+    return all(written[key] == due[key] for key in written.keys() & due.keys())
+
+
+def _summary(state: SessionState) -> dict[str, Any]:
+    opened = state.opened
+    return {
+        "session": opened.session,
+        "subject": opened.subject,
+        "observer": opened.observer,
+        "participant_number": opened.participant_number if state.takes_part else None,
+        "protocol": {"name": state.protocol.name, "hash": opened.protocol_hash, "locked": opened.protocol_locked},
+        "device": asdict(opened.device),
+        "equalizer": opened.equalizer,
+        "begun_utc": opened.utc,
+        "closed": state.closed,
+        "outcome": state.sitting.turned_away or ("completed" if state.closed else "unfinished"),
+        "runs": [
+            {"index": r.index, "phase": r.phase.value, "frequency_hz": r.frequency_hz, "practice": r.practice}
+            for r in state.runs
+        ],
+        "answers": state.answers,
+        "presentations": len(state.trials),
+    }
+
+
+def _write_summary(folder: SessionFolder, state: SessionState) -> None:
+    provenance = gather_provenance(
+        protocol_hash=state.opened.protocol_hash, seeds={"session": state.opened.seed}, parents=[folder.log]
+    )
+    write_json(folder.path / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION, _summary(state), provenance, overwrite=True)

@@ -1,0 +1,70 @@
+"""After a sitting, with the device closed: the results of a finished session, or why there are none."""
+
+from dataclasses import replace
+
+from study.devices.device import Fault
+from study.errors import DeviceError, LeftError, StudyError
+from study.session.counted import answers_are
+from study.session.void_reasons import TOO_BUSY
+from study.store.archive import SessionFolder
+from study.store.session_lock import locked
+from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
+from study.workflows.results.fold_session import FoldedSession
+from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables
+from study.workflows.results.written_analysis import WrittenAnalysis
+from study.workflows.session.conduct_session import Conducted
+from study.workflows.session.prepare_sitting import does_not_take_part
+from study.workflows.session.resume_session import already_finished
+from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+
+BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
+
+
+def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
+    """Raises StudyError for a session that is not finished: how to go on, and an exit code that says why it ended.
+    Erases first what a participant withdrew."""
+    if end.withdrawn:
+        raise _erased(end, utc)
+    if end.state.turned_away_for_good:
+        write_tables(end.folder)
+        raise does_not_take_part(end.state)
+    if end.left:
+        raise _not_finished(end)
+    return write_results(end.folder)
+
+
+def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalysis:
+    """What a kill after the last run left undone: seal, tables, summary and report. Raises StudyError where nothing is
+    due, or it cannot be written."""
+    if folded.state.turned_away_for_good:
+        finish_tables(folder, folded)
+        raise does_not_take_part(folded.state)
+    report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
+    due = (*due_results(folder, folded), *report)
+    if not due:
+        raise already_finished(folded.state, folder)
+    with locked(folder.path):
+        written = write_results(folder)
+    said = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
+    return replace(written, warnings=(said, *written.warnings))
+
+
+def _not_finished(end: Conducted) -> StudyError:
+    kind = LeftError if end.fault is Fault.NONE else DeviceError
+    return kind(
+        "The session is not finished",
+        f"The sitting ended: {end.left}.",
+        f"{BUSY_ADVICE if end.left.startswith(TOO_BUSY) else ''}Go on with: hapteq resume {end.folder.path}",
+        saved=f"{answers_are(end.state.answers)} on disk.",
+    )
+
+
+def _erased(end: Conducted, utc: str) -> StudyError:
+    data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
+    elsewhere = still_elsewhere(data, plan)
+    withdraw(data, plan, utc)
+    return LeftError(
+        "The participant withdrew",
+        f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
+        " ".join((*plan.doubtful, *elsewhere)),
+    )

@@ -1,0 +1,198 @@
+"""The equalizer of a session: read, checked against the protocol and the device, kept in the session folder."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_quality import quality_sentence
+from equalizer.plant.model_response import model_response
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.equalizer import Equalizer, Identity
+from equalizer.tracking.model_equalizer import ModelEqualizer
+from equalizer.tracking.periodic_inverse import inverse_response
+from equalizer.tracking.virtual_spring import VirtualSpring
+from protocols.study_protocol import StudyProtocol
+from study.devices.device import DeviceInfo
+from study.errors import StudyError
+from study.session.level_scale import EqualizedFacts, LevelScale
+from study.session.limits import SPRING_SLEW_N_PER_S, limits_of_study
+from study.session.state import SessionState
+from study.session.stimulus import direction_vector, held_stimulus
+from study.store.archive import SessionFolder
+from study.store.atomic_write import write_atomically
+from study.store.identified_model_file import read_identified_model
+from study.store.provenance import sha256_of
+from study.store.regular_file import read_regular
+from study.workflows.equalizer.spring_beside_model import spring_beside
+
+MODEL_NAME = "model.h5"
+NEAR_M = 0.02
+"""A model from a place farther away is of another device: by then the published coupling is back."""
+
+AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
+IDENTIFY_AGAIN = "Identify it again with hapteq identify."
+LEFT_OUT = 0.1
+"""Of a wanted acceleration, by the model itself: beyond this a level would not stand for what it says."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equalized:
+    """What stimuli go through, and what is to be known of it. `facts`: None where forces are commanded."""
+
+    equalizer: Equalizer
+    facts: EqualizedFacts | None
+    source: Path | None = None
+    """Of the model, to be kept with the session."""
+
+
+NOT_EQUALIZED = Equalized(Identity(), None)
+
+
+def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
+    """Raises StudyError where protocol and model do not go together, before any device is opened."""
+    wants_one = protocol.stimulus.quantity == "delivered_acceleration"
+    if wants_one and model is None:
+        raise StudyError(
+            "This protocol needs an equalizer",
+            f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and no model was given.",
+            "Give one with --model MODEL.h5; hapteq record and hapteq identify make it.",
+        )
+    if model is not None and not wants_one:
+        raise StudyError(
+            "This protocol does not use a model",
+            f"'{protocol.name}' moves the commanded force (stimulus.quantity), so {model} would change nothing.",
+            "Take --protocol equalized_threshold, or leave out --model.",
+        )
+    if model is not None:
+        _check_model(read_identified_model(model), protocol, model)
+
+
+def equalized_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> Equalized:
+    """For what `check_playable` let pass. Raises StudyError for a model that does not go with the device."""
+    if model is None:
+        return NOT_EQUALIZED
+    identified = read_identified_model(model)
+    equalizer = _equalizer(identified, protocol, info)
+    try:
+        scales = level_scales(protocol, equalizer, info.sample_rate_hz)
+    except (ValueError, ArithmeticError) as error:  # what linear algebra says of a model that is none
+        raise _refused(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
+    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
+    return Equalized(equalizer, facts, model)
+
+
+def keep_model(equalized: Equalized, folder: SessionFolder) -> None:
+    """Before the log names it."""
+    if equalized.source is not None:
+        write_atomically(folder.path / MODEL_NAME, read_regular(equalized.source))
+
+
+def equalized_again(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:
+    """For a session that goes on: its own model, which must be the one it was begun with."""
+    facts = state.opened.equalized
+    if facts is None:
+        return NOT_EQUALIZED
+    path = folder.path / facts.model
+    if not path.exists() or sha256_of(path) != facts.sha256:
+        raise StudyError(
+            "This session's model is not the one it was begun with",
+            f"{path} is {'changed' if path.exists() else 'missing'}, and levels would no longer mean the same.",
+            "Put the original file back, or begin a new session.",
+            saved="Nothing was changed.",
+        )
+    return Equalized(_equalizer(read_identified_model(path), state.protocol, info), facts)
+
+
+def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
+    """For every frequency of the protocol: the level that the harder direction needs for 1 m/s², onset included."""
+    cap_n = protocol.staircase.cap_n
+    scales = []
+    for frequency_hz in protocol.all_frequencies_hz:
+        n_per_mps2 = max(_hardest(protocol, equalizer, direction, frequency_hz, rate_hz) for direction in (1, 2))
+        scales.append(LevelScale(frequency_hz, n_per_mps2, cap_n / n_per_mps2))
+    return tuple(scales)
+
+
+def _hardest(
+    protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
+) -> float:
+    """The peak force for 1 m/s² or, where it is the slew limit that comes first, the force that stands for that."""
+    limits, cap_n = limits_of_study(protocol), protocol.staircase.cap_n
+    vector = direction_vector(protocol.directions, direction)
+    stimulus = held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
+    forces = stimulus.played_once_then_loop
+    steps = np.diff(np.concatenate([np.zeros((1, 3)), forces, stimulus.loop.samples[:1]]), axis=0)
+    slewing_n = _largest(steps) * rate_hz / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S) * cap_n
+    return max(_largest(forces), slewing_n)
+
+
+def _largest(vectors: FloatArray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max())
+
+
+def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> ModelEqualizer:
+    if model.sample_rate_hz != info.sample_rate_hz:
+        raise _refused(
+            f"It runs at {model.sample_rate_hz:g} Hz, the device at {info.sample_rate_hz:g} Hz.",
+            "Identify it from recordings of this device.",
+        )
+    stiffness = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
+    acting = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
+    return ModelEqualizer(model, spring_beside(model, acting))
+
+
+def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    shape = (model.D.shape, model.input_unit, model.output_unit)
+    if shape != ((3, 3), "N", "m/s^2"):
+        raise _refused(
+            f"{path} goes from {model.D.shape[1]} inputs in {model.input_unit} to {model.D.shape[0]} outputs in "
+            f"{model.output_unit}; a stimulus needs three forces in N and three accelerations in m/s^2.",
+            "Identify a model from a recording of all three axes.",
+        )
+    if model.spectral_radius >= 1:
+        raise _refused(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
+    low, high = model.band_hz
+    outside = [f"{f:g}" for f in protocol.all_frequencies_hz if not low <= f <= high]
+    if outside:
+        raise _refused(
+            f"{path} was made for {low:g} to {high:g} Hz; the protocol also plays {', '.join(outside)} Hz.",
+            "Identify a model that covers the protocol, such as hapteq identify --band 5 50.",
+        )
+    if model.place_m is not None and math.dist(model.place_m, (0.0, 0.0, 0.0)) > NEAR_M:
+        raise _refused(
+            f"{path} was identified at {model.place_m} m, and the study is at the centre.",
+            "Record and identify at the centre of the workspace.",
+        )
+    _check_axes(model, path)
+    _check_reach(model, protocol, path)
+
+
+def _check_axes(model: IdentifiedModel, path: Path) -> None:
+    """Other names may be anybody's; ours in another order would send forces along the wrong axes."""
+    for names, ours in zip((model.input_channels, model.output_channels), AXES, strict=True):
+        if set(names) == set(ours) and names != ours:
+            raise _refused(
+                f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order {', '.join(ours)}.",
+                "Identify a model from a recording whose channels are in that order.",
+            )
+
+
+def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    frequency_hz = np.array(protocol.all_frequencies_hz)
+    wanted = np.stack([direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
+    with np.errstate(all="ignore"):
+        reached = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ wanted
+        left_out = np.linalg.norm(reached - wanted, axis=1).max(axis=1)
+    beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LEFT_OUT]
+    if beyond:
+        raise _refused(
+            f"By {path} itself, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",
+            "Check units and axes of the recording it was made from, and identify it again.",
+        )
+
+
+def _refused(happened: str, do_now: str) -> StudyError:
+    return StudyError("This model cannot equalize the study", happened, do_now, saved="Nothing moved.")

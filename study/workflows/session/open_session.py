@@ -1,0 +1,98 @@
+"""Begin a session: a folder of its own, a log with its first line, and everything that first line fixes."""
+
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from protocols.hashing import protocol_hash
+from protocols.study_protocol import StudyProtocol
+from study.devices.clock import Clock
+from study.devices.device import DeviceInfo
+from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
+from study.session.fold import begin_session
+from study.session.rules import LATEST
+from study.session.state import SessionState
+from study.store.archive import SessionFolder, new_session_folder
+from study.store.event_log import EventLog
+from study.store.provenance import versions
+from study.store.session_lock import locked
+from study.workflows.session.equalize_stimuli import Equalized, keep_model
+from study.workflows.session.other_sessions import dose_before
+from study.workflows.session.participant_number import participant_number
+
+
+@dataclass(frozen=True, slots=True)
+class SessionPlan:
+    """What is decided before anybody sits down."""
+
+    protocol: StudyProtocol
+    protocol_text: str
+    protocol_locked: bool
+    subject: str
+    observer: str | None
+    """Name of the simulated participant; None for a person."""
+    seed: int
+    data: Path
+    participant_number: int | None = None
+    """Place in a balanced order; None counts the participants in the data folder."""
+    model: Path | None = None
+    """Identified model that equalizes the stimuli; None where forces are commanded."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenedSession:
+    folder: SessionFolder
+    log: EventLog
+    state: SessionState
+
+
+def fresh_seed() -> int:
+    return secrets.randbits(32)
+
+
+@contextmanager
+def opened_session(
+    plan: SessionPlan, device: DeviceInfo, equalized: Equalized, clock: Clock
+) -> Iterator[OpenedSession]:
+    """A new session, locked as long as the context lasts."""
+    number = plan.participant_number
+    if number is None:
+        number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
+    folder = new_session_folder(plan.data, plan.subject)
+    utc = clock.utc()
+    opened = SessionOpened(
+        utc=utc,
+        format=SESSION_FORMAT,
+        version=SESSION_VERSION,
+        session=folder.name,
+        subject=plan.subject,
+        participant_number=number,
+        observer=plan.observer,
+        protocol_text=plan.protocol_text,
+        protocol_hash=protocol_hash(plan.protocol),
+        protocol_locked=plan.protocol_locked,
+        seed=plan.seed,
+        device=device_facts(device),
+        equalizer=equalized.equalizer.name,
+        versions=versions(),
+        equalized=equalized.facts,
+        monotonic_s=clock.now_s(),
+        dose_elsewhere=dose_before(folder, plan.observer, device.simulated, utc),
+        rules=LATEST,
+    )
+    with locked(folder.path):
+        keep_model(equalized, folder)
+        log = EventLog.create(folder.log)
+        try:
+            log.append(opened)
+            yield OpenedSession(folder, log, begin_session(opened, plan.protocol))
+        finally:
+            log.close()
+
+
+def device_facts(info: DeviceInfo) -> DeviceFacts:
+    return DeviceFacts(
+        name=info.name, simulated=info.simulated, sample_rate_hz=info.sample_rate_hz, details=info.details
+    )

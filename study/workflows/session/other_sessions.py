@@ -1,0 +1,32 @@
+"""The other sessions of a participant, as far as they bear on the vibration dose of the hand."""
+
+from study.errors import StudyError
+from study.session.daily_dose import dose_elsewhere
+from study.session.sitting_events import DoseElsewhere
+from study.session.sitting_state import SittingState
+from study.store.archive import SessionFolder, session_folders
+from study.workflows.results.fold_session import fold_session
+
+
+def dose_before(folder: SessionFolder, observer: str | None, simulated: bool, utc: str) -> DoseElsewhere | None:
+    """What this participant's hand got today in the other sessions of the data folder on the same kind of device.
+
+    A session that cannot be read is named and not counted. None for a simulated participant.
+    """
+    if observer is not None:
+        return None
+    sittings: dict[str, SittingState] = {}
+    unread: list[str] = []
+    for other in session_folders(folder.path.parent):
+        if other.subject != folder.subject:
+            continue
+        try:
+            if other.withdrawn or not other.log.exists():
+                continue
+            state = fold_session(other).state
+        except (StudyError, OSError):
+            unread.append(other.name)
+            continue
+        if state.opened.observer is None and state.opened.device.simulated == simulated:
+            sittings[other.name] = state.sitting
+    return dose_elsewhere(sittings, folder.name, utc, tuple(unread))

@@ -1,0 +1,102 @@
+"""Which participant of a protocol somebody is: chooses the row of a balanced order, and who has swapped labels."""
+
+import re
+import tomllib
+from pathlib import Path
+
+from study.errors import StudyError
+from study.session.events import PlaceTaken, SessionOpened, parse_event
+from study.session.log_chain import Chain, read_chained
+from study.session.rules import place_comes_later
+from study.session.state import SessionState
+from study.store.archive import SessionFolder, session_folders
+from study.store.event_log import read_opening
+from study.store.regular_file import read_regular
+from study.store.session_lock import places_locked
+from study.store.withdrawal_files import Begun, begun_of_tombstone, read_intent
+from study.workflows.trial.sitting import Sitting, record
+
+PLACED = b'"event":"place_taken"'
+NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
+"""In the first line, and in that of the place; the last that is there holds."""
+PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
+OF_A_PERSON = b'"observer":null'
+PRESENTED = b'"event":"trial_presented"'
+
+
+def participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
+    """0 for the first participant of this protocol in the data folder; a returning one keeps the number.
+
+    Those who take part count: a person who refused, was excluded, or left before the place was taken has none.
+    People and simulated participants are counted apart. Withdrawn ones keep their number, so that no row of a
+    balanced order is given twice, and so do those whose log was damaged, as far as anything is left of it.
+    """
+    numbers = []
+    for folder in session_folders(data):
+        begun = begun_in(folder)
+        if begun is None or begun.number is None or (begun.protocol, begun.simulated) != (protocol, simulated):
+            continue
+        if folder.subject == subject and not folder.withdrawn:
+            return begun.number
+        numbers.append(begun.number)
+    return max(numbers, default=-1) + 1
+
+
+def begun_in(folder: SessionFolder) -> Begun | None:
+    """None where nothing was begun, or nothing can be read of it."""
+    if folder.tombstone.exists():
+        return begun_of_tombstone(folder)
+    intent = read_intent(folder.path.parent, folder.subject)
+    if intent is not None and folder.name in intent.sessions:
+        return intent.sessions[folder.name]
+    try:
+        opening = read_opening(folder.log)
+        if not isinstance(opening, SessionOpened):
+            return None
+        name = tomllib.loads(opening.protocol_text).get("name", "")
+    except (StudyError, OSError, TypeError, ValueError, RecursionError):
+        return _begun_in_damaged(folder)
+    return Begun(name, opening.observer is not None, _place(folder, opening))
+
+
+def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
+    """By what is left of a damaged log: a place that is held too long costs a row of the balanced order, a place that
+    is given twice costs its balance."""
+    try:
+        content = read_regular(folder.log)
+    except OSError:
+        return None
+    opening = content.partition(b"\n")[0]
+    name, numbers = PROTOCOL_NAME.search(opening), NUMBER.findall(content)
+    if name is None or not numbers:
+        return None
+    return Begun(name[1].decode(errors="replace"), OF_A_PERSON not in opening, int(numbers[-1]))
+
+
+def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:
+    """From the lines before the first trial, so that a long log is not read for it."""
+    if not place_comes_later(opening):
+        return opening.participant_number
+    chain = Chain()
+    try:
+        for line in read_regular(folder.log).split(b"\n")[:-1]:
+            if PRESENTED in line:
+                return opening.participant_number
+            chain, event = read_chained(chain, line)
+            if PLACED in line and isinstance(place := parse_event(event), PlaceTaken):
+                return place.participant_number
+    except OSError:
+        return None
+    except ValueError:  # damaged before the first trial: most likely the expected number was taken
+        return opening.participant_number
+    return None
+
+
+def take_place(state: SessionState, sitting: Sitting) -> SessionState:
+    """Once for a person, when everything before the first stimulus is passed. Two programs take places in turn."""
+    if not place_comes_later(state.opened) or state.takes_part:
+        return state
+    data = sitting.folder.path.parent
+    with places_locked(data):
+        number = participant_number(data, state.opened.subject, state.protocol.name, simulated=False)
+        return record(state, PlaceTaken(utc=sitting.clock.utc(), participant_number=number), sitting)

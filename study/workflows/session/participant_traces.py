@@ -1,0 +1,193 @@
+"""Where a data folder speaks of a participant: what is proved to be theirs, and what only looks so.
+
+Proved is a session folder whose log, or tombstone, says this session of this participant; an analysis whose tables
+name the participant; a half-made file or folder that does. Links are named and never followed.
+"""
+
+import csv
+import io
+import json
+import re
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from study.store.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
+from study.store.real_folder import is_real_file, is_real_folder
+from study.store.regular_file import open_regular, read_regular
+from study.store.session_lock import LOCK_NAME
+from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
+from study.store.withdrawal_files import read_tombstone
+from study.store.written_elsewhere import WRITTEN_ELSEWHERE
+from study.workflows.results.analysis_files import ANALYSIS_NAME, written_by_analysis
+
+PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
+"""What a write that was cut off leaves, file or folder."""
+
+LARGEST_BYTES = 1 << 24
+"""Of a file that is searched for a name; recordings and pictures are not."""
+LONGEST_LINE = 1 << 20
+TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
+
+
+@dataclass(frozen=True, slots=True)
+class Traces:
+    sessions: tuple[str, ...]
+    """Names of the session folders that are proved to be the participant's."""
+    derived: tuple[str, ...]
+    """Analyses and half-made files that are, relative to the data folder."""
+    doubtful: tuple[str, ...]
+    """Sentences on what may be the participant's and is not erased."""
+
+
+def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Traces:
+    """data: the resolved data folder. proved: session folders that were before their logs were erased. Reads only."""
+    sessions, derived, doubtful = [], [], []
+    for path in sorted(data.iterdir()):
+        match = FOLDER.fullmatch(path.name)
+        if match is not None and match["subject"] == subject:
+            # A log that came into the folder since is not erased for what the folder was.
+            if is_session_of(path, subject) or (path.name in proved and _was_session(path)):
+                sessions.append(path.name)
+            else:
+                doubtful.append(_no_session(path, subject))
+        elif is_real_folder(path) and PART.fullmatch(path.name) is None:
+            doubtful += _strange_folder(path, subject)
+        elif path.is_symlink() and path.name == ANALYSIS_NAME:
+            doubtful.append(f"{path.name} is a link; what it leads to was not looked at.")
+    for folder in (data, *(p for p in sorted(data.iterdir()) if _may_hold_analysis(p))):
+        found, unclear = _analysis_traces(folder, subject, alone=folder != data)
+        derived += [path.relative_to(data).as_posix() for path in found]
+        doubtful += [f"{path.relative_to(data)} does not say whose numbers it holds." for path in unclear]
+    doubtful += [
+        f"{path.name} names {subject}."
+        for path in sorted(data.iterdir())
+        if is_real_file(path) and path.name not in derived and _is_others_file(path, subject) and _names(path, subject)
+    ]
+    return Traces(tuple(sessions), tuple(dict.fromkeys(derived)), tuple(doubtful))
+
+
+def is_session_of(path: Path, subject: str) -> bool:
+    """A real folder that holds, by the opening line of its log or by its tombstone, this session of this subject."""
+    if not is_real_folder(path):
+        return False
+    folder = SessionFolder(path)
+    if (opening := _opening(folder)) is not None:
+        return opening == (path.name, subject)
+    return is_real_file(folder.tombstone) and read_tombstone(folder).get("session") == path.name
+
+
+def _was_session(path: Path) -> bool:
+    """Its log, which goes last, is erased, and nothing else has come into the folder since."""
+    if not is_real_folder(path):
+        return False
+    names = {inner.name for inner in path.iterdir() if PART.fullmatch(inner.name) is None}
+    return names <= {LOCK_NAME, TOMBSTONE_NAME}
+
+
+def analysis_names(folder: Path, subject: str) -> bool | None:
+    """Whether the analysis in this folder is also of this subject; None where it does not say."""
+    said = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
+    said.append(_statistics_name(folder / "anova.json", subject))
+    if any(said):
+        return True
+    figure = re.compile(rf"staircases-\d+-{re.escape(subject)}\.(svg|png)")
+    if any(figure.fullmatch(path.name) for path in written_by_analysis(folder)):
+        return True
+    return None if all(one is None for one in said) else False
+
+
+def _opening(folder: SessionFolder) -> tuple[Any, Any] | None:
+    """Session and subject, even where the rest of the first line is damaged."""
+    if not is_real_file(folder.log):
+        return None
+    try:
+        with open_regular(folder.log) as file:
+            opening = json.loads(file.readline(LONGEST_LINE))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return (opening.get("session"), opening.get("subject")) if isinstance(opening, dict) else None
+
+
+def _no_session(path: Path, subject: str) -> str:
+    if path.is_symlink():
+        return f"{path.name} is a link; neither it nor what it leads to was touched."
+    return f"{path.name} holds no log that says it is a session of {subject}."
+
+
+def _strange_folder(path: Path, subject: str) -> Iterator[str]:
+    opening = _opening(SessionFolder(path))
+    if opening is not None and opening[1] == subject:
+        yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
+    elif _names(path / "diagnosis.json", subject):
+        yield f"{path.name} holds a diagnosis that names {subject}."
+
+
+def _may_hold_analysis(path: Path) -> bool:
+    return is_real_folder(path) and FOLDER.fullmatch(path.name) is None and PART.fullmatch(path.name) is None
+
+
+def _analysis_traces(folder: Path, subject: str, alone: bool) -> tuple[list[Path], list[Path]]:
+    """Proved and unclear ones: the files of the analysis in `folder`, and what was half made there.
+    alone: what is half made there belongs to the analysis."""
+    files = list(written_by_analysis(folder))
+    whose = analysis_names(folder, subject) if files else False
+    found, unclear = (files if whose else []), (files if whose is None and folder.name == ANALYSIS_NAME else [])
+    places = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
+    for path in (path for place in places for path in sorted(place.iterdir())):
+        if PART.fullmatch(path.name) is None or path.is_symlink():
+            continue
+        if (whose and alone) or _names(path, subject):
+            found.append(path)
+        else:
+            unclear.append(path)
+    return found, unclear
+
+
+def _rows_name(table: Path, subject: str) -> bool | None:
+    text = _text(table)
+    if text is None:
+        return None
+    try:
+        return any(row.get("subject") == subject for row in csv.DictReader(io.StringIO(text)))
+    except csv.Error:
+        return None
+
+
+def _statistics_name(path: Path, subject: str) -> bool | None:
+    text = _text(path)
+    try:
+        document = json.loads(text) if text is not None else None
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(document, dict):
+        return None
+    origin = document.get("provenance")
+    seeds = origin.get("seeds") if isinstance(origin, dict) else None
+    sessions = [str(name).rpartition("_")[0] for name in seeds] if isinstance(seeds, dict) else []
+    people = document.get("participants")
+    return subject in sessions or (isinstance(people, list) and subject in people)
+
+
+def _is_others_file(path: Path, subject: str) -> bool:
+    """Not one of those that the program keeps beside the sessions."""
+    return path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE) and PART.fullmatch(path.name) is None
+
+
+def _names(path: Path, subject: str) -> bool:
+    """Whether a name says a session of this subject, or a text does; of a folder, anything in it."""
+    session = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}(_\d{{3,}}|\.withdrawal\.json)(?!\d)")
+    if session.search(path.name):
+        return True
+    if is_real_folder(path):
+        return any(_names(inner, subject) for inner in sorted(path.iterdir()))
+    return path.suffix in TEXTS and session.search(_text(path) or "") is not None
+
+
+def _text(path: Path) -> str | None:
+    """None where it is no regular file, or too large for one of ours."""
+    try:
+        return read_regular(path, LARGEST_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
+    except OSError:
+        return None

@@ -1,0 +1,93 @@
+"""Before the instructions, in each sitting: consent, exclusion, the set-up, and a look at device and computer."""
+
+from dataclasses import replace
+
+from study.errors import StudyError
+from study.session.archive_views import TURNED_AWAY
+from study.session.events import DeviceChecked, FormFilled, SessionClosed
+from study.session.form_views import Form
+from study.session.forms import confirmation_of, confirmed, judge_form
+from study.session.machine import CheckDevice, FillIn, Leave, next_preparation
+from study.session.requests import NoteAsked
+from study.session.state import SessionState
+from study.session.views import DeviceFinding
+from study.workflows.checks.check_device import check_device
+from study.workflows.checks.check_timing import check_computer
+from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.trial.sitting import Sitting, record, write_notes
+
+
+def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState, str]:
+    """Returns why the sitting ends before it began; empty where it goes on."""
+    while (due := next_preparation(state)) is not None:
+        match due:
+            case Leave(reason=reason):
+                return state, reason
+            case FillIn(form=form):
+                state = fill_in(state, form, sitting)
+            case CheckDevice():
+                state = _check_device(state, sitting)
+        state = write_notes(state, sitting)
+        if sitting.attendant.stop_asked is not None:
+            return state, f"the {sitting.attendant.stop_asked} stopped the session"
+    return state, ""
+
+
+def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
+    sitting.attendant.begin("form")
+    reply = sitting.display.fill_in(form)
+    outcome = judge_form(state.protocol, form.kind, reply)
+    if not outcome.passed and not confirmed(sitting.display.fill_in(confirmation_of(form, reply))):
+        # A slip of the finger: asked once more, and what is answered then holds. The slip itself is kept nowhere.
+        outcome = judge_form(state.protocol, form.kind, sitting.display.fill_in(form))
+    event = FormFilled(
+        utc=sitting.clock.utc(),
+        form=form.kind.value,
+        version=form.version,
+        ethics_id=form.ethics_id,
+        passed=outcome.passed,
+        answers=outcome.kept,
+    )
+    state = record(state, event, sitting)
+    if outcome.reminder:
+        sitting.display.trouble(outcome.reminder)
+        sitting.attendant.note(NoteAsked("program", outcome.reminder))
+    return state
+
+
+def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
+    """The session is over: nothing but the outcome is in it."""
+    state = write_notes(state, sitting)
+    outcome = state.sitting.turned_away or "refused"
+    return record(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
+
+
+def does_not_take_part(state: SessionState) -> StudyError:
+    """At the end of such a sitting, and where it is to be resumed."""
+    return StudyError(
+        "This person does not take part",
+        f"{state.opened.session} is over: {TURNED_AWAY[state.sitting.turned_away or 'refused']}.",
+        "Begin a session for the next participant.",
+        saved="Nothing was played. Only this outcome is kept, and no place in the order of conditions was taken.",
+    )
+
+
+def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
+    """As often as somebody wants to check again. Going on in spite of a finding is their decision, and is logged."""
+    sitting.attendant.begin("preparing")
+    device, clock = sitting.device, sitting.clock
+    safety = state.protocol.safety
+    report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
+    # In virtual time nothing waits for a processor.
+    load = None if clock.virtual else load_per_processor()
+    computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
+    report = replace(report, findings=(*report.findings, *computer))
+    go_on = sitting.display.device_checked(report)
+    findings = tuple(f"{finding.name}: {finding.value}{_said(finding)}" for finding in report.findings)
+    return record(state, DeviceChecked(utc=sitting.clock.utc(), passed=go_on, findings=findings), sitting)
+
+
+def _said(finding: DeviceFinding) -> str:
+    if finding.fine:
+        return ""
+    return " (warning)" if finding.warning else " (not fine)"

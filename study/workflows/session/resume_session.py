@@ -1,0 +1,209 @@
+"""Go on with a session after a crash or a pause: fold its log, check it, close what was left open."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from protocols.schedule import label_of
+from protocols.trial import VoidCause
+from study.devices.clock import Clock
+from study.devices.device import DeviceInfo
+from study.errors import StudyError
+from study.session.counted import answers_are
+from study.session.delivered import delivered
+from study.session.due_trial import labels_are_swapped
+from study.session.events import (
+    SessionClosed,
+    SessionInterrupted,
+    SessionResumed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
+from study.session.fold import apply
+from study.session.state import SessionState
+from study.session.stimulus import direction_vector
+from study.store.archive import SessionFolder
+from study.store.event_log import EventLog, mend
+from study.store.live_file import remove_live
+from study.store.privacy import close_data_folder, close_to_others
+from study.store.provenance import versions
+from study.store.request_inbox import RequestInbox
+from study.store.session_lock import locked
+from study.store.trial_recordings import find_trial_recording, recording_name
+from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.session_results import write_tables
+from study.workflows.session.open_session import OpenedSession, device_facts
+from study.workflows.session.other_sessions import dose_before
+from study.workflows.session.prepare_sitting import does_not_take_part
+from study.workflows.trial.judge_trial import Judgement, judge
+from study.workflows.trial.trial_facts import known_again
+
+
+@contextmanager
+def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
+    """An existing session, mended and locked as long as the context lasts."""
+    close_data_folder(folder.path.parent)
+    close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
+    with locked(folder.path):
+        log = EventLog.reopen(folder.log)
+        # Yesterday's stop must not end today's sitting; from now on somebody hears. Nor does yesterday's live state
+        # say anything of today, whatever its time is.
+        RequestInbox(folder.path).clear()
+        remove_live(folder.path)
+        try:
+            folded = fold_session(folder)
+            if folded.state.turned_away_for_good:
+                _close_as_turned_away(folded, folder, log, clock)
+                raise does_not_take_part(folded.state)
+            _check_resumable(folded.state, device, folder)
+            mend(folder.log, folded.contents)
+            utc, observer = clock.utc(), folded.state.opened.observer
+            resumed = SessionResumed(
+                utc=utc,
+                device=device_facts(device),
+                versions=versions(),
+                mended=folded.contents.torn,
+                dose_elsewhere=dose_before(folder, observer, device.simulated, utc),
+                monotonic_s=clock.now_s(),
+            )
+            log.append(resumed)
+            # Ctrl-C, which a participant may press too, is told from a program that died.
+            interrupted = isinstance(folded.contents.events[-1], SessionInterrupted)
+            state = _close_open_trial(apply(folded.state, resumed), folder, log, clock, interrupted)
+            yield OpenedSession(folder, log, state)
+        finally:
+            log.close()
+
+
+def _close_as_turned_away(folded: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
+    """What the program may have died before: the last line, seal and tables."""
+    if not folded.state.closed:
+        mend(folder.log, folded.contents)
+        outcome = folded.state.sitting.turned_away or "refused"
+        log.append(SessionClosed(utc=clock.utc(), outcome=outcome, monotonic_s=clock.now_s()))
+    write_tables(folder)
+
+
+def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:
+    if state.closed:
+        raise already_finished(state, folder)
+    if device.simulated != state.opened.device.simulated:
+        raise StudyError(
+            "This session was begun on another kind of device",
+            f"{folder.name} was begun on '{state.opened.device.name}', now there is '{device.name}'. Felt and unfelt "
+            "answers never mix.",
+            "Resume it with the device it was begun on.",
+            saved="Nothing was changed.",
+        )
+
+
+def already_finished(state: SessionState, folder: SessionFolder) -> StudyError:
+    return StudyError(
+        "This session is finished",
+        f"{folder.name} has all its runs.",
+        f"Look at its results: hapteq analyze {folder.path}",
+        saved=f"{answers_are(state.answers)} on disk.",
+    )
+
+
+def _close_open_trial(
+    state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock, interrupted: bool
+) -> SessionState:
+    """An answered trial counts; an unanswered one is void, because it may have been felt."""
+    presented = state.presented
+    if presented is None:
+        return state
+    if state.answered is None:
+        event: TrialMeasured | TrialSpoiled = TrialSpoiled(
+            utc=clock.utc(),
+            run=presented.run,
+            trial=presented.trial,
+            attempt=presented.attempt,
+            reason="the program ended before the answer",
+            monotonic_s=clock.now_s(),
+            cause=VoidCause.LEFT if interrupted else VoidCause.PROGRAM_ENDED,
+        )
+    else:
+        event = _judged_late(state, presented, folder, clock)
+    log.append(event)
+    return apply(state, event)
+
+
+def _judged_late(
+    state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
+) -> TrialMeasured | TrialSpoiled:
+    """The program died between answer and measurement: the recording may still have reached the disk.
+
+    A recording is written only of a trial that was judged to count. Without one, the trial is judged by what was
+    logged with its answer. Where that is unknown too (older logs) the answer counts, unmeasured: the person gave it,
+    the staircase of an earlier sitting may have moved by it, and to drop answers by what cannot be known would choose
+    among them after they were seen.
+    """
+    try:
+        late = _from_recording(state, presented, folder, clock)
+    except (StudyError, ValueError):  # the answer is safe in the log; a damaged recording stays for a later look
+        late = None
+    return late if late is not None else _without_recording(state, presented, clock)
+
+
+def _without_recording(state: SessionState, presented: TrialPresented, clock: Clock) -> TrialMeasured | TrialSpoiled:
+    logged = state.answered.health if state.answered is not None else None
+    health = known_again(logged) if logged is not None else None
+    verdict = Judgement("", ())
+    if health is not None and logged is not None:
+        verdict = judge(health, state.protocol.measurement, logged.felt_whole)
+    missed_ticks = health.missed_ticks if health is not None else None
+    vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
+    if verdict.spoiled:
+        return TrialSpoiled(
+            utc=clock.utc(),
+            run=presented.run,
+            trial=presented.trial,
+            attempt=presented.attempt,
+            reason=verdict.spoiled,
+            missed_ticks=missed_ticks,
+            vibrated_s=vibrated_s,
+            monotonic_s=clock.now_s(),
+            cause=verdict.cause,
+        )
+    return TrialMeasured(
+        utc=clock.utc(),
+        run=presented.run,
+        trial=presented.trial,
+        attempt=presented.attempt,
+        status="unmeasured",
+        flags=("its recording was lost when the program ended", *verdict.flags),
+        missed_ticks=missed_ticks,
+        vibrated_s=vibrated_s,
+        monotonic_s=clock.now_s(),
+    )
+
+
+def _from_recording(
+    state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
+) -> TrialMeasured | None:
+    """None where there is none. Raises StudyError, ValueError where it cannot be used."""
+    found = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
+    if found is None:
+        return None
+    saved, recording = found
+    logged = state.answered.health if state.answered is not None else None
+    direction = label_of(presented.direction, labels_are_swapped(state.protocol, state.opened))
+    vector = direction_vector(state.protocol.directions, direction)
+    values = delivered(recording, vector, presented.frequency_hz)
+    return TrialMeasured(
+        utc=clock.utc(),
+        run=presented.run,
+        trial=presented.trial,
+        attempt=presented.attempt,
+        status="flagged",
+        flags=("measured after a restart", *recording.meta.get("flags", ())),
+        recording=saved.name,
+        sha256=saved.sha256,
+        delivered_mps2=values.along_mps2 if values else None,
+        off_axis_mps2=values.off_axis_mps2 if values else None,
+        displacement_mm=values.displacement_mm if values else None,
+        missed_ticks=recording.meta.get("missed_ticks"),
+        vibrated_s=logged.ticks / state.opened.device.sample_rate_hz if logged is not None else None,
+        monotonic_s=clock.now_s(),
+    )

@@ -1,0 +1,233 @@
+"""The loop of a session: ask the machine what is next, do it, log it, until nothing is left."""
+
+import contextlib
+from dataclasses import dataclass, replace
+
+from protocols.practice import practice_passed, practised, right_of_last
+from protocols.trial import Phase
+from study.devices.device import Fault
+from study.errors import DeviceError, LeftError, StudyError
+from study.session.archive_views import TURNED_AWAY
+from study.session.counted import answers_are
+from study.session.due_trial import Present, labels_are_swapped
+from study.session.events import RestTaken, SessionClosed, SessionInterrupted
+from study.session.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
+from study.session.progress import progress
+from study.session.state import SessionState, felt
+from study.session.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
+from study.session.void_reasons import busy_sentence, why_too_many
+from study.store.log_seal import seal_log
+from study.workflows.results.fold_session import fold_session
+from study.workflows.session.participant_number import take_place
+from study.workflows.session.prepare_sitting import fill_in, prepare_sitting, turn_away
+from study.workflows.trial.after_trial import AfterTrial
+from study.workflows.trial.demonstrate import demonstrate
+from study.workflows.trial.present_trial import present_trial
+from study.workflows.trial.sitting import Sitting, record, tell, write_notes
+from study.workflows.trial.take_pause import take_pause
+
+VOID_TRIALS_IN_A_ROW = 3
+"""After so many presentations that nobody asked to repeat were void, the sitting ends: nobody is there, or the device
+is not well. A stimulus must not shake an empty chair all night."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEnd:
+    state: SessionState
+    left: str
+    """Why the sitting ended before the session was finished; empty where it is finished."""
+    fault: Fault = Fault.NONE
+    """What was wrong with the device, if that was why."""
+    withdrawn: bool = False
+    """The participant takes the consent back: the data are to be erased."""
+
+
+def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
+    """Run until the session is finished or somebody leaves.
+
+    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and leaves as LeftError. Any StudyError
+    on the way leaves with the number of answers that are on disk, and how to go on.
+    """
+    try:
+        end = _sit(state, sitting)
+    except KeyboardInterrupt as interruption:
+        sitting.device.stop()
+        return _interrupted(sitting, interruption)
+    except StudyError as error:
+        sitting.device.stop()
+        raise _with_the_way_back(error, sitting) from error
+    except BaseException:
+        sitting.device.stop()
+        raise
+    # Whoever leaves here by Ctrl-C leaves what is over already.
+    with contextlib.suppress(KeyboardInterrupt):
+        outcome = end.state.sitting.turned_away if end.state.closed else ""
+        sitting.display.goodbye(Goodbye(not end.left, end.state.answers, end.left, outcome))
+    # As long as the log is open, who notes something is told that the session writes it.
+    end = replace(end, state=write_notes(end.state, sitting))
+    if end.state.closed:
+        seal_log(sitting.folder.log)
+    return end
+
+
+def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
+    state, refused = prepare_sitting(state, sitting)
+    if state.turned_away_for_good:
+        return SessionEnd(turn_away(state, sitting), refused)
+    if refused:
+        return _end(AfterTrial(state, leave=refused), sitting)
+    state = take_place(state, sitting)
+    sitting.attendant.begin("instructions")
+    sitting.display.welcome(_welcome(state, sitting))
+    return _loop(state, sitting)
+
+
+def _interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
+    """What is on the disk decides: a session whose last line was written is finished, however it ended."""
+    state = fold_session(sitting.folder).state
+    still_on = sitting.device.fault() is Fault.FORCE_LEFT
+    if state.turned_away_for_good:  # nothing was played; its last line may be missing
+        state = state if state.closed else turn_away(state, sitting)
+        return SessionEnd(state, TURNED_AWAY[state.sitting.turned_away or "refused"])
+    if state.closed and not still_on:
+        return SessionEnd(state, left="")
+    # A full disk must not hide why the sitting ended.
+    with contextlib.suppress(StudyError):
+        sitting.log.append(
+            SessionInterrupted(
+                utc=sitting.clock.utc(),
+                reason="interrupted: Ctrl-C, or the terminal was closed",
+                monotonic_s=sitting.clock.now_s(),
+            )
+        )
+    way_back = f"Go on with: hapteq resume {sitting.folder.path}"
+    saved = f"{answers_are(state.answers)} on disk."
+    if still_on:
+        raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, way_back, saved) from interruption
+    raise LeftError("Interrupted", "The force was released.", way_back, saved) from interruption
+
+
+def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
+    """The same error; only the session knows how much is safe and how to go on."""
+    with contextlib.suppress(StudyError):
+        state = fold_session(sitting.folder).state
+        if not state.turned_away_for_good:
+            error.saved = f"{answers_are(state.answers)} on disk."
+            error.do_now = f"{error.do_now} Then go on with: hapteq resume {sitting.folder.path}"
+    return error
+
+
+def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
+    voids: tuple[str, ...] = ()
+    while True:
+        state = write_notes(state, sitting)
+        action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
+        if isinstance(action, Finish):
+            state = _say_busy(state, sitting)
+            closed = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
+            state = record(state, closed, sitting)
+            seal_log(sitting.folder.log)
+            return SessionEnd(state, left="")
+        after = _act(state, action, sitting)
+        voids = (*voids, after.void) if after.void else ()
+        if len(voids) >= VOID_TRIALS_IN_A_ROW:
+            after = replace(after, leave=after.leave or why_too_many(voids))
+        pause = _pause_wanted(after, sitting)
+        if pause and not after.leave:
+            broken = take_pause(after.state, pause, sitting)
+            after = replace(after, state=broken.state, leave=broken.leave)
+            if broken.withdrawn:
+                return replace(_end(after, sitting), withdrawn=True)
+        if stopped := sitting.attendant.stop_asked:
+            after = replace(after, leave=after.leave or f"the {stopped} stopped the session")
+        if after.leave:
+            return _end(after, sitting)
+        state = after.state
+
+
+def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
+    match action:
+        case Leave(reason=reason):
+            return AfterTrial(state, leave=reason)
+        case Rest(seconds=seconds):
+            return AfterTrial(_rest(state, seconds, sitting))
+        case FillIn(form=form):
+            return AfterTrial(fill_in(state, form, sitting))
+        case Demonstrate():
+            return demonstrate(state, sitting)
+        case Present() as present:
+            after = present_trial(state, present, sitting)
+            if not after.leave:
+                _between_trials(after, present, state, sitting)
+            return after
+        case Finish():
+            return AfterTrial(state)
+
+
+def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
+    state = _say_busy(write_notes(after.state, sitting), sitting)
+    left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
+    return SessionEnd(record(state, left, sitting), after.leave, after.fault)
+
+
+def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
+    """At the end of a sitting, to the experimenter: on the screen and in the log."""
+    if not state.sitting.busy_voids:
+        return state
+    tell(busy_sentence(state.sitting.busy_voids), sitting)
+    return write_notes(state, sitting)
+
+
+def _pause_wanted(after: AfterTrial, sitting: Sitting) -> str:
+    sitting.attendant.listen()
+    who = sitting.attendant.pause_asked
+    return after.pause or (f"the {who} asked for a pause" if who else "")
+
+
+def _between_trials(after: AfterTrial, present: Present, before: SessionState, sitting: Sitting) -> None:
+    if after.void:
+        sitting.display.await_return(after.void)
+    if after.correct is not None:
+        if _feedback_wanted(before, present):
+            sitting.display.feedback(after.correct)
+        if before.runs[present.run].practice and after.state.run > before.run:
+            sitting.display.practice_over(_practice_result(before, after.correct))
+    sitting.clock.sleep(before.protocol.trial.pause_between_s)
+
+
+def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
+    settings, done = before.protocol.practice, practised(before.practice, correct)
+    asked = min(settings.of_last, len(done.correct))
+    return PracticeResult(practice_passed(settings, done), right_of_last(settings, done), asked)
+
+
+def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
+    """A rest that a pause or a stop cuts short counts for nothing: it is due again afterwards."""
+    sitting.attendant.begin("rest")
+    notice = RestNotice(seconds, len(state.runs) - state.run, progress(state))
+    rested_s = max(0.0, sitting.display.rest(notice, sitting.attendant.glance))
+    if rested_s < seconds and (sitting.attendant.stop_asked or sitting.attendant.pause_asked):
+        return state
+    event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)
+    return record(state, event, sitting)
+
+
+def _feedback_wanted(state: SessionState, present: Present) -> bool:
+    protocol, run = state.protocol, state.runs[present.run]
+    if run.practice:
+        return protocol.practice.feedback == "after_answer"
+    settings = protocol.training if run.phase is Phase.TRAINING else protocol.trial
+    return settings.feedback == "after_answer"
+
+
+def _welcome(state: SessionState, sitting: Sitting) -> Welcome:
+    training = sum(run.phase is Phase.TRAINING for run in state.runs)
+    return Welcome(
+        title=state.protocol.title,
+        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
+        runs=len(state.runs) - training,
+        training_runs=training,
+        device=sitting.device.info.name,
+        felt=felt(state.opened) is not False,
+        resumed_after=state.answers,
+    )

@@ -1,0 +1,134 @@
+"""A simulated participant at the display and at the handle: feels the stimulus and answers after a while."""
+
+from collections.abc import Callable
+
+from protocols.trial import VoidCause
+from study.devices.clock import Clock
+from study.participants.observer import Felt, Observer
+from study.session.due_trial import Present
+from study.session.form_views import Form, FormField, FormReply
+from study.session.views import (
+    AfterPause,
+    Answered,
+    DemoChoice,
+    DemoDone,
+    DemoMenu,
+    DeviceReport,
+    Goodbye,
+    HandleView,
+    PauseNotice,
+    PlayingNotice,
+    PracticeResult,
+    Question,
+    Reply,
+    RestNotice,
+    Unanswered,
+    Welcome,
+)
+from study.workflows.trial.display import SignOfLife
+
+GLANCE_S = 0.1
+"""How often a waiting participant gives the device a sign of life."""
+
+PATIENCE_S = 60.0
+"""How long a handle may stay away: nobody will come and move a simulated one."""
+
+CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
+
+
+class SimulatedDisplay:
+    def __init__(
+        self, observer: Observer, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
+    ) -> None:
+        self._observer = observer
+        self._seed = seed
+        self._clock = clock
+        self._on_question = on_question
+        self._felt: Felt | None = None
+
+    def feel(self, stimulus: Present, answers_before: int) -> None:
+        self._felt = Felt(
+            run=stimulus.run,
+            trial=stimulus.trial,
+            attempt=stimulus.attempt,
+            phase=stimulus.phase,
+            frequency_hz=stimulus.frequency_hz,
+            level_n=stimulus.level_n,
+            direction_shown=stimulus.label,
+            trials_before=answers_before,
+        )
+
+    def fill_in(self, form: Form) -> FormReply:
+        return FormReply({field.key: _first_answer(field) for field in form.fields})
+
+    def device_checked(self, report: DeviceReport) -> bool:
+        return True
+
+    def welcome(self, notice: Welcome) -> None:
+        return None
+
+    def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
+        return DemoDone()
+
+    def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
+        return None if self._waited(notice.seconds, sign_of_life) else CUT_SHORT
+
+    def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
+        until_s = self._clock.now_s() + PATIENCE_S
+        while not look().ready:
+            if self._clock.now_s() > until_s:
+                return Unanswered("the handle did not come back", leave=True)
+            if not self._waited(GLANCE_S, sign_of_life):
+                return CUT_SHORT
+        return None
+
+    def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
+        if self._on_question is not None:
+            self._on_question(question)
+        if self._felt is None:
+            raise RuntimeError("a simulated participant was asked before anything was felt")
+        reply = self._observer.reply(self._felt, self._seed)
+        too_slow = 0 < question.time_limit_s < reply.response_time_s
+        if not self._waited(question.time_limit_s if too_slow else reply.response_time_s, sign_of_life):
+            return CUT_SHORT
+        if too_slow:
+            return Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
+        return Answered(reply.answer, self._clock.now_s())
+
+    def feedback(self, correct: bool) -> None:
+        return None
+
+    def practice_over(self, result: PracticeResult) -> None:
+        return None
+
+    def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
+        started_s = self._clock.now_s()
+        self._waited(notice.seconds, sign_of_life)
+        return self._clock.now_s() - started_s
+
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        return AfterPause.GO_ON
+
+    def goodbye(self, notice: Goodbye) -> None:
+        return None
+
+    def await_return(self, reason: str) -> None:
+        return None
+
+    def trouble(self, sentence: str) -> None:
+        return None
+
+    def _waited(self, seconds: float, sign_of_life: SignOfLife) -> bool:
+        """False where the sign of life ended the wait."""
+        until_s = self._clock.now_s() + seconds
+        while (left_s := until_s - self._clock.now_s()) > 1e-9:
+            self._clock.sleep(min(GLANCE_S, left_s))
+            if not sign_of_life():
+                return False
+        return True
+
+
+def _first_answer(field: FormField) -> str:
+    if field.choices:
+        return field.choices[0]
+    return "simulated" if field.needed else ""

@@ -1,0 +1,157 @@
+"""Withdrawal: erase a participant's data for good, and leave a tombstone.
+
+The tombstone keeps the session's name, the protocol's, and the place in its balanced order: nothing measured. What is
+to be erased is proved and written down first, each log goes last, then the tombstone takes its place: interrupted at
+any point, the same command goes on.
+"""
+
+import errno
+import os
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from study.errors import StudyError, WrongUseError
+from study.store.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
+from study.store.event_log import LOG_NAME, nobody_writes
+from study.store.real_folder import RealFolder, is_real_file, is_real_folder, opened_folder
+from study.store.session_lock import LOCK_NAME, locked
+from study.store.withdrawal_files import Intent, read_intent, write_intent, write_tombstone
+from study.store.written_elsewhere import written_elsewhere
+from study.workflows.session.participant_number import begun_in
+from study.workflows.session.participant_traces import analysis_names, find_traces
+
+ELSEWHERE = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
+
+
+@dataclass(frozen=True, slots=True)
+class Withdrawal:
+    subject: str
+    sessions: tuple[str, ...]
+    """All sessions of the participant in this data folder, those withdrawn before included."""
+    derived: tuple[str, ...]
+    """Analyses and half-made files that hold the participant's numbers, relative to the data folder."""
+    doubtful: tuple[str, ...]
+    """Sentences on what may be the participant's and stays, to be looked at."""
+
+    @property
+    def made_from_them(self) -> tuple[str, ...]:
+        """The folders, or files, of the data folder in which analyses are."""
+        return tuple(dict.fromkeys(PurePosixPath(name).parts[0] for name in self.derived))
+
+
+def session_to_withdraw(session: str, data: Path) -> SessionFolder:
+    """By its folder or, within `data`, by its name. Raises WrongUseError; also for a link, which is not followed."""
+    path = Path(session) if Path(session).is_dir() else data / session
+    folder = SessionFolder(path.absolute().parent.resolve() / path.absolute().name)
+    if folder.path.is_symlink():
+        raise WrongUseError(
+            "This session is a link",
+            f"{folder.name} leads to another place, where nothing is erased.",
+            "Give the session's real folder.",
+            saved="Nothing was changed.",
+        )
+    named = FOLDER.fullmatch(folder.name) is not None
+    if not named or not (is_real_folder(folder.path) or is_real_file(folder.withdrawal)):
+        raise WrongUseError(
+            "There is no such session", f"'{session}' was not found in {data}.", "Give its folder, or --data."
+        )
+    return folder
+
+
+def plan_withdrawal(session: SessionFolder) -> Withdrawal:
+    """What would be erased: every session of the same participant beside this one, and what was made from them.
+
+    Raises StudyError where nothing here is proved to be the participant's.
+    """
+    data, subject = session.path.parent.resolve(), session.subject
+    begun = read_intent(data, subject)
+    traces = find_traces(data, subject, begun.sessions if begun else ())
+    derived = (*traces.derived, *(begun.derived if begun else ()))
+    if not traces.sessions and begun is None:
+        raise StudyError(
+            "Nothing was erased",
+            f"No folder in {data} is proved to hold a session of {subject}. {' '.join(traces.doubtful)}".rstrip(),
+            "Look at what is named here, and erase by hand what is the participant's.",
+            saved="Nothing was changed.",
+        )
+    return Withdrawal(subject, traces.sessions, tuple(dict.fromkeys(derived)), traces.doubtful)
+
+
+def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
+    """Erase. Raises StudyError: before anything is changed where a session runs, and where the system refuses."""
+    data, subject = data.resolve(), withdrawal.subject
+    folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
+    try:
+        with ExitStack() as held, opened_folder(data) as place:
+            for folder in folders:
+                _hold(folder, held)
+            earlier = read_intent(data, subject)
+            begun = {folder.name: begun_in(folder) for folder in folders}
+            since = earlier.withdrawn_utc if earlier else utc
+            write_intent(data, Intent(subject, since, begun, withdrawal.derived))
+            for name in withdrawal.derived:
+                _erase_derived(place, name)
+            for folder in folders:
+                _erase_session(place, folder)
+                write_tombstone(folder, since, begun[folder.name])
+            place.sync()
+            place.erase(withdrawal_file(data, subject).name)
+            place.sync()
+    except OSError as problem:
+        raise _not_everything(data, withdrawal, problem) from problem
+
+
+def still_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
+    """Sentences on copies outside the data folder, by what was noted when they were written."""
+    noted = [path for path in written_elsewhere(data) if path.exists()]
+    named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]
+    return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
+
+
+def _hold(folder: SessionFolder, held: ExitStack) -> None:
+    """Nobody writes the session while it is erased. A link that was put in its place since is not followed."""
+    if not is_real_folder(folder.path):
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
+    lock = folder.path / LOCK_NAME
+    if lock.is_symlink():
+        lock.unlink()
+    held.enter_context(locked(folder.path))
+    if is_real_file(folder.log):
+        held.enter_context(nobody_writes(folder.log))
+
+
+def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
+    with opened_folder(data, folder.name) as place:
+        for name in place.names():
+            if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
+                place.erase(name)
+        place.sync()
+        place.erase(LOG_NAME)
+        place.sync()
+
+
+def _erase_derived(data: RealFolder, name: str) -> None:
+    """And the folders that are empty then, up to the data folder."""
+    *parents, last = PurePosixPath(name).parts
+    try:
+        with opened_folder(data, *parents) as place:
+            place.erase(last)
+            place.sync()
+    except (FileNotFoundError, NotADirectoryError):
+        return  # gone already, or a link was put into its way: what that leads to is not ours
+    while parents:
+        *parents, last = parents
+        with opened_folder(data, *parents) as place:
+            place.erase_if_empty(last)
+
+
+def _not_everything(data: Path, withdrawal: Withdrawal, problem: OSError) -> StudyError:
+    where = f" ({problem.filename})" if problem.filename else ""
+    first = withdrawal.sessions[0] if withdrawal.sessions else f"{withdrawal.subject}_001"
+    return StudyError(
+        "Not everything could be erased",
+        f"Of {withdrawal.subject}: {problem.strerror or problem}{where}.",
+        f"Mend the permissions and go on with: hapteq withdraw {first} --data {data}",
+        saved="What is left is no longer used as data once erasing has begun.",
+    )

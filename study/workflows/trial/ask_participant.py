@@ -1,0 +1,98 @@
+"""Play one stimulus and get its answer: held until the answer, or, in a detection trial, in one of two intervals."""
+
+from dataclasses import dataclass
+
+from protocols.trial import Phase, VoidCause
+from study.devices.device import Fault, Health, Played
+from study.session.due_trial import Present
+from study.session.held_stimulus import HeldStimulus
+from study.session.level_scale import amplitude
+from study.session.state import SessionState
+from study.session.stimulus import direction_vector, held_stimulus
+from study.session.views import Answered, PlayingNotice, Question, Reply, Unanswered
+from study.workflows.trial.release import released
+from study.workflows.trial.sitting import Sitting
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    reply: Reply
+    started_s: float
+    """From when on an answer could be given."""
+    felt_whole: bool
+    """Nothing was wrong with the stimulus when the answer came. What happens to it afterwards, while a slow disk
+    holds us up, cannot spoil the answer."""
+    played: Played | None
+    """Of a stimulus that is over before the question; None where it is still held, or was never begun."""
+    holding: bool
+    """It must still be released."""
+    health: Health | None = None
+    """What the device had counted when the answer came; None where nothing was played to the end of the question."""
+
+
+def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+    sitting.attendant.begin("trial")
+    if present.phase is Phase.DETECTION:
+        return _in_one_of_two_intervals(state, present, question, sitting)
+    sitting.device.hold(_stimulus(state, present, sitting))
+    sitting.hand.feel(present, state.answers)
+    started_s = sitting.clock.now_s()
+    reply = _reply_to(question, sitting)
+    sitting.device.keep_alive()
+    health = sitting.device.health()
+    return Asked(reply, started_s, health.fault is Fault.NONE, played=None, holding=True, health=health)
+
+
+def _in_one_of_two_intervals(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+    played: Played | None = None
+    sitting.hand.feel(present, state.answers)
+    for interval in (1, 2):
+        holding = interval == present.label
+        if holding:
+            sitting.device.hold(_stimulus(state, present, sitting))
+        cut = _wait(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
+        if cut is not None:
+            return Asked(cut, sitting.clock.now_s(), False, played, holding)
+        if holding:
+            played = released(sitting)
+        cut = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
+        if cut is not None:
+            return Asked(cut, sitting.clock.now_s(), False, played, holding=False)
+    started_s = sitting.clock.now_s()
+    reply = _reply_to(question, sitting)
+    health = played.health if played is not None else None
+    whole = health is not None and health.fault is Fault.NONE
+    return Asked(reply, started_s, whole, played, holding=False, health=health)
+
+
+def _reply_to(question: Question, sitting: Sitting) -> Reply:
+    """A repeat that is not left is no reply, whatever the display lets through: it is asked again."""
+    while True:
+        reply = sitting.attendant.resolve(sitting.display.ask(question, sitting.attendant.glance))
+        repeat = isinstance(reply, Unanswered) and reply.asked and not (reply.pause or reply.leave)
+        if not repeat or question.repeats_left != 0 or not sitting.attendant.glance():
+            return reply
+
+
+def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswered | None:
+    """A button pressed during an interval answers nothing yet."""
+    reply = sitting.display.show_playing(PlayingNotice(title, number, seconds, picture=None), sitting.attendant.glance)
+    if reply is None and sitting.attendant.glance():
+        return None
+    resolved = sitting.attendant.resolve(reply or Unanswered("the stimulus ended early", leave=False))
+    return (
+        Unanswered("answered before both intervals", leave=False, cause=VoidCause.EARLY)
+        if isinstance(resolved, Answered)
+        else resolved
+    )
+
+
+def _stimulus(state: SessionState, present: Present, sitting: Sitting) -> HeldStimulus:
+    return held_stimulus(
+        state.protocol.stimulus,
+        direction_vector(state.protocol.directions, present.direction),
+        present.frequency_hz,
+        present.polarity * amplitude(state.opened.equalized, present.level_n, present.frequency_hz),
+        sitting.equalizer,
+        sitting.device.info.sample_rate_hz,
+    )

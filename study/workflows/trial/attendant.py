@@ -1,0 +1,141 @@
+"""Who looks after everything while somebody waits: the device's sign of life, requests, buttons, the live state."""
+
+import math
+from collections.abc import Callable
+
+from study.devices.clock import Clock
+from study.devices.device import Device, Fault, Look
+from study.session.live import Activity, Live
+from study.session.requests import NoteAsked, PauseAsked, StopAsked, Who
+from study.session.views import Answered, Reply, Unanswered
+from study.workflows.trial.requests_port import Requests
+
+LIVE_EVERY_S = 0.25
+"""Often enough for whoever watches, and no burden on the disk."""
+
+PLAYING = ("trial", "demo")
+
+
+class Attendant:
+    """One for a sitting. `glance` is the sign of life of every wait; what ended a wait is asked for afterwards."""
+
+    def __init__(
+        self,
+        device: Device,
+        clock: Clock,
+        requests: Requests,
+        tell: Callable[[Live], None],
+        buttons: tuple[int, ...] = (),
+        place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        self._device = device
+        self._clock = clock
+        self._requests = requests
+        self._tell = tell
+        self._buttons = buttons
+        self._place_m = place_m
+        self._buttons_up = False
+        self._told_s = float("-inf")
+        self._activity: Activity = "preparing"
+        self._since_utc = clock.utc()
+        self._handle_ready = True
+        self._notes: list[NoteAsked] = []
+        self._answer: Answered | None = None
+        self.stop_asked: Who | None = None
+        self.pause_asked: Who | None = None
+
+    def begin(self, activity: Activity) -> None:
+        """A new wait begins: a button that is still down from the last one does not answer it."""
+        self._activity, self._since_utc = activity, self._clock.utc()
+        self._buttons_up = False
+        self._answer = None
+        self._handle_ready = True
+        self._told_s = float("-inf")
+        self.listen()
+        self._report()
+
+    def glance(self) -> bool:
+        """The sign of life. False where the wait is over: a fault, a request, a button."""
+        self._device.keep_alive()
+        self.listen()
+        self._report()
+        if self._activity == "pause":
+            return self.stop_asked is None
+        if self.stop_asked is not None or self.pause_asked is not None or self._answer is not None:
+            return False
+        # Between stimuli the last one's fault is still there, and over.
+        return self._activity not in PLAYING or self._device.fault() is Fault.NONE
+
+    def listen(self) -> None:
+        """Take what was asked for. A stop takes the force away at once, whoever waits for whatever."""
+        for request in self._requests.take():
+            match request:
+                case StopAsked(who=who):
+                    self._device.stop()
+                    self.stop_asked = who
+                case PauseAsked(who=who):
+                    self.pause_asked = who
+                case NoteAsked():
+                    self._notes.append(request)
+
+    def resolve(self, reply: Reply) -> Reply:
+        """What really ended the wait, where the display only knows that it was over."""
+        if self.stop_asked is not None:
+            return Unanswered(f"the {self.stop_asked} stopped the session", leave=True)
+        if isinstance(reply, Answered):
+            return reply
+        if self._answer is not None:
+            return self._answer
+        if self.pause_asked is not None:
+            return Unanswered(f"the {self.pause_asked} asked for a pause", leave=False, asked=True, pause=True)
+        return reply
+
+    def note(self, note: NoteAsked) -> None:
+        self._notes.append(note)
+
+    def take_notes(self) -> tuple[NoteAsked, ...]:
+        notes, self._notes = tuple(self._notes), []
+        return notes
+
+    def handle_is(self, ready: bool) -> None:
+        self._handle_ready = ready
+
+    def _report(self) -> None:
+        now_s = self._clock.now_s()
+        due = not self._clock.virtual and now_s - self._told_s >= LIVE_EVERY_S
+        if not due and not self._buttons:
+            return
+        look = self._device.look()
+        self._press(look, now_s)
+        if due:
+            self._told_s = now_s
+            self._tell(self._live(look))
+
+    def _press(self, look: Look, now_s: float) -> None:
+        down = [number for number in self._buttons if number in look.buttons]
+        if not down:
+            self._buttons_up = True
+        elif self._buttons_up and len(down) == 1 and self._activity == "trial" and self._answer is None:
+            self._answer = Answered(1 + self._buttons.index(down[0]), now_s)
+
+    def offset_m(self, look: Look) -> tuple[float, float, float] | None:
+        """Of the handle from its place; None without a reading."""
+        if look.position_m is None:
+            return None
+        (x, y, z), (x0, y0, z0) = look.position_m, self._place_m
+        return (x - x0, y - y0, z - z0)
+
+    def _live(self, look: Look) -> Live:
+        fault, offset, acceleration = self._device.fault(), self.offset_m(look), look.acceleration_mps2
+        return Live(
+            utc=self._clock.utc(),
+            activity=self._activity,
+            since_utc=self._since_utc,
+            fault="" if fault is Fault.NONE else fault.value,
+            offset_mm=None if offset is None else 1000.0 * math.hypot(*offset),
+            handle_ready=self._handle_ready,
+            acceleration_mps2=None if acceleration is None else math.hypot(*acceleration),
+            sensor_clipped=look.sensor_clipped,
+            missed_ticks=look.missed_ticks,
+            monotonic_s=self._clock.now_s(),
+        )

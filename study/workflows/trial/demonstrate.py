@@ -1,0 +1,88 @@
+"""The labelled demonstration: each direction at each frequency, as often as the participant wants."""
+
+from protocols.schedule import demo_level_n, label_of
+from study.devices.device import Fault
+from study.session.due_trial import labels_are_swapped
+from study.session.events import DemoFinished, DemoPlayed
+from study.session.level_scale import amplitude
+from study.session.state import SessionState, felt
+from study.session.stimulus import direction_angle_deg, direction_vector, held_stimulus
+from study.session.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, picture_of
+from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
+from study.workflows.trial.sitting import Sitting, record
+
+
+def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
+    """Until enough was felt, or somebody leaves or wants a pause. Then it can be gone through again."""
+    felt_so_far: tuple[tuple[int, int], ...] = ()
+    vibration = 1
+    while True:
+        sitting.attendant.begin("demo")
+        choice = sitting.display.choose_demo(_menu(state, felt_so_far, vibration), sitting.attendant.glance)
+        ended = _asked_to_end(state, sitting)
+        if ended is not None:
+            return ended
+        if isinstance(choice, DemoDone):
+            return AfterTrial(record(state, DemoFinished(utc=sitting.clock.utc()), sitting))
+        vibration = choice.vibration
+        after = _play(state, choice, sitting)
+        state = after.state
+        if after.leave or after.pause:
+            return after
+        if after.void:
+            sitting.display.trouble(f"That was cut short: {after.void}.")
+        else:
+            felt_so_far = (*felt_so_far, (choice.vibration, choice.number))
+
+
+def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibration: int) -> DemoMenu:
+    return DemoMenu(
+        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
+        vibrations=len(state.protocol.all_frequencies_hz),
+        vibration=vibration,
+        felt=felt_so_far,
+        handle_moves=felt(state.opened) is not False,
+    )
+
+
+def _asked_to_end(state: SessionState, sitting: Sitting) -> AfterTrial | None:
+    """A stop or a pause that came while nothing was played."""
+    reply = sitting.attendant.resolve(Unanswered("", leave=False, asked=True))
+    return cut_short(state, reply) if isinstance(reply, Unanswered) and (reply.leave or reply.pause) else None
+
+
+def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
+    protocol = state.protocol
+    frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
+    level_n = demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)
+    direction = label_of(choice.number, labels_are_swapped(protocol, state.opened))
+    played = DemoPlayed(
+        utc=sitting.clock.utc(),
+        frequency_hz=frequency_hz,
+        level_n=level_n,
+        direction=1 if choice.number == 1 else 2,
+        angle_deg=direction_angle_deg(protocol.directions, direction),
+        seconds=protocol.demo.seconds,
+    )
+    state = record(state, played, sitting)
+    sitting.device.hold(
+        held_stimulus(
+            protocol.stimulus,
+            direction_vector(protocol.directions, direction),
+            frequency_hz,
+            amplitude(state.opened.equalized, level_n, frequency_hz),
+            sitting.equalizer,
+            sitting.device.info.sample_rate_hz,
+        )
+    )
+    picture = picture_of(protocol.directions, labels_are_swapped(protocol, state.opened))
+    notice = PlayingNotice(f"Direction {choice.number}", choice.number, protocol.demo.seconds, picture)
+    reply = sitting.display.show_playing(notice, sitting.attendant.glance)
+    fault = sitting.device.release().health.fault
+    if leave := reason_to_leave(fault):
+        return AfterTrial(state, leave=leave, fault=fault)
+    resolved = sitting.attendant.resolve(reply or Unanswered("", leave=False, asked=True))
+    if isinstance(resolved, Unanswered):
+        after = cut_short(state, resolved)
+        return after if fault is Fault.NONE or after.leave else AfterTrial(state, void=fault.value, fault=fault)
+    return AfterTrial(state)

@@ -1,0 +1,42 @@
+"""A pause: nothing is played until somebody decides how to go on."""
+
+from dataclasses import dataclass
+
+from study.session.events import PauseTaken
+from study.session.state import SessionState
+from study.session.views import AfterPause, PauseNotice
+from study.workflows.trial.sitting import Sitting, record, write_notes
+
+
+@dataclass(frozen=True, slots=True)
+class AfterTheBreak:
+    state: SessionState
+    leave: str
+    """Why the sitting ends here; empty where it goes on."""
+    withdrawn: bool
+
+
+LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
+
+
+def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBreak:
+    attendant = sitting.attendant
+    who = attendant.pause_asked or "participant"
+    attendant.begin("pause")
+    started_s = sitting.clock.now_s()
+
+    def glance() -> bool:
+        """A note is on the disk soon after it was typed, however long the pause."""
+        nonlocal state
+        state = write_notes(state, sitting)
+        return attendant.glance()
+
+    decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
+    state = write_notes(state, sitting)
+    # Whoever asked for a pause during the pause has had it: cleared only after the last look.
+    attendant.pause_asked = None
+    paused_s = sitting.clock.now_s() - started_s
+    state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)
+    if attendant.stop_asked is not None:
+        return AfterTheBreak(state, f"the {attendant.stop_asked} stopped the session", withdrawn=False)
+    return AfterTheBreak(state, LEAVE.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

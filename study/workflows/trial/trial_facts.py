@@ -1,0 +1,151 @@
+"""The facts of one trial as events, and what its recording says of itself."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from protocols.trial import VoidCause
+from study.devices.device import Fault, Health, Played
+from study.session.answer_given import AnswerHealth
+from study.session.delivered import Delivered
+from study.session.due_trial import Present
+from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.state import SessionState
+from study.store.provenance import versions
+from study.store.trial_recordings import recording_name, save_trial_recording
+from study.workflows.trial.sitting import Sitting
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What the device did in an answered trial."""
+
+    played: Played
+    values: Delivered | None
+    flags: tuple[str, ...]
+    vector: FloatArray
+    """(3,): the direction played."""
+
+
+def presented(present: Present, sitting: Sitting) -> TrialPresented:
+    return TrialPresented(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        phase=present.phase,
+        frequency_hz=present.frequency_hz,
+        level_db=present.level_db,
+        level_n=present.level_n,
+        direction=1 if present.label == 1 else 2,
+        angle_deg=present.angle_deg,
+        polarity=1 if present.polarity > 0 else -1,
+        wanted_mps2=present.wanted_mps2,
+    )
+
+
+def known_then(health: Health, felt_whole: bool) -> AnswerHealth:
+    """Logged with the answer."""
+    return AnswerHealth(
+        fault=health.fault.name,
+        felt_whole=felt_whole,
+        ticks=health.ticks,
+        missed_ticks=health.missed_ticks,
+        stimulus_clipped=health.stimulus_clipped,
+        total_clipped=health.total_clipped,
+        slew_limited=health.slew_limited,
+        sensor_clipped=health.sensor_clipped,
+        peak_command_n=health.peak_command_n,
+    )
+
+
+def known_again(logged: AnswerHealth) -> Health:
+    """From the log. A fault that this version does not know is still one."""
+    return Health(
+        fault=Fault.__members__.get(logged.fault, Fault.NOT_A_NUMBER),
+        ticks=logged.ticks,
+        missed_ticks=logged.missed_ticks,
+        stimulus_clipped=logged.stimulus_clipped,
+        total_clipped=logged.total_clipped,
+        slew_limited=logged.slew_limited,
+        sensor_clipped=logged.sensor_clipped,
+        peak_command_n=logged.peak_command_n,
+    )
+
+
+def spoiled(present: Present, why: tuple[str, VoidCause], health: Health | None, sitting: Sitting) -> TrialSpoiled:
+    """why: in words, and as a cause. health: None where nothing was played yet."""
+    reason, cause = why
+    return TrialSpoiled(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        reason=reason,
+        missed_ticks=health.missed_ticks if health else None,
+        vibrated_s=_seconds(health, sitting) if health else 0.0,
+        cause=cause,
+    )
+
+
+def measured(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> TrialMeasured:
+    """Saves the recording first: the event names it."""
+    saved = None
+    if outcome.played.recording is not None:
+        conditions = _conditions(present, outcome, state, sitting)
+        name = recording_name(present.run, present.trial, present.attempt)
+        saved = save_trial_recording(sitting.folder, name, outcome.played.recording, conditions)
+    values = outcome.values
+    return TrialMeasured(
+        utc=sitting.clock.utc(),
+        run=present.run,
+        trial=present.trial,
+        attempt=present.attempt,
+        # Without a steady part there is nothing to measure, which is no fault: most quick answers come before it.
+        status="flagged" if outcome.flags else "unmeasured" if values is None else "ok",
+        flags=outcome.flags,
+        recording=saved.name if saved else None,
+        sha256=saved.sha256 if saved else None,
+        delivered_mps2=values.along_mps2 if values else None,
+        off_axis_mps2=values.off_axis_mps2 if values else None,
+        displacement_mm=values.displacement_mm if values else None,
+        missed_ticks=outcome.played.health.missed_ticks,
+        vibrated_s=_seconds(outcome.played.health, sitting),
+        offset_mm=_farthest_mm(outcome.played, sitting),
+    )
+
+
+def _seconds(health: Health, sitting: Sitting) -> float:
+    """From the onset to stillness, fades included."""
+    return health.ticks / sitting.device.info.sample_rate_hz
+
+
+def _farthest_mm(played: Played, sitting: Sitting) -> float | None:
+    """How far the handle was from its place at the most, while it was recorded."""
+    if played.recording is None or played.recording.position is None:
+        return None
+    offset_m = np.linalg.norm(played.recording.position.samples - np.asarray(sitting.place_m), axis=1)
+    return 1000.0 * float(np.nanmax(offset_m)) if np.isfinite(offset_m).any() else None
+
+
+def _conditions(present: Present, outcome: Outcome, state: SessionState, sitting: Sitting) -> dict[str, Any]:
+    """What a recording carries inside, so that the file alone tells what was played, and where it comes from."""
+    return {
+        "session": sitting.folder.name,
+        "trial": {"run": present.run, "trial": present.trial, "attempt": present.attempt},
+        "frequency_hz": present.frequency_hz,
+        "level_n": present.level_n,
+        "wanted_mps2": present.wanted_mps2,
+        "unit_vector": [float(v) for v in outcome.vector],
+        "hand": "held",
+        "missed_ticks": outcome.played.health.missed_ticks,
+        "flags": list(outcome.flags),
+        "equalizer": sitting.equalizer.name,
+        "provenance": {
+            "protocol_hash": state.opened.protocol_hash,
+            "seed": state.opened.seed,
+            "versions": versions(),
+        },
+    }

@@ -1,0 +1,104 @@
+"""What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
+
+from equalizer.plant.model_quality import NOT_STORED
+from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
+from study.session.local_time import Zone, local_time
+from study.session.state import SessionState
+from study.session.void_reasons import computer_too_busy
+from study.workflows.results.fold_session import FoldedSession
+
+_HASH_DIGITS = 12
+
+
+def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
+    state, events = folded.state, folded.contents.events
+    opened = state.opened
+    who = f"simulated ({opened.observer})" if opened.observer else "a person"
+    lock = "locked" if opened.protocol_locked else "not locked"
+    # Nothing waits for a simulated participant, so the log may end in the future.
+    ahead = ", in simulated time, which runs ahead of the clock" if opened.observer else ""
+    facts = [
+        ("participant", f"{opened.subject}, {who}, {_number(state)}"),
+        ("protocol", f"{state.protocol.name} ({opened.protocol_hash[:_HASH_DIGITS]}, {lock})"),
+        ("title", state.protocol.title),
+        ("device", _device(opened)),
+        ("equalizer", opened.equalizer),
+        ("its quality", _quality(opened)),
+        ("within reach", _reach(opened)),
+        ("begun", local_time(opened.utc, zone, "seconds")),
+        (_end(state), local_time(_last_utc(folded), zone, "seconds") + ahead),
+        ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
+        ("runs", f"{state.run} of {len(state.runs)}"),
+        ("answers", _answers(folded)),
+        *_forms(folded),
+        ("log", _log(folded)),
+        ("seed", str(opened.seed)),
+        ("versions", ", ".join(f"{name} {version}" for name, version in opened.versions.items())),
+    ]
+    return tuple((what, value) for what, value in facts if value)
+
+
+def _end(state: SessionState) -> str:
+    if state.sitting.turned_away:
+        return "ended"
+    return "finished" if state.closed else "last entry"
+
+
+def _number(state: SessionState) -> str:
+    if not state.takes_part:
+        return "without a place in the order of this protocol"
+    return f"number {state.opened.participant_number + 1} of this protocol"
+
+
+def _quality(opened: SessionOpened) -> str:
+    """Of the model that stimuli go through."""
+    return "" if opened.equalized is None else opened.equalized.quality or NOT_STORED
+
+
+def _reach(opened: SessionOpened) -> str:
+    """What both directions reach at the cap."""
+    if opened.equalized is None:
+        return ""
+    return ", ".join(f"{s.reachable_mps2:.1f} m/s² at {s.frequency_hz:g} Hz" for s in opened.equalized.levels)
+
+
+def _device(opened: SessionOpened) -> str:
+    device = opened.device
+    moves = ", simulated: nothing moves" if device.simulated else ""
+    return f"{device.name}{moves}, {device.sample_rate_hz:g} Hz"
+
+
+def _answers(folded: FoldedSession) -> str:
+    state = folded.state
+    void = len(state.trials) - state.answers - (state.presented is not None and state.answered is None)
+    if not void:
+        return str(state.answers)
+    reasons = [event.reason for event in folded.contents.events if isinstance(event, TrialSpoiled)]
+    busy = sum(map(computer_too_busy, reasons))
+    because = f", {busy} of them because the computer was too busy" if busy else ""
+    return f"{state.answers}, and {void} void presentations{because}"
+
+
+def _last_utc(folded: FoldedSession) -> str:
+    closed = next((event.utc for event in folded.contents.events if isinstance(event, SessionClosed)), "")
+    return closed or folded.contents.events[-1].utc
+
+
+def _log(folded: FoldedSession) -> str:
+    """What speaks for it being as it was written."""
+    lines = f"{folded.contents.chain.lines} lines"
+    sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
+    return f"{lines}, {folded.contents.chain.in_words()}{sealed}"
+
+
+def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
+    """What the participant chose when looking back; what was written in own words stays in the log file, because it
+    may be about health."""
+    questions = {question.key: question for question in folded.state.protocol.debrief if question.choices}
+    facts = []
+    for event in folded.contents.events:
+        if isinstance(event, FormFilled) and event.form == "consent":
+            facts.append(("consent", f"{'given' if event.passed else 'not given'}, version {event.version}"))
+        if isinstance(event, FormFilled) and event.form == "debrief":
+            facts += [("said", f"{q.question} {event.answers[k]}") for k, q in questions.items() if k in event.answers]
+    return tuple(facts)

@@ -1,0 +1,133 @@
+"""One line per session. Reads only.
+
+A list has to be there at once: the log of a finished session whose checksums and seal hold is what the program wrote,
+and is counted without being parsed. Every other log is folded.
+"""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import lru_cache
+
+from protocols.loading import ProtocolError, load_protocol
+from protocols.schedule import runs
+from protocols.study_protocol import StudyProtocol
+from study.errors import StudyError
+from study.session.archive_views import SessionLine
+from study.session.events import SessionOpened
+from study.session.state import SessionState
+from study.store.archive import SessionFolder
+from study.store.event_log import read_opening
+from study.store.log_seal import is_sealed, seal_paths
+from study.store.log_writer import somebody_writes
+from study.store.regular_file import read_regular
+from study.store.session_summary import SUMMARY_NAME
+from study.store.withdrawal_files import how_to_finish, read_intent, read_tombstone
+from study.workflows.results.fold_session import fold_session
+
+MEASURED = b',"event":"trial_measured",'
+
+
+def session_line(folder: SessionFolder) -> SessionLine:
+    """What cannot be read is a line with a remark. Raises nothing."""
+    try:
+        if folder.withdrawn:
+            return _withdrawn(folder)
+        line = _line(folder, _stamp(folder))
+    except FileNotFoundError:
+        return unreadable(folder, "It has no log: the program died while it was made.")
+    except StudyError as problem:
+        return unreadable(folder, problem.happened)
+    except OSError as problem:
+        return unreadable(folder, f"The system refused: {problem.strerror or problem}.")
+    return with_writer(line, folder)
+
+
+def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
+    """`running` where somebody writes it right now; the lock is looked at for some microseconds."""
+    if line.standing == "unfinished" and somebody_writes(folder.log):
+        return replace(line, standing="running")
+    return line
+
+
+def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
+    opened = state.opened
+    return SessionLine(
+        name=folder.name,
+        path=str(folder.path),
+        subject=folder.subject,
+        protocol=state.protocol.name,
+        begun_utc=opened.utc,
+        observer=opened.observer,
+        answers=state.answers,
+        runs_done=state.run,
+        runs=len(state.runs),
+        standing=state.sitting.turned_away or ("finished" if state.closed else "unfinished"),
+    )
+
+
+def unreadable(folder: SessionFolder, why: str) -> SessionLine:
+    """Its begin is unknown: it stands where its folder was last changed."""
+    try:
+        changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
+    except OSError:
+        changed_utc = ""
+    return SessionLine(folder.name, str(folder.path), folder.subject, "", changed_utc, None, 0, 0, 0, "unreadable", why)
+
+
+def _withdrawn(folder: SessionFolder) -> SessionLine:
+    left = read_tombstone(folder)  # that there is one says enough
+    intent = read_intent(folder.path.parent, folder.subject)
+    when = str(left.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
+    begun = left.get("begun")
+    if begun is None and intent is not None and (promised := intent.sessions.get(folder.name)):
+        begun = {"protocol": promised.protocol}
+    protocol = str(begun.get("protocol", "")) if isinstance(begun, dict) else ""
+    remark = "The participant withdrew; the data were erased."
+    if finish := how_to_finish(folder):
+        remark = f"The participant withdrew, and not everything is erased. {finish}"
+    return SessionLine(
+        folder.name, str(folder.path), folder.subject, protocol, when, None, 0, 0, 0, "withdrawn", remark
+    )
+
+
+def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
+    """Of all files that decide how a session stands: times and sizes. Raises OSError where there is no log."""
+    beside = (path for path in (*seal_paths(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
+    stats = ((path.name, path.stat()) for path in (folder.log, *beside))
+    return tuple((name, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for name, stat in stats)
+
+
+@lru_cache(maxsize=4096)
+def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
+    """Depends on the content of these files alone, for which their stamp stands. Raises StudyError, OSError."""
+    content = read_regular(folder.log)
+    opened = read_opening(folder.log)
+    ours = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
+    ours = ours and MEASURED in content  # a person who does not take part left a short log
+    planned = _planned(opened.protocol_text) if ours and isinstance(opened, SessionOpened) else None
+    if planned is None or not isinstance(opened, SessionOpened):
+        return line_of(fold_session(folder).state, folder)
+    protocol, run_count = planned
+    return SessionLine(
+        name=folder.name,
+        path=str(folder.path),
+        subject=folder.subject,
+        protocol=protocol,
+        begun_utc=opened.utc,
+        observer=opened.observer,
+        answers=content.count(MEASURED),
+        runs_done=run_count,
+        runs=run_count,
+        standing="finished",
+    )
+
+
+@lru_cache(maxsize=64)
+def _planned(protocol_text: str) -> tuple[str, int] | None:
+    """Name and number of runs; None for text that is no study protocol."""
+    try:
+        protocol = load_protocol(protocol_text, "the log")
+    except ProtocolError:
+        return None
+    # How many there are depends on neither seed nor participant: only their order does.
+    return (protocol.name, len(runs(protocol, 0, 0))) if isinstance(protocol, StudyProtocol) else None

@@ -1,0 +1,51 @@
+"""A note into a session's log: through the session while it runs, by ourselves where it does not."""
+
+from study.devices.clock import Clock
+from study.errors import StudyError
+from study.session.events import NoteTaken
+from study.session.requests import NoteAsked
+from study.store.archive import SessionFolder
+from study.store.event_log import EventLog, mend
+from study.store.log_seal import seal_log
+from study.store.log_writer import somebody_writes
+from study.store.provenance import as_text
+from study.store.session_lock import locked
+from study.workflows.results.fold_session import fold_session
+from study.workflows.views.ask_session import ask_session
+
+
+def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
+    """Returns whether it is in the log, or in the hands of the session that writes it; False where it waits for that.
+
+    Raises StudyError where the log cannot be written.
+    """
+    if not note.text.strip():
+        raise StudyError("There is nothing to note", "The text is empty.", "Give a sentence.")
+    if note.text != as_text(note.text):
+        raise StudyError(
+            "This note cannot be written",
+            "Its text holds bytes that are not UTF-8.",
+            "Type it again.",
+            saved="Nothing was changed.",
+        )
+    if somebody_writes(folder.log):
+        return ask_session(folder, note, clock)
+    with locked(folder.path):
+        log = EventLog.reopen(folder.log)
+        try:
+            folded = fold_session(folder)
+            contents = folded.contents
+            if contents.torn:
+                mend(folder.log, contents)
+                log.append(_of_the_program(f"a torn last line was cut off: {contents.torn}", clock))
+            log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
+            if folded.state.closed:
+                seal_log(folder.log)
+        finally:
+            log.close()
+    return True
+
+
+def _of_the_program(text: str, clock: Clock) -> NoteTaken:
+    """What `hapteq resume` would have kept with its own line."""
+    return NoteTaken(utc=clock.utc(), who="program", text=text)

@@ -1,0 +1,153 @@
+"""One session looked at: facts, thresholds, staircases and its log in words. Reads only, and never fails for damage."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from analysis.thresholds import RunEnd, Threshold
+from analysis.wording import NONE, number
+from protocols.schedule import Run
+from protocols.trial import Phase
+from study.errors import StudyError
+from study.session.archive_views import SessionLine, SessionView, Staircase
+from study.session.event_words import log_in_words
+from study.session.local_time import Zone, in_utc, local_time
+from study.session.printable import printable
+from study.session.state import SessionState
+from study.store.archive import SessionFolder
+from study.store.event_log import readable_events
+from study.workflows.results.analysis_files import ANALYSIS_NAME
+from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.session_results import due_results
+from study.workflows.views.session_facts import session_facts
+from study.workflows.views.session_line import line_of, session_line, with_writer
+
+if TYPE_CHECKING:
+    from analysis.study_analysis import StudyAnalysis
+
+THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark")
+
+
+def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
+    """path: the session's folder. Damage is a view too: what can be read, and a warning that says what cannot.
+
+    zone: of the times in it, which are text; `study.local_clock.machine_zone` for a person.
+    """
+    folder = SessionFolder(path.absolute())
+    try:
+        folded = None if folder.withdrawn else fold_session(folder)
+    except StudyError as problem:
+        return printable(_damaged(folder, problem, zone))
+    return printable(_bare(folder, session_line(folder)) if folded is None else _whole(folder, folded, zone))
+
+
+def _whole(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionView:
+    state = folded.state
+    analysis, problem = _analysis(state)
+    clock = (f"Before {local_time(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps)
+    return SessionView(
+        line=with_writer(line_of(state, folder), folder),
+        facts=session_facts(folded, zone),
+        thresholds=_threshold_rows(state, analysis),
+        warnings=(*_log_remarks(folder, folded), *clock, *problem, *(analysis.warnings if analysis else ())),
+        staircases=_staircases(state, analysis),
+        events=log_in_words(folded.contents.events, zone),
+        report=_report(folder),
+        figures=_figures(folder),
+    )
+
+
+def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
+    due = ", ".join(due_results(folder, folded))
+    said = (
+        (
+            folded.contents.torn_bytes,
+            "A crash tore the last line of the log; it is taken off when the session is resumed.",
+        ),
+        (due, f"Missing or not as the log gives it: {due}. hapteq resume writes it."),
+        (not folded.contents.chain.since, "The log carries no checksums: it was written before there were any."),
+    )
+    return tuple(text for holds, text in said if holds)
+
+
+def _damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
+    line = session_line(folder)
+    if line.standing != "unreadable":  # it looked whole at a glance, and is not
+        line = SessionLine(
+            line.name, line.path, line.subject, line.protocol, line.begun_utc, line.observer,
+            line.answers, 0, line.runs, "unreadable", problem.happened,
+        )  # fmt: skip
+    said = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
+    events = log_in_words(readable_events(folder.log), zone)
+    return _bare(folder, line, warnings=(f"{problem.title}.", *said), events=events)
+
+
+def _bare(
+    folder: SessionFolder, line: SessionLine, warnings: tuple[str, ...] = (), events: tuple[str, ...] = ()
+) -> SessionView:
+    facts = (("participant", line.subject), ("folder", str(folder.path)))
+    notes = warnings or ((line.remark,) if line.remark else ())
+    return SessionView(line, facts, (), notes, (), events, _report(folder), _figures(folder))
+
+
+def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
+    # Statistics load slowly, and the engine, which looks at sessions too, begins at once.
+    from analysis.study_analysis import analyse_study
+
+    try:
+        return analyse_study(state.trials, state.protocol), ()
+    except ValueError as problem:
+        return None, (f"No thresholds: {problem}.",)
+
+
+def _threshold_rows(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[tuple[str, ...], ...]:
+    rows = (*analysis.thresholds, *analysis.detection) if analysis else ()
+    if not any(row.complete for row in rows):
+        return ()
+    return (THRESHOLD_HEADER, *(_threshold_row(row, state.runs[row.run]) for row in rows))
+
+
+def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
+    remark = "cut by the cap" if row.censored else ""
+    if not row.complete:
+        remark = "trial limit" if row.ended is RunEnd.TRIAL_LIMIT else "not complete"
+    threshold = f"{number(row.threshold_n, 3)} N" if row.complete else NONE
+    return (
+        str(row.run + 1),
+        run.phase.value,
+        f"{row.frequency_hz:g} Hz",
+        threshold,
+        NONE if row.threshold_mps2 is None else f"{row.threshold_mps2:.2f} m/s²",
+        str(row.reversals),
+        str(row.trials),
+        NONE if row.percent_correct is None else f"{row.percent_correct:.0f} %",
+        remark,
+    )
+
+
+def _staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
+    rows = {row.run: row for row in (*analysis.thresholds, *analysis.detection)} if analysis else {}
+    begun = (run for run in state.runs if not run.practice)
+    drawn = (_staircase(state, run, rows.get(run.index)) for run in begun)
+    return tuple(staircase for staircase in drawn if staircase.levels_n)
+
+
+def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircase:
+    counted = [t for t in state.trials if t.run == run.index and t.counts and t.phase is not Phase.CATCH]
+    over = run.index < state.run
+    return Staircase(
+        title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}{'' if over else ', not complete'}",
+        levels_n=tuple(trial.level_n for trial in counted),
+        correct=tuple(bool(trial.correct) for trial in counted),
+        reversals=tuple(trial.reversal for trial in counted),
+        threshold_n=row.threshold_n if row is not None else None,
+        cap_n=state.protocol.staircase.cap_n,
+    )
+
+
+def _report(folder: SessionFolder) -> str:
+    report = folder.path / ANALYSIS_NAME / "report.html"
+    return str(report) if report.is_file() else ""
+
+
+def _figures(folder: SessionFolder) -> tuple[str, ...]:
+    return tuple(str(path) for path in sorted((folder.path / ANALYSIS_NAME / "figures").glob("*.png")))

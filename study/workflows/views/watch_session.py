@@ -1,0 +1,149 @@
+"""Follow a running session from beside it, reading only, and ask it to stop, to pause, or to note something."""
+
+import io
+from pathlib import Path
+
+from study.errors import StudyError
+from study.session.draw_check import LogContradiction
+from study.session.events import SessionOpened, parse_event
+from study.session.live import Live
+from study.session.log_chain import Chain, ChainBrokenError, read_chained
+from study.session.log_time import minutes_between
+from study.session.requests import Request
+from study.session.watch_alarms import SILENT_AFTER_S
+from study.session.watch_view import WatchView
+from study.session.watched import Watched, begin_watching
+from study.session.watched import follow as after
+from study.session.watching import Beside, watch_view
+from study.store.archive import SessionFolder
+from study.store.live_file import read_live
+from study.store.log_seal import read_seal, seal_paths
+from study.store.log_writer import somebody_writes
+from study.store.regular_file import TABLE_BYTES, open_regular
+from study.store.request_inbox import RequestInbox
+from study.workflows.results.fold_session import protocol_of
+
+PROBE_EVERY_S = 1.0
+"""How often at most the lock of a session that gives no sign of life is looked at."""
+
+
+def follow(folder: Path) -> "Follower":
+    return Follower(SessionFolder(folder))
+
+
+def ask(folder: Path, request: Request) -> str:
+    """Returns the request's name in the session's inbox. Raises StudyError where it cannot be written."""
+    return RequestInbox(folder).send(request)
+
+
+class Follower:
+    """Reads what is new in the log at every look, and never writes to it."""
+
+    def __init__(self, folder: SessionFolder) -> None:
+        self._folder = folder
+        self._watched: Watched | None = None
+        self._read_bytes = 0
+        self._last_line = b""
+        self._chain = Chain()
+        self._problem = ""
+        self._missing = False
+        self._view: WatchView | None = None
+        self._writer: bool | None = None
+        self._probed_utc = ""
+
+    def look(self, now_utc: str) -> WatchView | None:
+        """None while there is no first line. Raises StudyError where the first line cannot be used."""
+        self._take_in_what_is_new()
+        if self._watched is None:
+            return None
+        live = read_live(self._folder.path)
+        beside = Beside(live, self._somebody_writes(live, now_utc), self._problem)
+        self._view = watch_view(self._watched, beside, now_utc, self._view)
+        return self._view
+
+    def _take_in_what_is_new(self) -> None:
+        sealed_bytes = self._sealed_bytes()  # before the log is read: it is written after the lines that it covers
+        try:
+            with open_regular(self._folder.log) as file:
+                self._begin_again_if_rewritten(file)
+                file.seek(self._read_bytes)
+                fresh = file.read(TABLE_BYTES)
+        except OSError as problem:
+            self._problem, self._missing = f"{problem.strerror or problem}.", isinstance(problem, FileNotFoundError)
+            if self._watched is None and not self._missing:
+                raise _not_ours(f"The log of {self._folder.name}: {self._problem}") from problem
+            return
+        self._problem, self._missing = "", False
+        # What comes after the last line end is being written, or was torn by a crash.
+        for line in (whole + b"\n" for whole in fresh.split(b"\n")[:-1]):
+            self._problem = self._take_in(line)
+            if self._problem:
+                return
+            self._read_bytes += len(line)
+            self._last_line = line
+        if sealed_bytes is None:
+            self._problem = "its seal cannot be read."
+        elif sealed_bytes > self._read_bytes:
+            self._problem = "its end is missing."
+
+    def _sealed_bytes(self) -> int | None:
+        """None where a seal cannot be read."""
+        try:
+            return max((read_seal(path).bytes for path in seal_paths(self._folder.path).values()), default=0)
+        except StudyError:
+            return None
+
+    def _begin_again_if_rewritten(self, file: io.BufferedReader) -> None:
+        """A line that could not be synced is cut off again by its writer, after it was seen here."""
+        file.seek(self._read_bytes - len(self._last_line))
+        if file.read(len(self._last_line)) != self._last_line:
+            self._watched, self._read_bytes, self._last_line, self._chain = None, 0, b"", Chain()
+
+    def _take_in(self, line: bytes) -> str:
+        """Returns the problem with this line; empty where there is none."""
+        try:
+            chain, content = read_chained(self._chain, line.removesuffix(b"\n"))
+            event = parse_event(content)
+        except ValueError as problem:
+            if self._watched is None:
+                raise _not_ours(_FIRST.format(self._folder.name)) from None
+            if isinstance(problem, ChainBrokenError):
+                return f"line {self._chain.lines + 1} of it {problem}."
+            return "a line of it is no event that this version knows."
+        if self._watched is None:
+            if not isinstance(event, SessionOpened):
+                raise _not_ours(_FIRST.format(self._folder.name))
+            try:
+                self._watched = begin_watching(event, protocol_of(event, self._folder))
+            except LogContradiction:
+                raise _not_ours(_FIRST.format(self._folder.name)) from None
+            self._chain = chain
+            return ""
+        try:
+            self._watched = after(self._watched, event)
+        except LogContradiction:
+            # Not in the problem's own words: they may tell what the open trial plays.
+            return "it contradicts the rules."
+        self._chain = chain
+        return ""
+
+    def _somebody_writes(self, live: Live | None, now_utc: str) -> bool | None:
+        if self._missing:
+            return False
+        if live is not None and 60.0 * minutes_between(live.utc, now_utc) <= SILENT_AFTER_S:
+            self._writer = None
+        elif 60.0 * abs(minutes_between(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
+            self._probed_utc = now_utc
+            self._writer = somebody_writes(self._folder.log)
+        return self._writer
+
+
+_FIRST = "The first line of the log of {} is none that this version knows."
+
+
+def _not_ours(why: str) -> StudyError:
+    return StudyError(
+        "This session cannot be followed",
+        why,
+        "Use the hapteq that runs the session; hapteq validate says more.",
+    )

@@ -1,0 +1,133 @@
+"""A start that left two names: the sealed device plays what was proposed, and the right name is left.
+
+The start's answer is written by hand: whether a diagnosis leaves several names is not what is tested here.
+"""
+
+import json
+
+import pytest
+
+from analysis.diagnosis.result.experiment_menu import experiment_menu
+from analysis.proof.follow_up import FollowUp, follow_up_figures
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES
+from study.errors import StudyError
+from study.evaluation.bank.follow_up import DRAWN, FURTHER, NEXT, PROPOSED, follow_up
+from study.evaluation.bank.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder, opened
+from study.evaluation.bank.reveal_cases import outcome_of
+from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
+from study.evaluation.challenge.draw_bank import draw
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.provenance import sha256_of
+
+SEED, NUMBER, LEVEL_N = 51_404, 0, 3.0
+"""A gain of the accelerometer."""
+PLAN = BankPlan(SEED, 1, brief=True)
+CONSIDERED = ("sensor_gain", "force_gain", "sensor_lag", "coulomb_friction", "added_mass")
+"""Of the catalogue, for the time that it takes."""
+ERRORS = {"before": 9.0, "retuned": 9.0, "after": 1.0, "noise": 1.0}
+
+
+def answer(place, effect="sensor_gain", rival="force_gain", best=""):
+    """As the process of the diagnosis writes it."""
+    named = {
+        "effect": effect, "place": "sensor", "axis": None, "probability": 0.5, "share": 0.9,
+        "parameters": {"gain": {"value": 1.02, "unit": "1", "ci95": [1.01, 1.03]}},
+        "rivals": [{"effect": rival, "probability": 0.5, "inseparable": True, "why_not": "as good"}],
+    }  # fmt: skip
+    diagnosis = {
+        "verdict": "explained", "mismatch": [], "effects": [named], "retuned": {}, "remainder": [],
+        "fit": {"fit": ERRORS, "test": ERRORS}, "error": "free simulation", "next_experiment": None,
+    }  # fmt: skip
+    said = {
+        "diagnosis": diagnosis,
+        "channel_errors": {"retuned": {"ay": 9.0}},
+        "proposal": {"axis": 0, "level": LEVEL_N, "best": best or None},
+        "recording_sha256": sha256_of(place / RECORDING),
+        "model_sha256": sha256_of(place / MODEL),
+    }
+    (place / ANSWER).write_text(json.dumps(said))
+
+
+def started(path, best):
+    folder = opened(path, SEED, True)
+    seal_one(folder, draw(SEED, NUMBER, True))
+    label = json.loads(folder.label(NUMBER).read_text())
+    place = folder.open / label["name"]
+    without = [effect.name for effect in EFFECT_NAMES if effect.name not in CONSIDERED]
+    (place / SETTINGS).write_text(settings_text(without))
+    menu = experiment_menu(read_mechanical_model(place / MODEL), 1000.0, 0, LEVEL_N)
+    answer(place, best=menu[0].words if best else "")
+    outcome = outcome_of(label, json.loads((place / ANSWER).read_text()))
+    (place / RECORDING).unlink()  # as a bank leaves it
+    return folder, outcome, menu
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory):
+    folder, outcome, menu = started(tmp_path_factory.mktemp("bank") / "proof", True)
+    seen = []
+    found = follow_up(folder, PLAN, (outcome,), (2, False), lambda done, of: seen.append((done, of)))
+    return folder, outcome, menu, found, seen
+
+
+def test_the_right_name_is_left_by_the_recording_that_was_proposed(followed):
+    _, outcome, menu, (found,), seen = followed
+    assert outcome.returned == ("sensor_gain", "force_gain")
+    assert (found.proposed, found.after_proposed, found.resolved) == (menu[0].words, ("sensor_gain",), True)
+    assert found.drawn in [one.words for one in menu]
+    assert found.after_drawn
+    assert (seen[0], seen[-1]) == ((0, 2), (2, 2))
+
+
+def test_both_cases_are_told_nothing_of_which_is_which(followed):
+    folder, *_ = followed
+    again = ProofFolder(folder.path / NEXT)
+    label = json.loads(again.label(NUMBER).read_text())
+    assert {path.name for path in again.open.iterdir()} == {label[which]["name"] for which in (PROPOSED, DRAWN)}
+    for place in again.open.iterdir():
+        assert {path.name for path in place.iterdir()} == {ANSWER, MODEL, "settings.json"}  # recordings are forgotten
+
+
+def test_the_same_call_goes_on_without_doing_anything_twice(followed):
+    folder, outcome, _, found, _ = followed
+    before = {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()}
+    assert follow_up(folder, PLAN, (outcome,), (2, False), lambda done, of: None) == found
+    assert {path: path.stat().st_mtime_ns for path in (folder.path / NEXT).rglob("*") if path.is_file()} == before
+
+
+def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_played(tmp_path, monkeypatch):
+    folder, outcome, _ = started(tmp_path / "bank", False)
+    asked = []
+    monkeypatch.setattr("study.evaluation.bank.follow_up.ask_engine", lambda again, names, *_: asked.extend(names))
+    with pytest.raises(StudyError, match="answer.json"):  # nobody answered
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
+    (name,) = asked
+    assert (folder.path / NEXT / "open" / name / FURTHER).exists()
+
+
+def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
+    folder, _, _ = started(tmp_path / "bank", True)
+    place = folder.open / json.loads(folder.label(NUMBER).read_text())["name"]
+    said = json.loads((place / ANSWER).read_text())
+    said["diagnosis"]["effects"][0]["rivals"] = []
+    alone = outcome_of(json.loads(folder.label(NUMBER).read_text()), said)
+    assert follow_up(folder, PLAN, (alone,), (1, False), lambda done, of: None) == ()
+
+
+def test_a_device_that_cannot_be_drawn_again_is_said(tmp_path):
+    folder, outcome, _ = started(tmp_path / "bank", True)
+    path = folder.label(NUMBER)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"recording_sha256": "0" * 64}))
+    with pytest.raises(StudyError, match="cannot be drawn again"):
+        follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
+
+
+def test_shares_count_all_starts_and_those_for_which_something_is_proposed():
+    both = ("sensor_lag", "logger_offset")
+    found = [
+        FollowUp(1, "sensor_lag", both, "a sweep", ("sensor_lag",), "another", both),
+        FollowUp(2, "sensor_lag", both, "a sweep", both, "a sweep", both),
+        FollowUp(3, "logger_offset", both, "a sweep", ("sensor_lag",), "another", ("logger_offset",)),
+        FollowUp(4, "extra_mode", ("extra_mode", "body_on_actuator"), "", (), "another", ("extra_mode",)),
+    ]
+    assert [(one.hits, one.of) for one in follow_up_figures(found)] == [(1, 4), (2, 4), (1, 3), (1, 3)]

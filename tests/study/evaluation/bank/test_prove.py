@@ -1,0 +1,203 @@
+"""A bank from start to end on short recordings: sealed first, answered apart, revealed, and gone on with."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from study.errors import LeftError, StudyError
+from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, opened
+from study.evaluation.bank.proof_seals import answer_at
+from study.evaluation.bank.proof_summary import proof_lines, summary
+from study.evaluation.bank.prove import Wishes, prove
+from study.evaluation.bank.reveal_cases import reveal_cases
+from study.evaluation.bank.seal_cases import BankPlan, to_draw
+from study.evaluation.bank.write_proof import commit, write_proof, write_table
+from study.evaluation.challenge.draw_bank import draw
+from study.store.file_errors import UnusableFileError
+
+ROOT = Path(__file__).parents[4]
+SEED = 51_404
+PLAN = BankPlan(SEED, 2, brief=True)
+
+
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory):
+    seen = []
+    path = tmp_path_factory.mktemp("bank") / "proof"
+    return prove(path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of))), seen
+
+
+def test_a_bank_is_sealed_answered_and_revealed(proof):
+    done, seen = proof
+    assert len(done.outcomes) == len(to_draw(PLAN))
+    assert seen[-1] == ("diagnosing", len(done.outcomes), len(done.outcomes))
+    assert [one.verdict for one in done.outcomes if one.verdict == "failed"] == []
+    assert len(done.engines) == 1
+
+
+def test_seals_are_read_by_sha256sum_and_come_before_any_answer(proof):
+    folder = proof[0].folder
+    checked = subprocess.run(["sha256sum", "--check", "--status", "labels.sha256"], cwd=folder.path, check=False)
+    assert checked.returncode == 0
+    answers = [path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")]
+    assert folder.seals.stat().st_mtime_ns <= min(answers)
+
+
+def test_what_the_diagnosis_is_given_tells_neither_number_nor_seed(proof):
+    folder = proof[0].folder
+    for place in folder.open.iterdir():
+        given = (place / "model.toml").read_text() + (place / "settings.json").read_text()
+        assert str(SEED)[:4] not in given
+        assert not (place / RECORDING).exists()  # megabytes that have been answered
+
+
+def test_the_process_that_answers_never_loads_the_challenge(proof):
+    folder = proof[0].folder
+    answers = [json.loads(path.read_text()) for path in folder.open.glob(f"*/{ANSWER}")]
+    assert [one["knows_the_challenge"] for one in answers] == [False] * len(answers)
+
+
+@pytest.mark.parametrize(
+    ("does", "refused"),
+    [
+        ("import study.evaluation.challenge.draw_case", "ModuleNotFoundError"),
+        ("(cases.parent / 'sealed' / '00000.json').read_text()", "PermissionError"),
+        ("open(f'{cases}/../sealed/00000.json')", "PermissionError"),
+        ("open(f'{cases}/../sealed/00000.json'.encode())", "PermissionError"),
+        ("import os; os.listdir(cases.parent / 'sealed')", "PermissionError"),
+        ("import os; list(os.scandir(cases.parent))", "PermissionError"),
+        ("import os; os.chdir(cases.parent)", "PermissionError"),
+        ("import subprocess; subprocess.run(['cat', f'{cases}/../sealed/00000.json'])", "PermissionError"),
+        (
+            "import study; (Path(study.__path__[0]) / 'evaluation' / 'challenge' / 'draw_bank.py').read_text()",
+            "PermissionError",
+        ),
+    ],
+)
+def test_the_process_that_answers_reaches_no_label(proof, does, refused):
+    script = (
+        "from pathlib import Path\nfrom study.evaluation.bank.answer_cases import stay_apart\n"
+        f"cases = Path({str(proof[0].folder.open)!r})\nstay_apart(cases)\n{does}"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert refused in done.stderr
+
+
+def test_the_same_command_goes_on_without_doing_anything_twice(proof):
+    folder, seen = proof[0].folder, []
+    before = {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")}
+    again = prove(folder.path, PLAN, Wishes(), lambda what, done, of: seen.append((what, done, of)))
+    assert {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")} == before
+    assert again.seal == proof[0].seal
+    assert [one.number for one in again.outcomes] == [one.number for one in proof[0].outcomes]
+
+
+def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_path):
+    done = proof[0]
+    write_proof(done)
+    write_table(tmp_path / "small.csv", done)
+    assert len((done.folder.path / "proof.csv").read_text().splitlines()) == len(done.outcomes) + 1
+    assert json.loads((done.folder.path / "proof.json").read_text())["format"] == "hapteq-proof"
+    assert f"# seal of the labels {done.seal}" in (tmp_path / "small.csv").read_text()
+    misses = (tmp_path / "small-misses.csv").read_text().splitlines()
+    assert len(misses) == 1 + len(done.score.misses)
+    document = json.loads((done.folder.path / "proof.json").read_text())
+    write_proof(replace(done, engines=("another",)))
+    assert json.loads((done.folder.path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
+    assert document["commit"] == commit()
+    assert next(proof_lines(done)).endswith(f"misses in {len(done.outcomes)} cases")
+    assert summary(done)["cases"] == len(done.outcomes)
+
+
+@pytest.fixture
+def copied(proof, tmp_path):
+    folder = ProofFolder(tmp_path / "copy")
+    subprocess.run(["cp", "-r", str(proof[0].folder.path), str(folder.path)], check=True)
+    return folder
+
+
+def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
+    folder = copied
+    path = next(folder.sealed.glob("*.json"))
+    path.write_text(path.read_text().replace('"kind"', '"kind" '))
+    with pytest.raises(StudyError, match="A seal is broken"):
+        reveal_cases(folder, 100)
+    sealed = folder.seals.read_text()
+    with pytest.raises(StudyError, match="A seal is broken"):
+        prove(folder.path, PLAN, Wishes(), lambda *_: None)
+    assert folder.seals.read_text() == sealed
+
+
+def test_seals_that_are_none_break_the_proof(copied):
+    copied.seals.write_text("garbage\n")
+    with pytest.raises(StudyError, match="A seal is broken"):
+        prove(copied.path, PLAN, Wishes(), lambda *_: None)
+
+
+@pytest.mark.parametrize("without", ["recording_sha256", "knows_the_challenge", "model_sha256"])
+def test_an_answer_that_does_not_say_what_it_is_to_breaks_the_seal(copied, without):
+    path = next(copied.open.glob(f"*/{ANSWER}"))
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps({key: value for key, value in said.items() if key != without}))
+    with pytest.raises(StudyError, match="A seal is broken"):
+        reveal_cases(copied, 100)
+
+
+@pytest.mark.parametrize("torn", [ANSWER, "label"])
+def test_a_torn_file_is_named(copied, torn):
+    path = next(copied.open.glob(f"*/{ANSWER}")) if torn == ANSWER else next(copied.sealed.glob("*.json"))
+    path.write_text(path.read_text()[:40])
+    with pytest.raises(StudyError, match=path.name if torn == ANSWER else "A seal is broken"):
+        prove(copied.path, PLAN, Wishes(), lambda *_: None)
+
+
+def test_an_error_that_is_not_known_is_read(copied):
+    path = next(copied.open.glob(f"*/{ANSWER}"))
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
+    assert "NaN" in path.read_text()
+    assert len(reveal_cases(copied, 100)) == len(to_draw(PLAN))
+
+
+def test_an_answer_that_was_removed_is_given_again(copied):
+    path = next(copied.open.glob(f"*/{ANSWER}"))
+    before = json.loads(path.read_text())
+    path.unlink()
+    again = prove(copied.path, PLAN, Wishes(workers=1), lambda *_: None)
+    assert len(again.outcomes) == len(to_draw(PLAN))
+    assert json.loads(path.read_text())["diagnosis"] == before["diagnosis"]
+
+
+def test_a_folder_of_another_bank_is_refused(proof, tmp_path):
+    with pytest.raises(StudyError, match="another bank"):
+        opened(proof[0].folder.path, SEED + 1, True)
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(StudyError, match="a folder of its own"):
+        opened(tmp_path, SEED, True)
+
+
+def test_ctrl_c_keeps_what_is_sealed(tmp_path):
+    def interrupt(what, done, of):
+        if what == "diagnosing":
+            raise KeyboardInterrupt
+
+    with pytest.raises(LeftError, match="Interrupted"):
+        prove(tmp_path / "bank", PLAN, Wishes(workers=1), interrupt)
+    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(to_draw(PLAN))
+
+
+def test_the_short_bank_is_of_this_kind():
+    assert {draw(SEED, number, True).rig.period for number in range(3)} == {1000}
+
+
+def test_an_answer_that_is_nested_without_end_is_named(tmp_path):
+    (tmp_path / ANSWER).write_text("[" * 100_000)
+    with pytest.raises(UnusableFileError, match="nested"):
+        answer_at(tmp_path)
+    (tmp_path / ANSWER).write_text('{"error": NaN}')
+    assert math.isnan(answer_at(tmp_path)["error"])

@@ -1,0 +1,83 @@
+"""Cases: repeatable, of the same making as the labelled ones, and honest about what they conceal."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.signals.recording_checks import recording_problems
+from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.draw_case import draw_case
+from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
+from study.evaluation.challenge.nominal import WIDE, calibrated, retuned, shifted
+from study.evaluation.challenge.sensor_kernel import one_pole
+
+
+def first_seconds(plan):
+    """Of the multisines at 1.5 N alone, one period each."""
+    parts = [s for s in plan.segments if s.role == "fit" and s.amplitude == 1.5]
+    command = np.vstack([plan.command[s.start : s.start + 2000] for s in parts])
+    return DrivePlan(command, tuple(replace(s, start=2000 * k, stop=2000 * (k + 1)) for k, s in enumerate(parts)))
+
+
+@pytest.fixture(scope="module")
+def friction_case():
+    return draw_case(5, ["coulomb_friction"], strength=0.5)
+
+
+def test_a_draw_repeats_from_its_seed(friction_case):
+    again = draw_case(5, ["coulomb_friction"], strength=0.5)
+    np.testing.assert_array_equal(again.recording.response.samples, friction_case.recording.response.samples)
+    assert again.truth == friction_case.truth
+    np.testing.assert_array_equal(again.model.mass, friction_case.model.mass)
+
+
+def test_a_case_is_a_sound_recording_with_a_linear_model_and_the_truth(friction_case):
+    assert recording_problems(friction_case.recording) == ()
+    assert len(friction_case.recording) == 105_000
+    assert friction_case.model.effects == ()
+    (truth,) = friction_case.truth
+    assert (truth.effect, truth.place) == ("coulomb_friction", "mechanism")
+    assert truth.axis in ("x", "y", "z")
+    assert truth.values["level"] == pytest.approx(np.sqrt(0.003 * 0.25))
+
+
+def test_nothing_missing_is_an_empty_truth():
+    assert draw_case(6).truth == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"effects": ["stiction"]}, "there is no way to conceal 'stiction'"),
+        ({"effects": ["cogging"], "strength": 1.5}, "strength is 1.5; it must lie between 0 and 1"),
+        ({"effects": ["hand_impedance"], "concealed": "retuned"}, "from a calibrated model only"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(change, said):
+    with pytest.raises(ValueError, match=said):
+        draw_case(1, **change)
+
+
+def test_a_calibrated_model_is_off_by_its_tolerances_at_the_driven_axes_alone():
+    random = np.random.default_rng(2)
+    bench = draw_bench(random)
+    offsets = []
+    for _ in range(200):
+        known, tolerance = calibrated(bench, random)
+        offsets.append(np.diag(known.mass - bench.mass) / tolerance.mass_kg)
+        assert np.triu(known.mass - bench.mass, 1).max() == 0.0
+    assert np.std(offsets) == pytest.approx(1.0, abs=0.1)
+
+
+def test_retuning_finds_the_bench_when_nothing_hides():
+    random = np.random.default_rng(4)
+    bench, plan = draw_bench(random), first_seconds(draw_plan(random))
+    start = shifted(bench, np.repeat((0.02, 0.5, 15.0), 3))
+    each = [motion(Device(bench), plan.command[s.start : s.stop])[0] for s in plan.segments]
+    response = np.vstack([one_pole(part, 1.0 - np.exp(-np.pi)) for part in each])
+    found, tolerance = retuned(start, response, plan)
+    assert tolerance == WIDE
+    np.testing.assert_allclose(found.mass, bench.mass, atol=2e-4)
+    np.testing.assert_allclose(found.stiffness, bench.stiffness, atol=0.3)

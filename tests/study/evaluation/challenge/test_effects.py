@@ -1,0 +1,136 @@
+"""Every concealed effect does what its name says, and at zero strength nothing."""
+
+import numpy as np
+import pytest
+
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from study.evaluation.challenge.device import Device, record
+from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
+from study.evaluation.challenge.hidden import Circumstances
+from study.evaluation.challenge.sensor import NOISE_MPS2
+
+NEUTRAL = {
+    "end_stop": {"position": 1.0},
+    "hand_impedance": {"mass": 0.0, "damping": 0.0, "stiffness": 0.0},
+    "force_saturation": {"limit": 0.0},
+    "slew_limit": {"rate": 0.0},
+    "force_gain": {"gain": 1.0},
+    "sensor_gain": {"gain": 1.0},
+    "sensor_lag": {"bandwidth": 500.0},
+    "sensor_clipping": {"limit": 29.43},
+    "sensor_misalignment": {"about_x": 0.0, "about_y": 0.0, "about_z": 0.0},
+    "asymmetric_friction": {"level_positive": 0.0, "level_negative": 0.0},
+    "cross_axis_sensitivity": {"from_next": 0.0, "from_after_next": 0.0},
+    "extra_mode": {"mass": 0.0},
+    "time_varying_grip": {"depth": 0.0},
+    "bending_sensor": {"bend": 0.0, "play": 0.0},
+    "stiffness_in_time": {"depth": 0.0},
+    "skipped_commands": {"every": 0.0},
+}
+"""What `nothing` means, where it is not the main number at zero."""
+LINEAR = {
+    "viscous_damping", "extra_mode", "added_mass", "hand_impedance", "amplifier_lag", "transport_delay", "force_gain",
+    "sensor_lag", "sensor_misalignment", "cross_axis_sensitivity", "sensor_gain", "logger_offset",
+}  # fmt: skip
+ODD = {
+    "coulomb_friction", "stribeck_friction", "presliding_hysteresis", "quadratic_damping", "hardening_stiffness",
+    "backlash", "force_saturation", "force_deadband", "slew_limit", "sensor_clipping", "sensor_nonlinearity",
+    "bending_sensor", "damping_of_place", "force_hysteresis",
+}  # fmt: skip
+EVEN = {
+    "asymmetric_friction", "position_dependent_friction", "asymmetric_stiffness", "constant_force", "cogging",
+    "pose_dependent_inertia", "sensor_offset", "crossed_axes",
+}  # fmt: skip
+TRAVEL_M = 4e-3
+"""Of the bench of these tests, about."""
+ALL = {**EFFECTS, **DECOYS}
+
+
+def drawn(bench, name, strength, seed=3):
+    at = Circumstances(np.random.default_rng(seed), strength, bench, 0, np.full(3, TRAVEL_M), np.full(3, 12.0))
+    return ALL[name].draw(at)
+
+
+def heard(device, command):
+    """The reading without its noise, (samples, 3), m/s^2, and the position, m."""
+    response, position = record(device, command, np.random.default_rng(1))
+    quiet, _ = record(Device(device.bench), np.zeros_like(command), np.random.default_rng(1))
+    return response - quiet, position
+
+
+def with_effect(bench, name, strength=0.8):
+    return ALL[name].build(Device(bench), 0, drawn(bench, name, strength))
+
+
+# Without a gap the motor of a backlash still hangs on its contact spring.
+@pytest.mark.parametrize("name", [name for name in ALL if name != "backlash"])
+def test_at_zero_strength_nothing_changes(bench, command, name):
+    values = drawn(bench, name, 0.5)
+    nothing = NEUTRAL.get(name, {next(iter(values)): 0.0})
+    device = ALL[name].build(Device(bench), 0, values | nothing)
+    plain = record(Device(bench), command[:1500], np.random.default_rng(1))
+    there = record(device, command[:1500], np.random.default_rng(1))
+    np.testing.assert_allclose(there[0], plain[0], atol=1e-6)
+    np.testing.assert_allclose(there[1], plain[1], atol=1.01e-5)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_strong_effect_is_seen_above_the_noise_and_a_weak_one_is_weaker(bench, command, name):
+    plain = heard(Device(bench), command)
+    weak, strong = (
+        np.sqrt(np.mean((heard(with_effect(bench, name, strength), command)[0] - plain[0]) ** 2 / NOISE_MPS2, axis=0))
+        for strength in (0.0, 1.0)
+    )
+    assert strong.max() > max(0.05, 1.2 * weak.max())
+
+
+@pytest.mark.parametrize("name", sorted(LINEAR))
+def test_linear_effects_scale_with_the_command(bench, command, name):
+    device = with_effect(bench, name)
+    single, double = (heard(device, scale * command)[0] for scale in (0.5, 1.0))
+    np.testing.assert_allclose(double, 2 * single, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(ODD | EVEN))
+def test_nonlinear_effects_do_not_scale_with_the_command(bench, command, name):
+    device = with_effect(bench, name)
+    single, double = (record(device, scale * command, np.random.default_rng(1)) for scale in (0.5, 1.0))
+    moved = np.abs(double[1] - 2 * single[1]).max() > 1e-4
+    assert moved or np.abs(heard(device, command)[0] - 2 * heard(device, 0.5 * command)[0]).max() > 0.05
+
+
+@pytest.mark.parametrize("name", sorted(ODD - {"backlash"}))
+def test_odd_effects_mirror_with_the_command(bench, command, name):
+    device = with_effect(bench, name)
+    np.testing.assert_allclose(mirrored(device, command), 0.0, atol=0.3)
+
+
+@pytest.mark.parametrize("name", sorted(EVEN))
+def test_even_effects_do_not_mirror(bench, command, name):
+    device = with_effect(bench, name)
+    one, other = (record(device, sign * command, np.random.default_rng(1)) for sign in (1, -1))
+    assert np.abs(mirrored(device, command)).max() > 0.05 or np.abs(one[1] + other[1]).max() > 1e-4
+
+
+def mirrored(device, command):
+    """Zero where the device answers the mirrored command with the mirrored motion."""
+    still = record(Device(device.bench), 0 * command, np.random.default_rng(1))[0]
+    return sum(record(device, sign * command, np.random.default_rng(1))[0] for sign in (1, -1)) - 2 * still
+
+
+@pytest.mark.parametrize("name", [name for name, effect in ALL.items() if effect.place == "sensor"])
+def test_a_sensor_leaves_the_position_alone_but_for_the_clock_and_the_line(bench, command, name):
+    position = record(with_effect(bench, name), command, np.random.default_rng(1))[1]
+    same = np.array_equal(position, record(Device(bench), command, np.random.default_rng(1))[1])
+    assert same == (name not in ("clock_drift", "lost_samples"))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_values_have_the_names_of_the_vocabulary(bench, name):
+    wanted = {part.name for part in EFFECTS_BY_NAME[name].parameters if not part.optional}
+    assert wanted <= set(drawn(bench, name, 0.5))
+    assert EFFECTS[name].place == EFFECTS_BY_NAME[name].place
+
+
+def test_decoys_are_in_no_vocabulary():
+    assert not set(DECOYS) & set(EFFECTS_BY_NAME)

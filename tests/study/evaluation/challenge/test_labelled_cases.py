@@ -1,0 +1,64 @@
+"""The bench is that of the labelled cases: with the known numbers it plays their recordings back to the noise."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.evaluation.challenge.bench import Bench, Oscillators
+from study.evaluation.challenge.device import Device, motion
+from study.evaluation.challenge.drive_plan import DrivePlan
+from study.evaluation.challenge.effects.actuator import EFFECTS as ACTUATOR
+from study.evaluation.challenge.nominal import retuned
+from study.evaluation.challenge.sensor import NOISE_MPS2
+from study.evaluation.challenge.sensor_kernel import one_pole
+from study.store.mechanical_model_file import read_mechanical_model
+from study.store.recording_file import read_recording
+
+CASES = Path(__file__).parents[4].parent / "shared" / "cases"
+
+
+def bench_of(model):
+    """The bare parts of a case's model: modes stand on its diagonal."""
+    spring, mass = np.diag(model.stiffness)[3:], np.diag(model.mass)[3:]
+    damper, direction = np.diag(model.damping)[3:], -(model.stiffness[:3, 3:] / np.diag(model.stiffness)[3:]).T
+    damping = model.damping[:3, :3] - direction.T @ np.diag(damper) @ direction
+    stiffness = model.stiffness[:3, :3] - direction.T @ np.diag(spring) @ direction
+    modes = Oscillators(np.sqrt(spring / mass) / (2 * np.pi), mass, damper / (2 * np.sqrt(spring * mass)), direction)
+    return Bench(model.mass[:3, :3], damping, stiffness, modes)
+
+
+def opened(name):
+    if not CASES.exists():
+        pytest.skip("../shared/cases is absent")
+    truth = json.loads((CASES / f"{name}.truth.json").read_text(encoding="utf-8"))
+    recording = read_recording(CASES / f"{name}.h5")
+    model = bench_of(read_mechanical_model(CASES / f"{name}.toml"))
+    return recording, model, truth
+
+
+def misfit(device, recording):
+    """In units of the noise, worst channel, where nothing is clipped."""
+    acceleration, _ = motion(device, recording.command.samples)
+    seen = one_pole(acceleration, 1.0 - np.exp(-np.pi)) @ device.sensor.orientation.T
+    apart = (recording.response.samples - seen) / NOISE_MPS2
+    read = np.abs(recording.response.samples) < 29.0
+    return max(apart[read[:, j], j].std() for j in range(3))
+
+
+def test_where_nothing_is_missing_only_noise_is_left():
+    recording, model, _ = opened("open-00")
+    plan = DrivePlan(recording.command.samples, recording.segments)
+    bench, _ = retuned(model, recording.response.samples, plan)
+    assert misfit(Device(bench), recording) < 1.03
+
+
+def test_the_labelled_saturation_explains_its_case():
+    recording, model, (truth,) = opened("open-07")
+    (effect,) = (one for one in ACTUATOR if one.name == truth["effect"])
+    plan = DrivePlan(recording.command.samples, recording.segments)
+    bench, _ = retuned(model, recording.response.samples, plan)
+    axis = "xyz".index(truth["axis"])
+    assert misfit(Device(bench), recording) > 1.5
+    assert misfit(effect.build(Device(bench), axis, truth["values"]), recording) < 1.1

@@ -1,0 +1,201 @@
+"""A folder of recordings, diagnosed one by one: what goes through, what is said of the rest, what is kept."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+from study.errors import LeftError, StudyError
+from study.evaluation.real.real_folder import read_real_folder
+from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
+from study.evaluation.real.real_summary import real_lines
+from study.importing.model_library import model_for, shipped_models
+from study.store.real_answer_file import read_real_answer
+from study.workflows.files.validate import validate_file
+
+RATE_HZ, SECONDS = 500.0, 8.0
+MASS, DAMPING, STIFFNESS = 0.2, 4.0, 900.0
+OFFSET = 1.5
+
+MAP = """
+device = "one axis"
+title = "Noise on one axis"
+files = ["run.npz"]
+
+[[clock]]
+rate_hz = 500
+
+[[channel]]
+role = "command"
+name = "fx"
+value = "u"
+unit = "N"
+
+[[channel]]
+role = "response"
+name = "ax"
+value = "y"
+unit = "m/s^2"
+
+[[segment]]
+kind = "noise"
+split = { fit = 0.7, test = 0.3 }
+
+[diagnosis]
+model = "axis.model.toml"
+nominal = { mass = 0.2 }
+objections = ["It is simulated."]
+"""
+
+MODEL = f"""
+[model]
+name = "one axis"
+quantity = "acceleration"
+mass = [[{MASS}]]
+damping = [[{DAMPING}]]
+stiffness = [[{STIFFNESS}]]
+input = [[1.0]]
+output = [[1.0]]
+
+[tolerance]
+mass_kg = 0.004
+damping_n_s_per_m = 0.1
+stiffness_n_per_m = 20.0
+"""
+
+
+def played(offset: float) -> dict[str, np.ndarray]:
+    """Zero-order hold; the answer is taken just before the next command is written."""
+    random = np.random.default_rng(4)
+    n = int(RATE_HZ * SECONDS)
+    u = lfilter([0.2], [1.0, -0.8], random.normal(size=n))
+    a = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
+    exact = cont2discrete((a, np.array([[0.0], [1 / MASS]]), np.eye(2), np.zeros((2, 1))), 1 / RATE_HZ)
+    state, y, held = np.zeros(2), np.zeros(n), 0.0
+    for k in range(n):
+        y[k] = a[1] @ state + held / MASS
+        held = u[k]
+        state = exact[0] @ state + exact[1][:, 0] * held
+    return {"u": u, "y": y + offset + 0.01 * random.normal(size=n)}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """One recording with a wrong zero, one folder that nobody can read, one whose file is broken."""
+    whole = tmp_path / "recordings"
+    for name in ("axis", "nobody_knows", "torn"):
+        (whole / name).mkdir(parents=True)
+    np.savez(whole / "axis" / "run.npz", **played(OFFSET))
+    (whole / "axis" / "run.toml").write_text(MAP)
+    (whole / "axis" / "axis.model.toml").write_text(MODEL)
+    (whole / "nobody_knows" / "notes.txt").write_text("nothing")
+    (whole / "torn" / "run.npz").write_bytes(b"no archive")
+    (whole / "torn" / "run.toml").write_text(MAP.replace("axis.model.toml", ""))
+    return whole
+
+
+def silent(what: str, share: float) -> None:
+    return None
+
+
+def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_path: Path) -> None:
+    done = diagnose_folder(RealPlan(folder, tmp_path / "out"), silent)
+    axis, torn = done.results.answers
+    assert axis.effects == ("sensor_offset",)
+    assert axis.verdict in ("explained", "partly_explained")
+    assert axis.held_out.after < 0.1 * axis.held_out.retuned
+    assert axis.numbers[0].name == "mass" and axis.numbers[0].holds_nominal
+    assert axis.objections == ("It is simulated.",)
+    assert torn.verdict == "refused" and "run.npz" in torn.answer
+    assert [one.where for one in done.results.troubles] == ["nobody_knows"]
+    page = done.page.read_text()
+    assert "It is simulated." in page and "nobody_knows" in page
+    assert done.table.read_text().splitlines()[1].startswith(f"axis,run,{axis.verdict},sensor_offset")
+    assert (tmp_path / "out" / "figures" / "held-out-axis-run.svg").is_file()
+    assert any("sensor_offset" in line for line in real_lines(done))
+    kept = tmp_path / "out" / "axis" / "run" / "answer.json"
+    assert read_real_answer(kept) == axis
+    assert validate_file(kept).kind.startswith("answer to the real recording run of axis")
+    before = kept.stat().st_mtime_ns
+    assert diagnose_folder(RealPlan(folder, tmp_path / "out"), silent).results.answers[0] == axis
+    assert kept.stat().st_mtime_ns == before
+
+
+def test_interrupted_the_same_command_goes_on(folder: Path, tmp_path: Path) -> None:
+    def leave(what: str, share: float) -> None:
+        if what.startswith("torn"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(LeftError) as left:
+        diagnose_folder(RealPlan(folder, tmp_path / "out", seconds=1.0), leave)
+    assert "goes on where it stopped" in left.value.do_now
+    assert (tmp_path / "out" / "axis" / "run" / "answer.json").is_file()
+    assert not (tmp_path / "out" / "torn" / "run").exists()
+
+
+def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="no such folder"):
+        read_real_folder(tmp_path / "nowhere")
+
+
+def test_a_model_that_nobody_has_is_refused_with_those_that_are_there(tmp_path: Path) -> None:
+    with pytest.raises(StudyError) as refusal:
+        model_for("haptic_padle", tmp_path)
+    assert "haptic_paddle" in refusal.value.happened
+    assert all(model_for(name, tmp_path).is_file() for name in shipped_models())
+
+
+def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Path) -> None:
+    plan = RealPlan(folder, tmp_path / "out", inject=2, seed=6)
+    done = diagnose_folder(plan, silent)
+    assert len(done.results.injected) == 2
+    sealed = sorted((tmp_path / "out" / "injected" / "sealed").glob("*.json"))
+    assert len(sealed) == 2
+    assert len((tmp_path / "out" / "injected" / "labels.sha256").read_text().splitlines()) == 2
+    assert not any(one.failed for one in done.results.injected)
+    assert "Faults injected into real recordings" in done.page.read_text()
+    assert any(line.startswith("Injected: ") for line in real_lines(done))
+
+
+def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:
+    if not (shared / "recordings").is_dir():
+        pytest.skip("the public recordings are not beside this checkout")
+    found = read_real_folder(shared / "recordings")
+    by_name = {one.name: one for one in found.recordings}
+    # Folders that no shipped map describes are named as such, and stop none of the others.
+    without_map = {trouble.where for trouble in found.troubles}
+    assert all("no map is for its files" in trouble.why for trouble in found.troubles)
+    assert not without_map & {"emps", "f16_gvt", "haptic_paddle", "rack_drive", "silverbox", "vibration_actuator"}
+    assert set(by_name) >= {
+        "emps", "f16_gvt", "haptic_paddle_sensors", "haptic_paddle_torque", "rack_drive", "silverbox",
+        "vibration_actuator_noise_condition1_noise", "vibration_actuator_noise_condition2_noise",
+    }  # fmt: skip
+    on_a_body = by_name["vibration_actuator_noise_condition2_noise"]
+    assert on_a_body.before is not None and on_a_body.before.files[0].name == "condition1_noise.npz"
+    assert [one.files[0].stem for one in on_a_body.tests] == ["condition2_clip"]
+    assert [one.name for one in by_name["silverbox"].tests] == ["silverbox_growing_noise", "silverbox_schroeder"]
+    assert all(one.found.source.map.diagnosis.objections for one in found.recordings)
+    assert by_name["haptic_paddle_torque"].model().rotational
+
+
+@pytest.mark.slow
+def test_the_figures_of_the_public_recordings_are_reached(shared: Path, tmp_path: Path) -> None:
+    """Those that are; docs/real.md says which are not."""
+    if not (shared / "recordings").is_dir():
+        pytest.skip("the public recordings are not beside this checkout")
+    few = tmp_path / "recordings"
+    few.mkdir()
+    for name in ("emps", "haptic_paddle", "vibration_actuator"):
+        (few / name).symlink_to(shared / "recordings" / name)
+    done = diagnose_folder(RealPlan(few, tmp_path / "out"), silent)
+    answers = {one.recording: one for one in done.results.answers}
+    axis, lever = answers["emps"], answers["haptic_paddle_torque"]
+    assert axis.held_out.after <= 0.28 * axis.held_out.retuned
+    assert axis.numbers[0].value == pytest.approx(95.1, rel=0.01)
+    assert lever.held_out.after <= 0.25 * lever.held_out.retuned
+    assert lever.numbers[0].holds_nominal
+    pair = answers["vibration_actuator_noise_condition2_noise"].pair
+    assert pair.with_effects <= 0.8 * pair.gain
+    assert "body_on_actuator" in pair.returned
+    assert not any(one.verdict == "explained" for one in answers.values())

@@ -1,0 +1,48 @@
+"""A session's folder is diagnosed against a model of the handle without the spring that held it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from equalizer.plant.mechanical_model import MechanicalModel
+from protocols.loading import load_protocol
+from study.devices.clock import VirtualClock
+from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
+from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
+from study.workflows.session.conduct_session import conduct_new
+from study.workflows.session.open_session import SessionPlan
+from study.workflows.session.simulated_participant import simulated_participant
+
+SPRING = pytest.approx(136.5, abs=0.5)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory, small_text) -> Path:
+    plan = SessionPlan(
+        protocol=load_protocol(small_text, "small.toml"), protocol_text=small_text, protocol_locked=False,
+        subject="P01", observer="ideal", seed=3, data=tmp_path_factory.mktemp("data"), participant_number=0,
+    )  # fmt: skip
+    return conduct_new(plan, "simulated", simulated_participant("ideal", 3, VirtualClock())).folder.path
+
+
+def test_the_spring_is_in_the_compared_model_and_not_in_the_improved_one(session, diagnosed, tmp_path):
+    one = np.eye(3)
+    write_mechanical_model(
+        tmp_path / "m.toml", MechanicalModel("handle", "acceleration", 0.3 * one, 8 * one, 20 * one, one, one)
+    )
+    findings = diagnosed.diagnosed(diagnosed.recorded(1), diagnosed.device(1))
+    compared = []
+
+    def engine(recordings, model, settings, map_, progress):
+        compared.append((recordings, model, settings.names))
+        return findings
+
+    plan = DiagnosePlan((session,), tmp_path / "out", tmp_path / "m.toml")
+    done = diagnose_recordings(plan, lambda what, share: None, engine)
+    ((recordings, model, names),) = compared
+    assert len(recordings) == 1 and names == (session.name,)
+    assert [*np.diag(model.stiffness - 20 * one)] == [SPRING] * 3
+    improved = read_mechanical_model(tmp_path / "out" / "improved.toml")
+    assert float((findings.improved.stiffness - improved.stiffness).max()) == SPRING
+    assert any("spring of 137 N/m held the handle" in remark for remark in done.findings.remarks)

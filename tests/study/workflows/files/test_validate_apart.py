@@ -1,0 +1,37 @@
+"""Files that take their reader down."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from study.workflows.files import validate_apart
+from study.workflows.files.validate import Validation, validate_file
+from study.workflows.files.validate_apart import validate_files
+
+pytestmark = pytest.mark.real_time
+
+
+def crash_or_hang(path: Path) -> Validation:
+    """Stands for the HDF5 library on a file damaged in a way that it does not survive; found by name here."""
+    if "crash" in path.name:
+        os.abort()
+    if "hang" in path.name:
+        time.sleep(600)
+    return validate_file(path)
+
+
+@pytest.mark.timeout(120)
+def test_a_crash_and_a_hang_are_problems_of_their_files_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(validate_apart, "_validated", crash_or_hang)
+    names = ("sound.toml", "crash.h5", "hang.h5", "last.toml")
+    paths = [tmp_path / name for name in names]
+    for path in paths:
+        path.write_text("x = 1\n")
+    found = list(validate_files(paths, patience_s=15.0))
+    assert [v.path for v in found] == paths
+    assert found[1].problems == ("The file is damaged: reading it crashes the HDF5 library. Restore it from a copy.",)
+    assert "does not end within 15 s" in found[2].problems[0]
+    for other in (found[0], found[3]):
+        assert other == validate_file(other.path)

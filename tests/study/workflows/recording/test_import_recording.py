@@ -1,0 +1,136 @@
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from study.errors import StudyError, WrongUseError
+from study.importing.map_errors import ImportRefusedError, MapNeededError
+from study.store.recording_file import read_recording, write_recording
+from study.workflows.recording.import_recording import ImportPlan, import_recording
+
+T = np.arange(200) / 1000
+TABLE = "time [s],fx [N],ax [g]\n" + "\n".join(f"{t:.3f},{np.sin(99 * t):.6f},{t * t:.9f}" for t in T) + "\n"
+MAP = """
+device = "rig"
+[meta]
+place_m = [0.0, 0.01, 0.0]
+[[clock]]
+rate = "data.fs"
+[[channel]]
+role = "command"
+name = "fx"
+value = "array('data.u')"
+unit = "N"
+[[channel]]
+role = "response"
+name = "ax"
+value = "data.y"
+unit = "m/s^2"
+[[segment]]
+kind = "noise"
+split = { fit = 0.5, test = 0.5 }
+"""
+
+
+def test_a_table_whose_header_says_all_needs_no_map(tmp_path):
+    (tmp_path / "a.csv").write_text(TABLE)
+    done = import_recording(ImportPlan((tmp_path / "a.csv",), None, tmp_path / "r.h5"))
+    found = read_recording(tmp_path / "r.h5")
+    np.testing.assert_allclose(found.response.samples[:, 0], 9.80665 * T**2, atol=1e-7)
+    assert found.sample_rate_hz == 1000
+    assert done.notes == ("Taken from the header: fx as command, ax as response.",)
+    assert found.meta["import"] == {"map": "header", "notes": list(done.notes)}
+
+
+def test_matlab_structures_by_a_map(tmp_path):
+    savemat(tmp_path / "a.mat", {"data": {"u": T[:, None], "y": 2 * T, "fs": 1000.0}})
+    (tmp_path / "m.toml").write_text(MAP)
+    import_recording(ImportPlan((tmp_path / "a.mat",), str(tmp_path / "m.toml"), tmp_path / "r.h5"))
+    found = read_recording(tmp_path / "r.h5")
+    np.testing.assert_allclose(found.response.samples, 2 * found.command.samples)
+    assert [segment.role for segment in found.segments] == ["fit", "test"]
+    assert found.meta["place_m"] == [0.0, 0.01, 0.0]
+    assert found.meta["import"]["map"] == "m"
+    assert len(found.meta["import"]["map_sha256"]) == 64
+    assert [parent["file"] for parent in found.meta["provenance"]["parents"]] == ["a.mat"]
+
+
+def test_a_folder_with_a_map_of_its_own(tmp_path):
+    folder = tmp_path / "lab"
+    folder.mkdir()
+    savemat(folder / "a.mat", {"data": {"u": T, "y": 2 * T, "fs": 1000.0}})
+    (folder / "m.toml").write_text(MAP)
+    done = import_recording(ImportPlan((folder,), None, tmp_path / "r.h5"))
+    assert (done.map, len(done.recording)) == ("m", 200)
+
+
+def test_of_a_folder_a_named_map_takes_its_own_files(tmp_path):
+    savemat(tmp_path / "a.mat", {"data": {"u": T, "y": T, "fs": 1000.0}})
+    savemat(tmp_path / "b.mat", {"data": {"u": T, "y": T, "fs": 1000.0}})
+    (tmp_path / "m.toml").write_text('files = ["b*"]\n' + MAP)
+    done = import_recording(ImportPlan((tmp_path,), str(tmp_path / "m.toml"), tmp_path / "r.h5"))
+    assert [part["file"] for part in done.recording.meta["parts"]] == ["b.mat"]
+    (tmp_path / "m.toml").write_text('files = ["c*"]\n' + MAP)
+    with pytest.raises(ImportRefusedError, match=r"None of its files is one of c\*"):
+        import_recording(ImportPlan((tmp_path,), str(tmp_path / "m.toml"), tmp_path / "s.h5"))
+
+
+def test_a_folder_that_no_map_is_for_is_wrong_use(tmp_path):
+    (tmp_path / "a.csv").write_text("x\n1\n")
+    with pytest.raises(WrongUseError, match="No map is for the files of the folder"):
+        import_recording(ImportPlan((tmp_path,), None, tmp_path / "r.h5"))
+
+
+def test_a_folder_of_several_recordings_asks_which(tmp_path):
+    for name in ("a.mat", "b.mat"):
+        savemat(tmp_path / name, {"data": {"u": T, "y": T, "fs": 1000.0}})
+    (tmp_path / "m.toml").write_text("separate = true\n" + MAP)
+    with pytest.raises(WrongUseError, match=r"makes 2 recordings: m for a\.mat; m for b\.mat\."):
+        import_recording(ImportPlan((tmp_path,), None, tmp_path / "r.h5"))
+
+
+def recording(rate_hz=1000.0):
+    one = Signal(T[:, None], rate_hz, "force", "N", ("fx",))
+    return Recording("rig", one, Signal(T[:, None], rate_hz, "acceleration", "m/s^2", ("ax",)), meta={"grip": "weak"})
+
+
+def test_recordings_of_ours_are_taken_as_they_are_and_joined(tmp_path):
+    write_recording(tmp_path / "a.h5", recording())
+    write_recording(tmp_path / "b.h5", recording())
+    one = import_recording(ImportPlan((tmp_path / "a.h5",), None, tmp_path / "one.h5"))
+    assert one.recording.meta["grip"] == "weak"
+    two = import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "b.h5"), None, tmp_path / "two.h5"))
+    assert len(two.recording) == 400
+    assert two.notes == ("2 recordings were put one after another; time stamps were left out.",)
+    assert [part["file"] for part in two.recording.meta["parts"]] == ["a.h5", "b.h5"]
+
+
+def test_recordings_of_ours_that_do_not_fit_together_are_refused(tmp_path):
+    write_recording(tmp_path / "a.h5", recording())
+    write_recording(tmp_path / "b.h5", recording(500.0))
+    with pytest.raises(ImportRefusedError, match="A recording of rig at 500 Hz cannot follow one of rig at 1000 Hz"):
+        import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "b.h5"), None, tmp_path / "r.h5"))
+
+
+def test_a_file_that_says_nothing_gets_a_map_to_complete(tmp_path):
+    np.savez(tmp_path / "a.npz", u=T, y=T)
+    with pytest.raises(MapNeededError) as refused:
+        import_recording(ImportPlan((tmp_path / "a.npz",), None, tmp_path / "r.h5"))
+    assert 'value = "u"' in refused.value.skeleton
+    assert refused.value.happened == "Nothing says which array is what, and in which unit."
+
+
+@pytest.mark.parametrize("out", ["there.h5", "nowhere/r.h5"])
+def test_a_name_that_cannot_be_written_is_said_before_anything_is_read(tmp_path, out):
+    (tmp_path / "there.h5").write_bytes(b"mine")
+    with pytest.raises(StudyError, match="Nothing was imported"):
+        import_recording(ImportPlan((tmp_path / "not_there.csv",), None, tmp_path / out))
+    assert (tmp_path / "there.h5").read_bytes() == b"mine"
+
+
+def test_what_is_refused_leaves_nothing_behind(tmp_path):
+    (tmp_path / "a.csv").write_text(TABLE.replace("0.005,", "0.001,", 1))
+    with pytest.raises(ImportRefusedError, match="runs backwards at sample 5"):
+        import_recording(ImportPlan((tmp_path / "a.csv",), None, tmp_path / "r.h5"))
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]

@@ -1,0 +1,78 @@
+"""Recordings on the simulated device."""
+
+import numpy as np
+import pytest
+
+from protocols.apparatus import SafetySettings
+from protocols.recording_protocol import RecordingProtocol
+from protocols.recording_segments import SineSegment, SweepSegment
+from study.errors import LeftError, StudyError
+from study.store.recording_file import read_recording
+from study.workflows.recording.record_device import RecordingPlan, record_device
+
+PROTOCOL = RecordingProtocol(
+    name="short",
+    kind="recording",
+    title="Short",
+    segments=(
+        SineSegment("sine", (15.0, 25.0), 1.0, "direction_1", duration_s=0.8, settle_s=0.5),
+        SweepSegment("sweep", 2.0, 200.0, 1.0, "y", duration_s=1.0),
+    ),
+    safety=SafetySettings(stimulus_cap_n=1.5, total_cap_n=3.0),
+    rest_s=0.3,
+)
+
+
+def plan(out, protocol=PROTOCOL) -> RecordingPlan:
+    return RecordingPlan(protocol, device="simulated", place_m=(0.0, 0.0, 0.0), seed=2, out=out)
+
+
+def test_a_recording_holds_what_the_protocol_asked_for(tmp_path):
+    progress: list[float] = []
+    record_device(plan(tmp_path / "r.h5"), progress.append)
+    recording = read_recording(tmp_path / "r.h5")
+    assert [s.kind for s in recording.segments] == ["sine", "sine", "sweep"]
+    assert [s["frequency_hz"] for s in recording.meta["segments"]] == [15.0, 25.0, None]
+    for segment, about in zip(recording.segments, recording.meta["segments"], strict=True):
+        played = recording.excitation.samples[segment.start : segment.stop] @ np.array(about["unit_vector"])
+        assert np.abs(played).max() == pytest.approx(1.0, rel=0.02)
+    assert progress == sorted(progress)
+    assert progress[-1] == pytest.approx(plan(tmp_path / "x.h5").total_s)
+
+
+def test_the_spring_is_in_the_command_and_not_in_the_excitation(tmp_path):
+    record_device(plan(tmp_path / "r.h5"), lambda _: None)
+    recording = read_recording(tmp_path / "r.h5")
+    feedback = recording.command.samples - recording.excitation.samples
+    stiffness = -np.sum(feedback * recording.position.samples) / np.sum(recording.position.samples**2)
+    about = recording.meta["feedback"]
+    expected = about["effective_mass_kg"] * (2 * np.pi * about["natural_frequency_hz"]) ** 2
+    assert stiffness == pytest.approx(expected, rel=1e-3)
+
+
+def test_interrupted_the_whole_pieces_are_written(tmp_path):
+    def press(seconds: float) -> None:
+        if seconds > 3.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(LeftError) as left:
+        record_device(plan(tmp_path / "r.h5"), press)
+    assert left.value.happened.startswith("1 of 3 pieces were recorded")
+    recording = read_recording(tmp_path / "r.h5")
+    assert recording.meta["interrupted"] is True
+    assert len(recording.segments) == 1
+
+
+def test_interrupted_at_once_nothing_is_written(tmp_path):
+    def press(seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(LeftError) as left:
+        record_device(plan(tmp_path / "r.h5"), press)
+    assert left.value.saved == "Nothing was written."
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_does_not_exist_is_said_before_anything_moves(tmp_path):
+    with pytest.raises(StudyError, match="There is no folder"):
+        record_device(plan(tmp_path / "nowhere" / "r.h5"), lambda _: None)

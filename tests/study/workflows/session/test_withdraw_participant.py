@@ -1,0 +1,332 @@
+"""Withdrawal erases this participant and nothing else, and goes on after an interruption at any point."""
+
+import json
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from study.cli.main import app, main
+from study.errors import StudyError
+from study.store.archive import SessionFolder
+from study.store.event_log import EventLog
+from study.workflows.files.validate import validate_file
+from study.workflows.results.collect_sessions import collect_sessions
+from study.workflows.results.fold_session import fold_session
+from study.workflows.session.participant_number import participant_number
+from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
+from study.workflows.views.list_sessions import session_lines
+from study.workflows.views.view_session import session_view
+
+CORPUS = Path(__file__).resolve().parents[3] / "frozen" / "v0_1" / "study"
+UTC = "2026-05-04T09:30:00+00:00"
+PART = ".anova.json.0123abcd.part"
+
+
+def copy_session(data: Path, name: str) -> None:
+    """The corpus's finished session under another name, with one recording."""
+    folder = data / name
+    (folder / "recordings").mkdir(parents=True)
+    for path in sorted((CORPUS / "P01_001" / "recordings").iterdir())[:1]:
+        shutil.copy(path, folder / "recordings")
+    for path in ("events.jsonl", "trials.csv", "thresholds.csv", "session.json"):
+        text = (CORPUS / "P01_001" / path).read_text()
+        (folder / path).write_text(text.replace("P01", name.partition("_")[0]).replace("_001", name[-4:]))
+
+
+def write_analysis(folder: Path, *subjects: str) -> None:
+    (folder / "figures").mkdir(parents=True)
+    header, row = (CORPUS / "P01_001" / "thresholds.csv").read_text().splitlines()[:2]
+    rows = [row.replace("P01", subject) for subject in subjects]
+    (folder / "thresholds.csv").write_text("\n".join([header, *rows, ""]))
+    (folder / "report.html").write_text(" ".join(subjects))
+    for number, subject in enumerate(subjects):
+        (folder / "figures" / f"staircases-{number}-{subject}.svg").write_text("<svg/>")
+
+
+@pytest.fixture
+def data(tmp_path) -> Path:
+    """Two sessions of P01, one of P02, and their analysis."""
+    data = tmp_path / "data"
+    for name in ("P01_001", "P01_002", "P02_001"):
+        copy_session(data, name)
+    write_analysis(data / "analysis", "P01", "P02")
+    return data
+
+
+def erase(data: Path, session: str = "P01_001") -> None:
+    withdraw(data, plan_withdrawal(SessionFolder(data / session)), UTC)
+
+
+def files(folder: Path) -> dict[str, bytes | str]:
+    """Of everything below, links as what they say."""
+    return {
+        str(path.relative_to(folder)): str(path.readlink()) if path.is_symlink() else path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_symlink() or path.is_file()
+    }
+
+
+@pytest.fixture
+def elsewhere(tmp_path) -> Iterator[Path]:
+    """A folder that no withdrawal may touch."""
+    copy_session(tmp_path / "other", "P01_002")
+    folder = tmp_path / "other" / "P01_002"
+    before = files(folder)
+    yield folder
+    assert files(folder) == before
+
+
+def test_a_link_in_the_place_of_a_session_is_named_and_left_alone(data, elsewhere):
+    shutil.rmtree(data / "P01_002")
+    (data / "P01_002").symlink_to(elsewhere)
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    assert plan.sessions == ("P01_001",)
+    assert "P01_002 is a link; neither it nor what it leads to was touched." in plan.doubtful
+    withdraw(data, plan, UTC)
+    assert (data / "P01_002").is_symlink()
+    done = CliRunner().invoke(app, ["withdraw", "P01_002", "--data", str(data), "--yes"])
+    assert isinstance(done.exception, StudyError)
+    assert "P01_002 leads to another place, where nothing is erased." in str(done.exception)
+
+
+def test_a_link_put_in_the_place_of_a_session_after_the_question_is_not_followed(data, elsewhere):
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    shutil.rmtree(data / "P01_002")
+    (data / "P01_002").symlink_to(elsewhere)
+    with pytest.raises(StudyError, match="Not everything could be erased"):
+        withdraw(data, plan, UTC)
+    assert (data / "P01_001" / "trials.csv").exists()
+
+
+@pytest.mark.parametrize("kept", ["nothing", "a log of P02", "a log of another session", "a linked log"])
+def test_a_folder_that_is_not_proved_to_be_the_participants_is_listed(data, elsewhere, kept):
+    folder = data / "P01_003"
+    folder.mkdir()
+    (folder / "thesis.txt").write_text("all of it")
+    match kept:
+        case "a log of P02":
+            shutil.copy(data / "P02_001" / "events.jsonl", folder)
+        case "a log of another session":
+            shutil.copy(data / "P01_001" / "events.jsonl", folder)
+        case "a linked log":
+            (folder / "events.jsonl").symlink_to(elsewhere / "events.jsonl")
+    before = files(folder)
+    done = CliRunner().invoke(app, ["withdraw", "P01_001", "--data", str(data), "--yes"])
+    assert done.exit_code == 0, done.output
+    assert "Not to be erased: P01_003 holds no log that says it is a session of P01." in done.output
+    assert files(folder) == before
+
+
+@pytest.mark.parametrize("name", ["recordings", "trials.csv", "session.lock", "withdrawn.json", "notes", "figures/x"])
+def test_a_link_inside_a_session_goes_and_what_it_leads_to_stays(data, elsewhere, name):
+    link = data / "P01_001" / name
+    link.parent.mkdir(exist_ok=True)
+    if link.is_dir():
+        shutil.rmtree(link)
+    link.unlink(missing_ok=True)
+    link.symlink_to(elsewhere if name != "trials.csv" else elsewhere / "trials.csv")
+    erase(data)
+    assert not link.is_symlink()
+    assert {path.name for path in (data / "P01_001").iterdir()} <= {"withdrawn.json", "session.lock"}
+    assert validate_file(data / "P01_001").problems == ()
+
+
+@pytest.mark.parametrize("name", ["analysis", "analysis/figures"])
+def test_a_linked_analysis_is_not_emptied(data, tmp_path, name):
+    write_analysis(tmp_path / "mine", "P01")
+    shutil.rmtree(data / name)
+    link = tmp_path / "mine" / ("figures" if "/" in name else "")
+    (data / name).symlink_to(link)
+    before = files(tmp_path / "mine")
+    erase(data)
+    assert files(tmp_path / "mine") == before
+
+
+def test_what_was_made_from_others_alone_stays(data):
+    shutil.rmtree(data / "analysis")
+    write_analysis(data / "analysis", "P02")
+    write_analysis(data / "with_p01", "P02", "P01")
+    (data / "with_p01" / PART).write_text("{")
+    (data / PART).write_text("{")
+    (data / ".found.89abcdef.part").mkdir()
+    (data / ".found.89abcdef.part" / "diagnosis.json").write_text('{"recordings": ["P01_002"]}')
+    others = files(data / "analysis")
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    assert plan.made_from_them == (".found.89abcdef.part", "with_p01")
+    assert plan.doubtful == (f"{PART} does not say whose numbers it holds.",)
+    withdraw(data, plan, UTC)
+    assert files(data / "analysis") == others
+    assert sorted(path.name for path in data.iterdir()) == sorted(
+        [PART, "P01_001", "P01_002", "P02_001", "analysis"]
+    )  # fmt: skip
+
+
+def test_an_analysis_that_does_not_say_whose_it_is_is_listed(data):
+    (data / "analysis" / "thresholds.csv").unlink()
+    for figure in (data / "analysis" / "figures").iterdir():
+        figure.unlink()
+    plan = plan_withdrawal(SessionFolder(data / "P01_001"))
+    assert "analysis/report.html does not say whose numbers it holds." in plan.doubtful
+    withdraw(data, plan, UTC)
+    assert (data / "analysis" / "report.html").exists()
+
+
+def test_copies_that_name_the_participant_are_named(data, tmp_path):
+    copied = shutil.copytree(data / "P01_001", data / "P01_001 (copy)")
+    (data / "todo.txt").write_text("call P01_002 again")
+    (data / "P010_001.txt").write_text("P010_001 is another participant")
+    for out in ("out", "nobody"):
+        write_analysis(tmp_path / out, "P01" if out == "out" else "P02")
+    (data / "written_elsewhere.txt").write_text(f"{tmp_path / 'out'}\n{tmp_path / 'nobody'}\n{tmp_path / 'gone'}\n")
+    done = CliRunner().invoke(app, ["withdraw", "P01_001", "--data", str(data), "--yes"])
+    assert done.exit_code == 0, done.output
+    assert "P01_001 (copy) holds a log of P01 under another name" in done.output
+    assert "Not to be erased: todo.txt names P01." in done.output
+    assert "P010" not in done.output
+    assert f"Written with --out, and not erased: {tmp_path / 'out'}" in done.output
+    assert str(tmp_path / "nobody") not in done.output
+    assert str(tmp_path / "gone") not in done.output
+    assert (copied / "events.jsonl").exists()
+
+
+def test_a_running_session_stops_the_withdrawal_before_anything_is_changed(data):
+    before = files(data)
+    log = EventLog.reopen(data / "P01_002" / "events.jsonl")
+    with pytest.raises(StudyError, match="Another program is writing to P01_002"):
+        erase(data)
+    log.close()
+    assert {name: held for name, held in files(data).items() if not name.endswith("session.lock")} == before
+
+
+def test_an_intent_leads_nowhere_else(data, elsewhere):
+    left = {"subject": "P01", "withdrawn_utc": UTC, "sessions": {"../other/P01_002": None, "P02_001": None},
+            "derived": ["../other/P01_002/trials.csv", str(elsewhere), "analysis"]}  # fmt: skip
+    document = {"format": "hapteq-withdrawal", "version": 1, **left}
+    (data / "P01.withdrawal.json").write_text(json.dumps(document))
+    erase(data)
+    assert (data / "P02_001" / "events.jsonl").exists()
+    assert not (data / "analysis").exists()
+
+
+def test_a_log_of_another_in_a_folder_that_was_the_participants_is_not_erased(data, elsewhere):
+    shutil.rmtree(data / "P01_002")
+    shutil.copytree(data / "P02_001", data / "P01_002")
+    tombstone = {"format": "hapteq-tombstone", "version": 1, "session": "P01_002", "withdrawn_utc": UTC}
+    (data / "P01_002" / "withdrawn.json").write_text(json.dumps(tombstone))
+    (data / "P01_003").mkdir()
+    (data / "P01_003" / "mine.txt").write_text("not of a session")
+    sessions = {"P01_002": None, "P01_003": None}
+    left = {"subject": "P01", "withdrawn_utc": UTC, "sessions": sessions, "derived": ["P02_001/events.jsonl"]}
+    document = {"format": "hapteq-withdrawal", "version": 1, **left}
+    (data / "P01.withdrawal.json").write_text(json.dumps(document))
+    erase(data)
+    assert (data / "P01_002" / "events.jsonl").read_bytes() == (data / "P02_001" / "events.jsonl").read_bytes()
+    assert (data / "P01_003" / "mine.txt").exists()
+
+
+def test_what_an_earlier_version_left_half_erased_is_said_and_erased(data):
+    """It wrote the tombstone first, and said that nothing was left but it."""
+    left = {"format": "hapteq-tombstone", "version": 1, "session": "P01_001", "withdrawn_utc": UTC, "begun": None}
+    (data / "P01_001" / "withdrawn.json").write_text(json.dumps(left))
+    (data / "P01_001" / "events.jsonl").unlink()
+    problems = " ".join(validate_file(data / "P01_001").problems)
+    assert "Still there: recordings/, session.json, thresholds.csv, trials.csv." in problems
+    assert f"hapteq withdraw P01_001 --data {data}" in problems
+    erase(data)
+    assert validate_file(data / "P01_001").problems == ()
+
+
+class Killed(BaseException):
+    """In the place of a SIGKILL: from here on no operation is done any more."""
+
+
+class _Killer:
+    """Counts what changes a file system, and ends the program before the operation `at`."""
+
+    CHANGING = ("os.remove", "os.rmdir", "os.rename", "os.link", "os.mkdir", "os.chmod", "os.truncate", "os.symlink")
+
+    def __init__(self) -> None:
+        self.active, self.done, self.at = False, 0, 0
+
+    def __call__(self, event: str, arguments: tuple) -> None:
+        if not self.active:
+            return
+        writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
+        if writes or event in self.CHANGING:
+            self.done += 1
+            if self.done >= self.at:
+                raise Killed
+
+    @contextmanager
+    def before(self, operation: int) -> Iterator[None]:
+        self.active, self.done, self.at = True, 0, operation
+        try:
+            yield
+        finally:
+            self.active = False
+
+
+@pytest.fixture(scope="module")
+def killer() -> _Killer:
+    """An audit hook cannot be taken off; this one sleeps between tests."""
+    killer = _Killer()
+    sys.addaudithook(killer)
+    return killer
+
+
+def check_half_erased(data: Path) -> None:
+    """Nothing of P01 counts as data, and it is said how to go on."""
+    for line in session_lines(data):
+        if line.subject == "P01":
+            assert line.standing == "withdrawn"
+            assert "hapteq withdraw P01_" in line.remark
+    assert [folder.name for folder in collect_sessions(data).sessions] == ["P02_001"]
+    for name in ("P01_001", "P01_002"):
+        view = session_view(data / name)
+        assert (view.line.standing, view.thresholds, view.events) == ("withdrawn", (), ())
+        with pytest.raises(StudyError, match="was withdrawn"):
+            fold_session(SessionFolder(data / name))
+        validation = validate_file(data / name)
+        assert f"hapteq withdraw {name} --data {data}" in " ".join(validation.problems)
+        if not (data / name / "events.jsonl").exists():
+            assert {path.suffix for path in (data / name).iterdir()} <= {".json", ".lock", ".part"}
+            assert not (data / name / "session.json").exists()
+        for left in (path for path in (data / name).iterdir() if not path.name.startswith(("with", "session.lock"))):
+            assert left.name in " ".join(validation.problems)
+    assert participant_number(data, "P09", "corpus", simulated=True) == 1
+
+
+def test_killed_before_any_operation_it_goes_on_and_finishes(data, elsewhere, killer, tmp_path, monkeypatch):
+    (data / "P01_001" / "recordings" / "more").symlink_to(elsewhere)
+    monkeypatch.setattr("study.devices.clock.RealClock.utc", lambda clock: UTC)
+    whole = shutil.copytree(data, tmp_path / "whole", symlinks=True)
+    erase(whole)
+    operation, begun = 0, 0
+    while True:
+        operation += 1
+        place = shutil.copytree(data, tmp_path / f"killed-{operation}", symlinks=True)
+        try:
+            with killer.before(operation):
+                erase(place)
+            break
+        except Killed:
+            pass
+        untouched = {name: held for name, held in files(data).items() if name.startswith("P01")}
+        if (place / "P01.withdrawal.json").exists():
+            begun += 1
+            check_half_erased(place)
+        else:
+            now = files(place)
+            over = "P01_001/withdrawn.json" in now and "P01_002/withdrawn.json" in now
+            assert over or all(now.get(name) == held for name, held in untouched.items())
+        assert main(["withdraw", "P01_001", "--data", str(place), "--yes"]) == 0
+        assert files(place) == files(whole)
+        assert validate_file(place / "P01_001").problems == validate_file(place / "P01_002").problems == ()
+        shutil.rmtree(place)
+    assert begun > 15

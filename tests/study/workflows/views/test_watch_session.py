@@ -1,0 +1,301 @@
+"""Follow a log while it grows, and reach the session that writes it."""
+
+import os
+import threading
+import time
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+
+from study.devices.clock import RealClock
+from study.errors import StudyError
+from study.session.live import Live
+from study.session.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.archive import SessionFolder
+from study.store.event_log import LOG_NAME, EventLog, read_log
+from study.store.live_file import write_live
+from study.store.log_writer import somebody_writes
+from study.store.request_inbox import RequestInbox
+from study.workflows.files.validate import validate_file
+from study.workflows.results.fold_session import fold_session
+from study.workflows.views.ask_session import ask_session
+from study.workflows.views.take_note import take_note
+from study.workflows.views.watch_session import ask, follow
+
+pytestmark = pytest.mark.real_time
+
+STOP, PAUSE = StopAsked("experimenter"), PauseAsked("experimenter")
+NOTE = NoteAsked("experimenter", "asks for a lower chair")
+
+
+def now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+class Growing:
+    """A log that grows byte by byte, as a copy of a whole one."""
+
+    def __init__(self, folder, data: bytes) -> None:
+        self.data = data
+        self.path = folder / LOG_NAME
+        self.path.write_bytes(b"")
+
+    def grow_to(self, length: int) -> None:
+        with self.path.open("ab") as file:
+            file.write(self.data[self.path.stat().st_size : length])
+
+
+@pytest.fixture
+def whole(sitter) -> SessionFolder:
+    return sitter.whole().folder
+
+
+@pytest.fixture
+def growing(tmp_path, whole) -> Growing:
+    folder = tmp_path / "copy" / whole.name
+    folder.mkdir(parents=True)
+    return Growing(folder, whole.log.read_bytes())
+
+
+def test_a_log_followed_while_it_grows_ends_at_the_view_of_the_whole(growing, whole):
+    follower = follow(growing.path.parent)
+    lengths = range(0, len(growing.data) + 1, 997)
+    seen = []
+    for length in [*lengths, len(growing.data)]:
+        growing.grow_to(length)
+        view = follower.look(now())
+        seen += [view.answers] if view is not None else []
+    at_once = follow(whole.path).look(view.utc)
+    assert replace(view, alarms=()) == replace(at_once, alarms=())
+    assert view.standing == "finished"
+    assert seen == sorted(seen)
+
+
+def test_a_torn_last_line_waits_until_it_is_whole(growing):
+    lines = growing.data.splitlines(keepends=True)
+    follower = follow(growing.path.parent)
+    growing.grow_to(len(lines[0]) + len(lines[1]) - 1)
+    assert follower.look(now()).open_trial is None
+    growing.grow_to(len(lines[0]) + len(lines[1]))
+    view = follower.look(now())
+    assert view.open_trial.trial == 0
+    assert "log" not in [alarm.kind for alarm in view.alarms]
+
+
+def test_without_a_first_line_there_is_nothing_to_see(growing):
+    assert follow(growing.path.parent).look(now()) is None
+    growing.grow_to(10)
+    assert follow(growing.path.parent).look(now()) is None
+
+
+def test_a_line_that_its_writer_took_back_is_taken_back_here(growing):
+    lines = growing.data.splitlines(keepends=True)
+    growing.grow_to(sum(map(len, lines[:4])))
+    follower = follow(growing.path.parent)
+    assert follower.look(now()).answers == 1
+    os.truncate(growing.path, sum(map(len, lines[:2])))
+    assert follower.look(now()).answers == 0
+    growing.grow_to(len(growing.data))
+    assert follower.look(now()).standing == "finished"
+
+
+def test_following_changes_nothing_in_the_folder(whole):
+    before = {path: path.read_bytes() for path in whole.path.rglob("*") if path.is_file()}
+    follower = follow(whole.path)
+    for _ in range(3):
+        follower.look(now())
+    assert {path: path.read_bytes() for path in whole.path.rglob("*") if path.is_file()} == before
+
+
+def test_a_contradiction_is_an_alarm_that_tells_nothing_of_the_draw(growing, session_logs):
+    growing.grow_to(len(b"".join(growing.data.splitlines(keepends=True)[:2])))
+    session_logs.as_older(growing.path.parent, lambda text: text.replace(b'"level_n":1.0', b'"level_n":2.0'))
+    view = follow(growing.path.parent).look(now())
+    assert view.alarms[0].sentence == "The log cannot be followed: it contradicts the rules."
+    assert view.open_trial is None
+
+
+def test_a_damaged_line_is_an_alarm(growing, session_logs):
+    growing.grow_to(len(b"".join(growing.data.splitlines(keepends=True)[:2])))
+    session_logs.as_older(growing.path.parent, lambda text: text.replace(b'"level_n"', b'"level_m"'))
+    view = follow(growing.path.parent).look(now())
+    assert "a line of it is no event that this version knows" in view.alarms[0].sentence
+
+
+def test_a_line_that_was_changed_is_an_alarm(growing):
+    whole = growing.data.splitlines(keepends=True)[:2]
+    growing.path.write_bytes(b"".join(whole).replace(b'"level_n":1.0', b'"level_n":2.0'))
+    view = follow(growing.path.parent).look(now())
+    assert view.alarms[0].sentence == "The log cannot be followed: line 2 of it does not match its checksum."
+    assert view.open_trial is None
+
+
+def test_the_cut_end_of_a_finished_log_is_an_alarm(whole):
+    assert follow(whole.path).look(now()).alarms == ()
+    text = whole.log.read_bytes()
+    whole.log.write_bytes(b"".join(text.splitlines(keepends=True)[:-1]))
+    assert follow(whole.path).look(now()).alarms[0].sentence == "The log cannot be followed: its end is missing."
+
+
+def test_a_first_line_of_another_kind_cannot_be_followed(growing):
+    growing.path.write_bytes(growing.data.splitlines(keepends=True)[1])
+    with pytest.raises(StudyError, match="This session cannot be followed"):
+        follow(growing.path.parent).look(now())
+    growing.path.write_bytes(b'{"format": "something"}\n')
+    with pytest.raises(StudyError, match="first line of the log of P01_001 is none that this version knows"):
+        follow(growing.path.parent).look(now())
+
+
+def test_a_session_erased_under_the_watcher_is_told(growing):
+    growing.grow_to(len(growing.data.splitlines(keepends=True)[0]))
+    follower = follow(growing.path.parent)
+    follower.look(now())
+    growing.path.unlink()
+    view = follower.look(now())
+    assert view.standing == "not running"
+    assert view.alarms[0].kind == "log"
+
+
+def test_a_killed_session_is_not_running_and_one_that_writes_is(sitter):
+    folder = sitter.interrupted(after=3).folder
+    lines = folder.log.read_bytes().splitlines(keepends=True)
+    folder.log.write_bytes(b"".join(lines[:-1]))
+    assert follow(folder.path).look(now()).standing == "not running"
+    log = EventLog.reopen(folder.log)
+    try:
+        assert somebody_writes(folder.log) is True
+        assert follow(folder.path).look(now()).standing == "running"
+    finally:
+        log.close()
+    assert somebody_writes(folder.log) is False
+
+
+def test_whether_somebody_writes_a_missing_log_is_not_known(tmp_path):
+    assert somebody_writes(tmp_path / "events.jsonl") is None
+
+
+def test_a_fresh_live_state_saves_the_look_at_the_lock(sitter):
+    folder = sitter.interrupted(after=3).folder
+    lines = folder.log.read_bytes().splitlines(keepends=True)
+    folder.log.write_bytes(b"".join(lines[:-1]))
+    live = Live("2999-01-01T00:00:00.000+00:00", "trial", now(), "", 0.5, True, 1.0, False, 0)
+    write_live(folder.path, live)
+    view = follow(folder.path).look(now())
+    assert (view.standing, view.live) == ("running", live)
+
+
+def test_live_state_and_requests_do_not_disturb_what_is_validated(whole):
+    write_live(whole.path, Live(now(), "idle", now(), "", None, True, None, False, 0))
+    RequestInbox(whole.path).send(STOP)
+    assert validate_file(whole.path).problems == ()
+    assert validate_file(whole.path / "live.json").kind == "live state of a session"
+    request = next((whole.path / "requests").iterdir())
+    assert (validate_file(request).kind, validate_file(request).problems) == ("request to a running session", ())
+
+
+def test_what_is_asked_lands_in_the_sessions_inbox(whole):
+    name = ask(whole.path, PAUSE)
+    assert RequestInbox(whole.path).unread(name)
+    assert RequestInbox(whole.path).take() == (PAUSE,)
+
+
+class Session:
+    """Holds the log as a running session does, and takes what is asked of it."""
+
+    def __init__(self, folder: SessionFolder, hears: bool) -> None:
+        self.folder, self.hears = folder, hears
+        self.heard: list[object] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> "Session":
+        self._log = EventLog.reopen(self.folder.log)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._over.set()
+        self._thread.join()
+        self._log.close()
+
+    def _run(self) -> None:
+        inbox = RequestInbox(self.folder.path)
+        while self.hears and not self._over.is_set():
+            self.heard += inbox.take()
+            time.sleep(0.01)
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    monkeypatch.setattr("study.workflows.views.ask_session.HEARD_WITHIN_S", 0.1)
+
+
+@pytest.mark.parametrize("request_", [STOP, PAUSE, NOTE])
+def test_a_running_session_hears_what_is_asked(sitter, request_):
+    with Session(sitter.interrupted(after=2).folder, hears=True) as session:
+        assert ask_session(session.folder, request_, RealClock())
+        time.sleep(0.02)
+    assert session.heard == [request_]
+
+
+def test_where_nothing_runs_nothing_can_be_stopped(whole):
+    with pytest.raises(StudyError) as told:
+        ask_session(whole, STOP, RealClock())
+    assert told.value.title == "This session is not running"
+    assert "No program has P01_001 open" in told.value.happened
+    assert not (whole.path / "requests").exists() or RequestInbox(whole.path).take() == ()
+
+
+def test_a_stop_that_is_not_heard_stays_and_says_what_to_do(sitter, soon):
+    with Session(sitter.interrupted(after=2).folder, hears=False) as session:
+        with pytest.raises(StudyError) as told:
+            ask_session(session.folder, STOP, RealClock())
+        assert told.value.title == "The stop was not heard"
+        assert "took nothing within 0.1 s" in told.value.happened
+        assert "switch the device off" in told.value.do_now
+        assert RequestInbox(session.folder.path).take() == (STOP,)
+
+
+def test_a_pause_that_is_not_heard_is_taken_back(sitter, soon):
+    with Session(sitter.interrupted(after=2).folder, hears=False) as session:
+        with pytest.raises(StudyError, match="The pause was not heard"):
+            ask_session(session.folder, PAUSE, RealClock())
+        assert RequestInbox(session.folder.path).take() == ()
+
+
+def test_a_note_that_is_not_heard_yet_waits(sitter, soon):
+    with Session(sitter.interrupted(after=2).folder, hears=False) as session:
+        assert not take_note(session.folder, NOTE, RealClock())
+        assert RequestInbox(session.folder.path).take() == (NOTE,)
+
+
+def test_a_note_on_a_session_that_does_not_run_is_written_into_its_log(whole):
+    before = whole.log.read_bytes()
+    assert take_note(whole, replace(NOTE, adverse=True), RealClock())
+    assert whole.log.read_bytes().startswith(before)
+    written = read_log(whole.log).events[-1]
+    assert (written.event, written.who, written.text, written.adverse) == (
+        "note_taken", "experimenter", NOTE.text, True,
+    )  # fmt: skip
+    assert fold_session(whole).state.closed
+    assert validate_file(whole.path).problems == ()
+
+
+def test_a_torn_line_is_kept_as_a_note_before_the_note(sitter):
+    folder = sitter.interrupted(after=2).folder
+    folder.log.write_bytes(folder.log.read_bytes() + b'{"utc":"2026')
+    take_note(folder, NOTE, RealClock())
+    mended, note = read_log(folder.log).events[-2:]
+    assert (mended.who, mended.text) == ("program", 'a torn last line was cut off: {"utc":"2026')
+    assert note.text == NOTE.text
+    assert sitter.resumed(folder).state.closed
+
+
+def test_an_empty_note_is_none(whole):
+    with pytest.raises(StudyError, match="There is nothing to note"):
+        take_note(whole, replace(NOTE, text="  "), RealClock())
+    before = whole.log.read_bytes()
+    with pytest.raises(StudyError, match="not UTF-8"):
+        take_note(whole, replace(NOTE, text=os.fsdecode(b"caf\xe9")), RealClock())
+    assert whole.log.read_bytes() == before
