@@ -124,6 +124,33 @@ def lying(rigs, force_judge) -> ModuleType:
     return _module_at(Path(__file__).parent / "lying_encoders.py")
 
 
+@pytest.fixture(scope="session")
+def vendor() -> ModuleType:
+    """`tests/vendor_stub.py`, a device library of Force Dimension's kind, for tests of its driver."""
+    return _module_at(Path(__file__).parent / "vendor_stub.py")
+
+
+@pytest.fixture(scope="session")
+def compiled_stub(vendor, tmp_path_factory) -> Path:
+    return vendor.compile_stub(tmp_path_factory.mktemp("stub") / vendor.FILE)
+
+
+@pytest.fixture
+def stub(vendor, compiled_stub, tmp_path, monkeypatch):
+    """A device of its own in wall time, which the driver finds as it finds the real library."""
+    monkeypatch.setenv("FDSDK", str(tmp_path / "sdk"))
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "none.toml"))
+    with vendor.copied(compiled_stub, tmp_path / "sdk") as one:
+        yield one
+
+
+@pytest.fixture
+def stepped_stub(stub):
+    """Its time passes with the forces that it gets: a millisecond each."""
+    stub.set("wall_time", 0)
+    return stub
+
+
 @pytest.fixture
 def small_file(tmp_path, small_text) -> Path:
     path = tmp_path / "small.toml"

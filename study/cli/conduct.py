@@ -11,6 +11,7 @@ import typer
 from study.cli.progress import answer_count
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
+from study.devices.opening import needs_real_time
 from study.errors import WrongUseError
 from study.store.archive import check_subject, find_session
 from study.store.privacy import left_open
@@ -47,7 +48,8 @@ def begin(
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
     _say_wait(sitter.observer)
-    clock: Clock = RealClock() if sitter.observer is None else VirtualClock()
+    in_real_time = sitter.observer is None or needs_real_time(device)
+    clock: Clock = RealClock() if in_real_time else VirtualClock()
     with _participant(sitter.observer, plan.session.seed, sitter.keys, clock) as participant:
         end = conduct_new(plan.session, device, participant)
     show(end_sitting(end, RealClock().utc()), as_json)
@@ -62,7 +64,8 @@ def go_on(session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys
     if state.closed:
         show(finish_closed(folder, folded), as_json)
         return
-    clock: Clock = RealClock() if opened.observer is None else VirtualClock.not_before(state.sitting.last.utc)
+    in_real_time = opened.observer is None or needs_real_time(device)
+    clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
     _say_wait(opened.observer)
     with _participant(opened.observer, opened.seed, keys, clock) as participant:
         end = conduct_resumed(folder, device, participant)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17
+CALIBRATION_S = 60.0
 
 
 def doctor(
@@ -23,6 +24,9 @@ def doctor(
         float, typer.Option(min=0, max=500, help="How long the 1 kHz loop is timed, with zero force; 0: not at all.")
     ] = 2.0,
     data: DataOption = Path("data"),
+    calibrate: Annotated[
+        bool, typer.Option("--calibrate", help="First wait until the handle is put into its calibration position.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves."""
@@ -32,6 +36,8 @@ def doctor(
     from study.workflows.checks.check_installation import this_terminal
     from study.workflows.checks.examine_setup import examine_setup
 
+    if calibrate:
+        _calibrate(device)
     with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
         examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
     if as_json:
@@ -40,6 +46,14 @@ def doctor(
         _say(examination)
     if examination.exit_code:
         raise typer.Exit(examination.exit_code)
+
+
+def _calibrate(device: str) -> None:
+    from study.devices.opening import calibrate_device
+
+    where = "Bring the handle into its calibration position, as the device's manual shows, and leave it there"
+    typer.echo(f"{where} (within {CALIBRATION_S:g} s).", err=True)
+    calibrate_device(device, CALIBRATION_S)
 
 
 def _say(examination: "Examination") -> None:

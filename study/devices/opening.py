@@ -5,29 +5,65 @@ The heavy parts (numba above all) are imported when a device is opened, so that 
 
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceSettings
+from study.devices.force_dimension.models import MODELS
 from study.errors import DeviceError
+from study.session.views import DeviceFinding
 
 SIMULATED = "simulated"
 
-DEVICES = (SIMULATED,)
+REAL = tuple(MODELS)
+"""Devices that move: they need the vendor's library, and real time."""
+
+DEVICES = (SIMULATED, *REAL)
 """What a study or a recording may be made on."""
 
 FRICTIONLESS = "simulated-frictionless"
 """The simulated device with no friction in its drives: what friction costs is seen by comparing. Offered nowhere."""
 
-SIMULATIONS = (*DEVICES, FRICTIONLESS)
+SIMULATIONS = (SIMULATED, FRICTIONLESS)
 """Those that need no real clock."""
+
+
+def needs_real_time(name: str) -> bool:
+    return name not in SIMULATIONS
 
 
 def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int) -> Device:
     """`seed` drives what is random in a simulated device. Raises `DeviceError`."""
-    if name not in SIMULATIONS:
+    if name not in SIMULATIONS and name not in REAL:
         raise DeviceError(
             f"There is no device called {name!r}",
-            "This version has no driver for a real device yet: it opens a simulated omega.3 only.",
-            f"Use --device {SIMULATED}.",
+            f"Known are {', '.join(DEVICES)}.",
+            f"Use --device {SIMULATED} where no device is at hand.",
+        )
+    if name in REAL and clock.virtual:
+        raise DeviceError(
+            "A real device needs real time", f"'{name}' was to be played faster than time passes.", "Use a real clock."
         )
     from study.devices.rigs_by_name import RIGS_BY_NAME
     from study.devices.safe import SafeDevice
 
-    return SafeDevice(RIGS_BY_NAME[name](settings, seed), settings, clock)
+    rig = RIGS_BY_NAME[name](settings, seed)
+    try:
+        return SafeDevice(rig, settings, clock)
+    except BaseException:
+        rig.close()
+        raise
+
+
+def examine_device(name: str) -> tuple[DeviceFinding, ...]:
+    """What a look at a real device's driver finds, with zero force; nothing for the others. Raises nothing."""
+    if name not in REAL:
+        return ()
+    from study.devices.force_dimension.findings import examine
+
+    return examine(name)
+
+
+def calibrate_device(name: str, patience_s: float) -> None:
+    """Wait until a person has brought the handle into its calibration position. Raises `DeviceError`."""
+    if name not in REAL:
+        raise DeviceError("There is nothing to calibrate", f"{name!r} is no real device.", "Leave --calibrate out.")
+    from study.devices.force_dimension.findings import calibrate
+
+    calibrate(name, patience_s)

@@ -84,3 +84,6 @@ class CompiledRig:
     """advance(state, parameters, force_n): holds force_n, shape (3,), for one tick."""
     buttons: Callable[[], frozenset[int]] = no_buttons
     """Numbers of the buttons that are down."""
+
+    def close(self) -> None:
+        """Nothing to disconnect."""

@@ -1,8 +1,11 @@
 """The bare devices behind `study.devices.opening`, which alone may ask for one. Heavy: imported when one is opened."""
 
 from collections.abc import Callable
+from functools import partial
 
 from study.devices.device import DeviceSettings
+from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.rigs import force_dimension_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
 from study.errors import DeviceError
@@ -27,8 +30,14 @@ def _simulated(settings: DeviceSettings, seed: int, friction: bool) -> CompiledR
         ) from error
 
 
+def _real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
+    """Nothing is random in it that a seed could drive."""
+    return force_dimension_rig(name, settings)
+
+
 RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
     "simulated": simulated_rig,
     "simulated-frictionless": frictionless_rig,
+    **{name: partial(_real_rig, name) for name in MODELS},
 }
-"""Rig of a name, its settings and a seed; the same names as `study.devices.opening.SIMULATIONS`."""
+"""Rig of a name, its settings and a seed; the same names as in `study.devices.opening`."""

@@ -12,7 +12,7 @@ from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 
-KINDS = ("simulated omega.3", "compiled mass", "stepped mass")
+KINDS = ("simulated omega.3", "compiled mass", "stepped mass", "driver on the stub")
 
 
 @pytest.fixture
@@ -30,6 +30,9 @@ def pressed():
 def device(request, rigs, clock, pressed):
     if request.param == "simulated omega.3":
         opened = open_device("simulated", rigs.SETTINGS, clock, seed=3)
+    elif request.param == "driver on the stub":
+        stub = request.getfixturevalue("stepped_stub")
+        opened = SafeDevice(stub.rig(), rigs.SETTINGS, clock)
     else:
         kind = rigs.compiled_rig if request.param == "compiled mass" else rigs.ScriptedRig
         rig = kind(pressed=pressed)

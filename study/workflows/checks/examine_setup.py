@@ -7,7 +7,7 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import open_device
+from study.devices.opening import examine_device, open_device
 from study.errors import DeviceError, ExitCode
 from study.session.timing_verdict import judge_load
 from study.session.views import DeviceFinding, DeviceReport
@@ -59,11 +59,15 @@ def _examine_device(
     name: str, timing_s: float, on_progress: Callable[[float], None]
 ) -> tuple[DeviceReport, Timing | None]:
     clock, settings = RealClock(), _settings(timing_s)
-    report = DeviceReport(name, simulated=False, findings=())
+    driver = examine_device(name)
+    report = DeviceReport(name, simulated=False, findings=driver)
+    if any(finding.wrong for finding in driver):
+        return report, None
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
             total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL).protocol.safety
             report = check_device(device, clock, settings.place_m, total_cap_n, safety)
+            report = replace(report, findings=(*driver, *report.findings))
             timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
             return report, timing
     except DeviceError as error:

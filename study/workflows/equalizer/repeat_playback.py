@@ -14,7 +14,7 @@ from equalizer.tracking.padding import CAUSAL
 from equalizer.tracking.trajectory import FORCES
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, Fault, Played
-from study.devices.opening import DEVICES, open_device
+from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.limits import SPRING_SLEW_N_PER_S
 from study.store.repeats_file import beside
@@ -34,7 +34,7 @@ def repeat_playback(plan: RepeatPlan, on_progress: OnProgress) -> Repeated:
     Raises StudyError before anything moves for a person on the handle, forces above the cap, a name that is taken.
     """
     _check(plan)
-    clock = VirtualClock() if plan.device in DEVICES else RealClock()
+    clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     with contextlib.closing(open_device(plan.device, plan.settings, clock, plan.seed)) as device:
         played: list[Played] = []
         states: list[IterationState] = []

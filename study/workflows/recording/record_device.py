@@ -11,7 +11,7 @@ from protocols.hashing import protocol_hash
 from protocols.recording_protocol import RecordingProtocol
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
-from study.devices.opening import SIMULATIONS, open_device
+from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError
 from study.session.handle_notice import handle_notice
 from study.session.limits import limits_of_recording
@@ -61,7 +61,7 @@ def record_device(
     Raises StudyError before anything moves where `out` exists already.
     """
     check_free(plan.out)
-    clock = VirtualClock() if plan.device in SIMULATIONS else RealClock()
+    clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     with contextlib.closing(open_device(plan.device, _settings(plan), clock, plan.seed)) as device:
         return record_on(device, plan, on_progress, before_moving)
 

@@ -67,12 +67,77 @@ def test_timing_can_be_left_out(run, tmp_path):
 
 
 def test_a_device_that_cannot_be_opened_is_a_finding_and_exit_code_3(run, tmp_path):
-    code, out = run("--device", "omega3", "--data", tmp_path)
+    code, out = run("--device", "omega", "--data", tmp_path)
     assert code == 3
-    assert "WRONG  Device             There is no device called 'omega3'." in out
-    assert "Use --device simulated." in out
+    assert "WRONG  Device             There is no device called 'omega'." in out
+    assert "Use --device simulated" in out
     assert out.splitlines()[-1].endswith("checks are not fine.")
     assert "Installation" in out
+
+
+def verdicts(out: str) -> dict[str, str]:
+    lines = out[out.index("\nDevice\n") :].splitlines()[2:]
+    return {line[9:26].strip(): line[2:7].strip() for line in lines if line.startswith("  ") and line[2] != " "}
+
+
+def test_a_missing_library_is_a_finding_that_says_what_to_install(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("FDSDK", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    code, out = run("--device", "omega3", "--data", tmp_path)
+    assert (code, verdicts(out)) == (3, {"Driver": "WRONG"})
+    assert "Install the Force Dimension SDK" in out
+
+
+def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(run, stub, tmp_path):
+    code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
+    found = verdicts(out)
+    of_driver = ("Library", "Connection", "Power", "Calibration", "Watchdog", "Masses")
+    assert {found[name] for name in (*of_driver, "Answers", "Handle", "Rate", "Largest force")} == {"fine"}
+    assert "omega.3, serial 4242, firmware 2.41, SDK 3.17.5.0" in out
+    assert "set to 30.0 ms; without forces the device let go within" in out
+    assert "0.28 kg, assumed" in out
+    assert (found["Accelerometer"], code) == ("WRONG", 3)  # none is connected
+    assert stub.safe
+    assert (stub.get("opened"), stub.get("peak_n")) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("switch", "value", "wrong", "cure"),
+    [
+        ("powered", 0, "Power", "Switch its power supply on."),
+        ("calibrated", 0, "Calibration", "hapteq doctor --device omega3 --calibrate"),
+        ("watchdog_works", 0, "Driver", "Do not let a person hold the handle."),
+        ("in_use", 1, "Driver", "Close the other program."),
+        ("read_fails", 2, "Answers", "Check its power and its cable"),
+    ],
+)
+def test_what_is_missing_is_said_with_its_cure(run, stub, tmp_path, switch, value, wrong, cure):
+    stub.set(switch, value)
+    code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
+    assert (code, verdicts(out)[wrong]) == (3, "WRONG")
+    assert cure in out
+    stub.set("in_use", 0)
+    assert (stub.safe, stub.get("opened"), stub.get("peak_n")) == (True, 0, 0)
+
+
+def test_a_device_can_be_calibrated_from_here(run, stub, tmp_path):
+    stub.set("calibrated", 0)
+    stub.set("reset_after_s", 0.05)
+    _, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0, "--calibrate")
+    assert verdicts(out)["Calibration"] == "fine"
+    assert stub.safe
+
+
+def test_a_handle_that_is_not_brought_there_is_an_error(run, stub, tmp_path, monkeypatch):
+    monkeypatch.setattr(doctor, "CALIBRATION_S", 0.1)
+    stub.set("calibrated", 0)
+    stub.set("reset_after_s", 100)
+    assert run("--device", "omega3", "--data", tmp_path, "--timing", 0, "--calibrate")[0] == 3
+    assert stub.safe
+
+
+def test_a_simulated_device_has_nothing_to_calibrate(run, tmp_path):
+    assert run("--timing", 0, "--data", tmp_path, "--calibrate")[0] == 3
 
 
 def test_an_installation_that_is_not_fine_is_exit_code_1(run, tmp_path):

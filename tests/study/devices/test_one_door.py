@@ -17,6 +17,14 @@ NAMED_IN = {
     "RIGS_BY_NAME": {"study/devices/opening.py"},
     "simulated_rig": set(),
     "build_omega3": {"study/devices/rigs_by_name.py"},
+    "force_dimension_rig": {"study/devices/rigs_by_name.py"},
+    "ForceDimensionRig": {"study/devices/force_dimension/rigs.py"},
+    "set_force": {
+        "study/devices/force_dimension/handle.py",
+        "study/devices/force_dimension/rig.py",
+        "study/devices/force_dimension/watchdog_proof.py",  # zero only
+    },
+    "dhdSetForce": {"study/devices/force_dimension/handle.py", "study/devices/force_dimension/library.py"},
     "CompiledRunner": {"study/devices/safe.py"},
     "SteppedRunner": {"study/devices/safe.py"},
     "Standby": {"study/devices/stepped_runner.py"},

@@ -12,7 +12,7 @@ import pytest
 from protocols.plausibility import PlausibilitySettings
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceSettings
-from study.devices.opening import DEVICES, FRICTIONLESS, SIMULATIONS, open_device
+from study.devices.opening import DEVICES, FRICTIONLESS, REAL, SIMULATIONS, open_device
 from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError, ExitCode
@@ -37,9 +37,9 @@ def test_the_simulated_device_opens_and_says_that_it_is_simulated():
     device.close()
 
 
-@pytest.mark.parametrize("name", ["omega3", "replay:x.h5", ""])
+@pytest.mark.parametrize("name", ["omega33", "replay:x.h5", ""])
 def test_another_name_is_refused_with_the_names_that_work(name):
-    with pytest.raises(DeviceError, match=r"simulated omega\.3 only.*--device simulated") as refusal:
+    with pytest.raises(DeviceError, match=r"Known are simulated, omega3, .*--device simulated") as refusal:
         open_device(name, SETTINGS, VirtualClock(), seed=1)
     assert refusal.value.exit_code is ExitCode.DEVICE
 
@@ -125,7 +125,7 @@ def test_with_a_hand_nobody_can_say_so():
 
 
 def test_every_device_that_is_offered_can_be_built():
-    assert set(DEVICES) <= set(SIMULATIONS) == set(RIGS_BY_NAME)
+    assert set(DEVICES) <= {*SIMULATIONS, *REAL} == set(RIGS_BY_NAME)
 
 
 def test_the_device_without_friction_says_so_and_is_offered_nowhere():

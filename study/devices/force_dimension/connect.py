@@ -1,0 +1,122 @@
+"""From a name to a device that is open, calibrated, armed with its watchdog, and takes forces: or an error that says
+what is missing. Whatever fails on the way, what was opened is stopped and closed again.
+"""
+
+import os
+
+from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.library import DEVICE_IN_USE, Library, LibraryError
+from study.devices.force_dimension.locate import Computer, find_library, patterns, this_computer
+from study.devices.force_dimension.models import DeviceModel, name_of_type
+from study.devices.force_dimension.usb import ADVICE, plugged_in
+from study.errors import DeviceError
+
+WATCHDOG_S = 0.03
+"""Close to the 31.9 ms that the firmware can count: a loop in Python is late by 10 ms on a busy computer, and a force
+that stays for 30 ms moves a bare handle by a few millimetres."""
+
+CALIBRATE = (
+    "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
+    "calibration program), then try again."
+)
+
+
+def load_library() -> Library:
+    """Raises `DeviceError`."""
+    computer = this_computer(os.environ)
+    path = find_library(computer)
+    if path is None:
+        raise no_library(computer)
+    return Library(path)
+
+
+def open_model(library: Library, model: DeviceModel) -> Handle:
+    """The first device of this kind that is free, as it is: neither armed nor taking forces. Raises `DeviceError`."""
+    others: list[str] = []
+    failures: list[LibraryError] = []
+    for number in range(max(0, int(library.function("dhdGetDeviceCount")()))):
+        try:
+            handle = Handle(library, library.call("dhdOpenID", number))
+        except LibraryError as error:
+            failures.append(error)
+            continue
+        try:
+            system_type = handle.system_type()
+            if system_type in model.system_types:
+                return handle
+            others.append(name_of_type(system_type) or handle.system_name())
+        except LibraryError as error:
+            failures.append(error)
+        except BaseException:
+            handle.let_go()
+            raise
+        handle.let_go()
+    raise _none_of_them(model, others, failures)
+
+
+def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:
+    """Takes forces up to cap_n from now on, zero for now. For how long it holds one by itself, s; 0: for ever.
+
+    Raises `DeviceError` for a device without power or calibration. The caller lets the handle go then.
+    """
+    try:
+        _check_fit(handle, model)
+        handle.read_every_time()
+        drops_after_s = handle.arm_watchdog(WATCHDOG_S)
+        handle.limit_force(cap_n)
+        handle.compensate_gravity(effector_mass_kg if effector_mass_kg is not None else model.effector_mass_kg)
+        handle.enable_force()
+        if not handle.status().force_on:
+            raise DeviceError(
+                f"The {model.name} takes no forces",
+                f"It was told to, and stays off: {handle.status().why_off}.",
+                "Check that its power supply is on, and press its force button if it has one.",
+            )
+    except LibraryError as error:
+        raise failed(model.name, error) from error
+    return drops_after_s
+
+
+def failed(name: str, error: LibraryError) -> DeviceError:
+    return DeviceError(
+        f"The {name} does not work", f"The library says: {error}.", "Check its power and its cable, then try again."
+    )
+
+
+def no_library(computer: Computer) -> DeviceError:
+    places = list(dict.fromkeys(str(folder) for folder, _ in patterns(computer)))
+    return DeviceError(
+        "The device's library is not installed",
+        f"Neither libdrd nor libdhd was found in {', '.join(places)}."
+        if places
+        else "Neither drd64.dll nor dhd64.dll was found.",
+        "Install the Force Dimension SDK from forcedimension.com, and set FDSDK to its folder.",
+    )
+
+
+def _check_fit(handle: Handle, model: DeviceModel) -> None:
+    status = handle.status()
+    if not status.powered:
+        raise DeviceError(
+            f"The {model.name} has no power",
+            "It answers over USB, and its motors are off.",
+            "Switch its power supply on, then try again.",
+        )
+    if not status.calibrated:
+        raise DeviceError(f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATE)
+
+
+def _none_of_them(model: DeviceModel, others: list[str], failures: list[LibraryError]) -> DeviceError:
+    title = f"There is no {model.name}"
+    if any(failure.code == DEVICE_IN_USE for failure in failures):
+        return DeviceError(title, "A device is there, and another program has it.", "Close the other program.")
+    if others:
+        known = [f"--device {name}" for name in others]
+        return DeviceError(title, f"Found instead: {', '.join(others)}.", f"Use {' or '.join(known)}, or plug it in.")
+    if any(not device.may_open for device in plugged_in() or ()):
+        return DeviceError(title, "A device is plugged in, and this account may not open it.", ADVICE)
+    if failures:
+        return DeviceError(
+            title, f"A device is there and cannot be opened: {failures[0]}.", "Switch it off and on, then try again."
+        )
+    return DeviceError(title, "No device of the vendor answers.", "Plug its USB cable in and switch its power on.")

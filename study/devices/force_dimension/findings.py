@@ -1,0 +1,99 @@
+"""What a check before a study day finds of a device: library, connection, power, calibration, watchdog. Zero force."""
+
+import time
+
+from study.devices.force_dimension.connect import CALIBRATE, load_library, make_ready, open_model
+from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.lab import LabSettings, lab_file, read_lab
+from study.devices.force_dimension.library import LibraryError
+from study.devices.force_dimension.models import MODELS, DeviceModel
+from study.devices.force_dimension.rigs import info_of
+from study.devices.force_dimension.usb import ADVICE, plugged_in
+from study.devices.force_dimension.watchdog_proof import prove_watchdog
+from study.errors import DeviceError
+from study.session.views import DeviceFinding
+
+CAP_N = 1.0
+"""While it is looked at no force is sent; if one were, the library would cut it here."""
+
+POWER = "Switch its power supply on."
+
+
+def examine(name: str) -> tuple[DeviceFinding, ...]:
+    """Up to the first thing that hinders all others. Raises nothing; the device is left braked."""
+    model = MODELS[name]
+    findings: list[DeviceFinding] = []
+    try:
+        lab = read_lab()
+        library = load_library()
+        findings.append(DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True))
+        findings += _usb()
+        handle = open_model(library, model)
+    except DeviceError as error:
+        return (*findings, _wrong("Driver", error))
+    try:
+        info = info_of(handle, library, model, lab.effective_mass_kg)
+        findings.append(DeviceFinding("Connection", f"{info.name}, {info.details}", fine=True))
+        findings += _of_opened(handle, model, lab)
+    except DeviceError as error:
+        findings.append(_wrong("Driver", error))
+    except LibraryError as error:
+        advice = "Check its power and its cable, then try again."
+        findings.append(DeviceFinding("Driver", f"the library says: {error}", fine=False, advice=advice))
+    finally:
+        handle.let_go()
+    return tuple(findings)
+
+
+def calibrate(name: str, patience_s: float) -> None:
+    """Wait until a person has put the handle where it rests. Raises `DeviceError`."""
+    handle = open_model(load_library(), MODELS[name])
+    try:
+        handle.calibrate(patience_s)
+    except LibraryError as error:
+        raise DeviceError(
+            "The device was not calibrated", f"Within {patience_s:g} s the library said: {error}.", CALIBRATE
+        ) from error
+    finally:
+        handle.let_go()
+
+
+def _usb() -> list[DeviceFinding]:
+    """Linux only, and only where a device is plugged in."""
+    return [
+        DeviceFinding("USB", device.product, fine=True)
+        if device.may_open
+        else DeviceFinding("USB", f"{device.product}: this account may not open it", fine=False, advice=ADVICE)
+        for device in plugged_in() or ()
+    ]
+
+
+def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
+    """Raises `DeviceError`, `LibraryError`."""
+    status = handle.status()
+    power = DeviceFinding("Power", "on" if status.powered else "off", status.powered, "" if status.powered else POWER)
+    calibrated = status.calibrated
+    place = "done" if calibrated else "not done since it was switched on: it does not know where its handle is"
+    advice = "" if calibrated else f"Run `hapteq doctor --device {_option(model)} --calibrate`, or: {CALIBRATE}"
+    findings = [power, DeviceFinding("Calibration", place, calibrated, advice)]
+    if not (status.powered and calibrated):
+        return findings
+    drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
+    took_s = prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+    watchdog = f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * took_s:.0f} ms"
+    return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab)]
+
+
+def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
+    carried_kg = lab.effector_mass_kg or model.effector_mass_kg
+    carried = f"{carried_kg:g} kg" if carried_kg else "what the library takes"
+    moved = f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
+    return DeviceFinding("Masses", f"gravity compensation {carried}, spring {moved} ({lab_file()})", fine=True)
+
+
+def _option(model: DeviceModel) -> str:
+    return next(name for name, known in MODELS.items() if known is model)
+
+
+def _wrong(name: str, error: DeviceError) -> DeviceFinding:
+    return DeviceFinding(name, f"{error.title}. {error.happened}", fine=False, advice=error.do_now)

@@ -1,0 +1,169 @@
+"""One opened device: the library's functions with its number filled in, in values instead of pointers."""
+
+import contextlib
+from ctypes import byref, c_double, c_int, c_ubyte, c_ushort
+from dataclasses import dataclass
+
+from equalizer.signals.signal import FloatArray
+from study.devices.force_dimension.library import Library, LibraryError
+
+STALE = 1
+"""dhdGetPosition answers so where it repeats an earlier reading."""
+SCALED = 2
+"""dhdSetForce answers so where the device cannot give that force and gives less of it, in the same direction."""
+
+WATCHDOG_UNIT_S = 125e-6
+STATUS_SIZE = 32
+"""17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
+
+OFF_CAUSES = {
+    1: "a button of the device was pressed",
+    2: "the handle moved faster than the device allows",
+    3: "the program came too late for the device's watchdog",
+    4: "a program switched it off",
+    5: "the USB connection broke",
+    6: "the hand was not on the handle (dead-man's switch)",
+}
+WATCHDOG_CAUSE = 3
+
+TRIES = 3
+"""To stop a device whose connection fails."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    powered: bool
+    calibrated: bool
+    force_on: bool
+    braking: bool
+    off_cause: int
+    """Why the force is off, 0 where that is not known."""
+
+    @property
+    def why_off(self) -> str:
+        return OFF_CAUSES.get(self.off_cause, "the device does not say why")
+
+
+class Handle:
+    """Raises `LibraryError` from every method but `let_go`."""
+
+    def __init__(self, library: Library, number: int) -> None:
+        self.library = library
+        self.number = number
+        self._x, self._y, self._z = c_double(), c_double(), c_double()
+        self._to_xyz = byref(self._x), byref(self._y), byref(self._z), number
+        self._get_position = library.function("dhdGetPosition")
+        self._set_force = library.function("dhdSetForce")
+        self._open = True
+
+    def read_position(self, into: FloatArray) -> bool:
+        """into (3,), m. Whether it is a repetition of an earlier reading. For one thread at a time."""
+        code = self.library.checked("dhdGetPosition", self._get_position(*self._to_xyz))
+        into[0], into[1], into[2] = self._x.value, self._y.value, self._z.value
+        return code == STALE
+
+    def velocity_mps(self) -> tuple[float, float, float]:
+        return self._three("dhdGetLinearVelocity")
+
+    def applied_n(self) -> tuple[float, float, float]:
+        """The force that the device says it gives."""
+        return self._three("dhdGetForce")
+
+    def set_force(self, x_n: float, y_n: float, z_n: float) -> bool:
+        """Whether the device gives less than that. From any thread."""
+        return self.library.checked("dhdSetForce", self._set_force(x_n, y_n, z_n, self.number)) == SCALED
+
+    def status(self) -> Status:
+        values = (c_int * STATUS_SIZE)()
+        self.library.call("dhdGetStatus", values, self.number)
+        return Status(
+            powered=bool(values[0]),
+            calibrated=bool(values[3]),
+            force_on=bool(values[5]),
+            braking=bool(values[6]),
+            off_cause=int(values[14]),
+        )
+
+    def button_mask(self) -> int:
+        return int(self.library.function("dhdGetButtonMask")(self.number))
+
+    def loop_khz(self) -> float:
+        """How often forces arrive at the device."""
+        return float(self.library.function("dhdGetComFreq")(self.number))
+
+    def system_type(self) -> int:
+        return self.library.call("dhdGetSystemType", self.number)
+
+    def system_name(self) -> str:
+        return (self.library.function("dhdGetSystemName")(self.number) or b"unnamed").decode("utf-8", "replace")
+
+    def serial(self) -> int:
+        number = c_ushort()
+        self.library.call("dhdGetSerialNumber", byref(number), self.number)
+        return number.value
+
+    def firmware(self) -> float:
+        version = c_double()
+        self.library.call("dhdGetVersion", byref(version), self.number)
+        return version.value
+
+    def enable_force(self) -> None:
+        """Zero force, from now on taken."""
+        self.library.call("dhdSetBrakes", 0, self.number)
+        self.library.call("dhdEnableForce", 1, self.number)
+        self.set_force(0.0, 0.0, 0.0)
+
+    def compensate_gravity(self, effector_mass_kg: float | None) -> None:
+        if effector_mass_kg is not None:
+            self.library.call("dhdSetEffectorMass", effector_mass_kg, self.number)
+        self.library.call("dhdSetGravityCompensation", 1, self.number)
+
+    def limit_force(self, newtons: float) -> None:
+        self.library.call("dhdSetMaxForce", newtons, self.number)
+
+    def read_every_time(self) -> None:
+        """No reading is repeated because the last was a moment ago: a loop that keeps its own time wants each."""
+        self.library.call("dhdEnableExpertMode")
+        self.library.call("dhdSetTimeGuard", 0, self.number)
+
+    def arm_watchdog(self, seconds: float) -> float:
+        """For how long the device holds a force now that no other follows, s, as it says itself; 0: for ever."""
+        self.library.call("dhdEnableExpertMode")
+        units = c_ubyte()
+        try:
+            self.library.call("dhdSetWatchdog", round(seconds / WATCHDOG_UNIT_S), self.number)
+            self.library.call("dhdGetWatchdog", byref(units), self.number)
+        except LibraryError:
+            return 0.0
+        return units.value * WATCHDOG_UNIT_S
+
+    def calibrate(self, patience_s: float) -> None:
+        """Wait until the handle was put where it rests, and take that as its place."""
+        self.library.call("dhdReset", self.number)
+        self.library.call("dhdWaitForReset", round(1000 * patience_s), self.number)
+
+    def let_go(self) -> bool:
+        """Zero force, brakes, disconnect. Whether the device took it. Never raises; may be called again."""
+        if not self._open:
+            return True
+        stopped = any(self._stop_once() for _ in range(TRIES))
+        with contextlib.suppress(LibraryError):
+            self.library.call("dhdClose", self.number)
+            self._open = False
+        return stopped
+
+    def _stop_once(self) -> bool:
+        with contextlib.suppress(LibraryError):
+            self.set_force(0.0, 0.0, 0.0)
+        with contextlib.suppress(LibraryError):
+            self.library.call("dhdSetBrakes", 1, self.number)
+        try:
+            self.library.call("dhdStop", self.number)
+        except LibraryError:
+            return False
+        return True
+
+    def _three(self, name: str) -> tuple[float, float, float]:
+        x, y, z = c_double(), c_double(), c_double()
+        self.library.call(name, byref(x), byref(y), byref(z), self.number)
+        return x.value, y.value, z.value

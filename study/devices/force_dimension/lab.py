@@ -1,0 +1,52 @@
+"""What a lab knows of its device beyond the vendor's library: a small TOML file, of which every key may be left out."""
+
+import os
+import tomllib
+from pathlib import Path
+
+from pydantic import Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from protocols.staircase_rule import STRICT
+from study.errors import DeviceError
+
+FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
+
+
+@dataclass(frozen=True, config=STRICT)
+class LabSettings:
+    effector_mass_kg: float | None = Field(default=None, gt=0, le=2)
+    """What the gravity compensation carries: handle and sensor. None: the model's own."""
+    effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
+    """What the centring spring moves, at the handle. None: the assumption in the table of models."""
+
+
+def lab_file() -> Path:
+    named = os.environ.get(FILE_VARIABLE)
+    return Path(named) if named else Path.home() / ".config" / "hapteq" / "device.toml"
+
+
+def read_lab() -> LabSettings:
+    """Raises `DeviceError` for a file that cannot be read. Without one, nothing is known."""
+    path = lab_file()
+    try:
+        text = path.read_text("utf-8")
+    except FileNotFoundError:
+        return LabSettings()
+    except (OSError, UnicodeDecodeError) as error:
+        raise _wrong(path, str(error)) from error
+    try:
+        return TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise _wrong(path, str(error)) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise _wrong(path, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _wrong(path: Path, happened: str) -> DeviceError:
+    return DeviceError(
+        "The settings of the device cannot be used",
+        f"{path}: {happened}.",
+        "Correct it; docs/hardware.md lists its keys.",
+    )

@@ -1,0 +1,139 @@
+"""The vendor's functions, bound by ctypes: every answer below zero becomes an error with the library's own words.
+
+The library keeps its last error per thread, so the text is fetched at once, in the thread whose call failed.
+"""
+
+import ctypes
+from collections.abc import Callable
+from ctypes import POINTER, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint, c_ushort
+from pathlib import Path
+from typing import Any
+
+from study.errors import DeviceError
+
+OLDEST_SDK = (3, 16, 0)
+"""From here on all functions are there with the types below; older ones differ in some."""
+
+ANY_ERROR = 1
+NO_DEVICE_FOUND = 5
+DEVICE_IN_USE = 20
+"""Of the library's error codes, those that something is decided by."""
+
+_ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
+_THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
+
+SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "dhdErrorGetLast": (c_int, ()),
+    "dhdErrorGetLastStr": (c_char_p, ()),
+    "dhdGetSDKVersion": (None, (POINTER(c_int),) * 4),
+    "dhdGetAvailableCount": (c_int, ()),
+    "dhdGetDeviceCount": (c_int, ()),
+    "dhdOpenID": (c_int, (_ID,)),
+    "dhdClose": (c_int, (_ID,)),
+    "dhdStop": (c_int, (_ID,)),
+    "dhdGetSystemType": (c_int, (_ID,)),
+    "dhdGetSystemName": (c_char_p, (_ID,)),
+    "dhdGetSerialNumber": (c_int, (POINTER(c_ushort), _ID)),
+    "dhdGetVersion": (c_int, (_NUMBERS, _ID)),
+    "dhdGetStatus": (c_int, (POINTER(c_int), _ID)),
+    "dhdEnableForce": (c_int, (c_ubyte, _ID)),
+    "dhdSetBrakes": (c_int, (c_int, _ID)),
+    "dhdGetPosition": (c_int, _THREE),
+    "dhdGetLinearVelocity": (c_int, _THREE),
+    "dhdSetForce": (c_int, (_NUMBER, _NUMBER, _NUMBER, _ID)),
+    "dhdGetForce": (c_int, _THREE),
+    "dhdGetButtonMask": (c_uint, (_ID,)),
+    "dhdGetComFreq": (c_double, (_ID,)),
+    "dhdSetGravityCompensation": (c_int, (c_int, _ID)),
+    "dhdSetEffectorMass": (c_int, (_NUMBER, _ID)),
+    "dhdGetEffectorMass": (c_int, (_NUMBERS, _ID)),
+    "dhdSetMaxForce": (c_int, (_NUMBER, _ID)),
+    "dhdReset": (c_int, (_ID,)),
+    "dhdWaitForReset": (c_int, (c_int, _ID)),
+    "dhdEnableExpertMode": (c_int, ()),
+    "dhdSetTimeGuard": (c_int, (c_int, _ID)),
+    "dhdSetWatchdog": (c_int, (c_ubyte, _ID)),
+    "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), _ID)),
+}
+"""Result and arguments of each function; `char ID` is the last argument and has no default in C."""
+
+
+class LibraryError(Exception):
+    """A function of the library answered that it failed."""
+
+    def __init__(self, function: str, code: int, text: str) -> None:
+        super().__init__(f"{function}: {text} (error {code})")
+        self.function, self.code, self.text = function, code, text
+
+
+class Library:
+    """The loaded library. Raises `DeviceError` where it cannot be loaded or is too old."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._functions = _bound(_loaded(path), path)
+        self.version = self._version()
+        if self.version[:3] < OLDEST_SDK:
+            raise _too_old(f"{path} is version {_dotted(self.version)}")
+
+    @property
+    def version_text(self) -> str:
+        return _dotted(self.version)
+
+    def function(self, name: str) -> Callable[..., Any]:
+        """Unchecked, for calls at every tick: what it returns is for `checked` to judge."""
+        return self._functions[name]
+
+    def checked(self, name: str, answer: int) -> int:
+        """The answer. Raises `LibraryError` where it is below zero; to be asked in the thread of the call."""
+        if answer >= 0:
+            return answer
+        code = int(self._functions["dhdErrorGetLast"]())
+        text = self._functions["dhdErrorGetLastStr"]() or b"no reason given"
+        raise LibraryError(name, code, text.decode("utf-8", "replace"))
+
+    def call(self, name: str, *arguments: Any) -> int:
+        """Raises `LibraryError`."""
+        return self.checked(name, int(self._functions[name](*arguments)))
+
+    def _version(self) -> tuple[int, int, int, int]:
+        parts = [c_int() for _ in range(4)]
+        self._functions["dhdGetSDKVersion"](*map(ctypes.byref, parts))
+        major, minor, release, revision = (part.value for part in parts)
+        return major, minor, release, revision
+
+
+def _loaded(path: Path) -> ctypes.CDLL:
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise DeviceError(
+            "The device's library cannot be loaded",
+            f"{path}: {error}.",
+            "On Linux it needs libusb (package libusb-1.0-0). Else take the SDK for this kind of computer from the "
+            "vendor, and set FDSDK to its folder.",
+        ) from error
+
+
+def _bound(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
+    missing = [name for name in SIGNATURES if not hasattr(loaded, name)]
+    if missing:
+        raise _too_old(f"{path} has no {', '.join(missing)}")
+    functions: dict[str, Callable[..., Any]] = {}
+    for name, (result, arguments) in SIGNATURES.items():
+        function = getattr(loaded, name)
+        function.restype, function.argtypes = result, list(arguments)
+        functions[name] = function
+    return functions
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
+
+
+def _too_old(happened: str) -> DeviceError:
+    return DeviceError(
+        "The device's library is too old",
+        f"{happened}.",
+        f"Install the vendor's SDK {_dotted(OLDEST_SDK)} or newer, and set FDSDK to its folder.",
+    )

@@ -1,0 +1,46 @@
+"""Builds the rig of a named device: library, device, watchdog and its proof, gravity compensation."""
+
+import time
+
+from study.devices.device import DeviceInfo, DeviceSettings
+from study.devices.force_dimension.connect import failed, load_library, make_ready, open_model
+from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.lab import read_lab
+from study.devices.force_dimension.library import Library, LibraryError
+from study.devices.force_dimension.models import MODELS, DeviceModel
+from study.devices.force_dimension.rig import ForceDimensionRig
+from study.devices.force_dimension.watchdog_proof import prove_watchdog
+
+RATE_HZ = 1000.0
+
+
+def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
+    """Raises `DeviceError` that says what is missing. What was opened until then is stopped and closed again."""
+    model, lab = MODELS[name], read_lab()
+    library = load_library()
+    handle = open_model(library, model)
+    try:
+        cap_n = min(settings.limits.total_cap_n, model.max_force_n)
+        drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
+        if drops_after_s > 0:
+            prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+        info = info_of(handle, library, model, lab.effective_mass_kg)
+        return ForceDimensionRig(handle, info, drops_after_s, cap_n)
+    except LibraryError as error:
+        handle.let_go()
+        raise failed(model.name, error) from error
+    except BaseException:
+        handle.let_go()
+        raise
+
+
+def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
+    """Raises `LibraryError`."""
+    return DeviceInfo(
+        name=model.name,
+        simulated=False,
+        sample_rate_hz=RATE_HZ,
+        max_force_n=model.max_force_n,
+        effective_mass_kg=effective_mass_kg or model.effective_mass_kg,
+        details=f"serial {handle.serial()}, firmware {handle.firmware():g}, SDK {library.version_text}",
+    )

@@ -1,0 +1,250 @@
+/* A stand-in for the vendor's device library, for tests only: ours, made from the public names and types of its
+ * functions. Behind them a mass on a damper and a spring in wall time or stepped time, a firmware with watchdog and
+ * brakes, and faults by switch: stub_set("name", value), or HAPTEQ_STUB="name=value,name=value" in the environment.
+ */
+#include <math.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT
+#endif
+
+#define SWITCHES(X)                                                                                                    \
+  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
+  X(wall_time, 1) X(mass, 0.25) X(damping, 2) X(stiffness, 0) X(weight, 0) X(max_n, 12)                                \
+  X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
+  X(unplugged, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
+  X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
+  X(off_by, 0) X(reset_after_s, 0)                                                                                     \
+  /* What a test may ask for. */                                                                                       \
+  X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
+  X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
+  X(expert, 0) X(resetting, 0) X(now, 0) X(ax, 0) X(ay, 0) X(az, 0) X(enables, 0) X(last_write, 0)
+
+#define AS_ENUM(name, value) name,
+#define AS_VALUE(name, value) value,
+#define AS_NAME(name, value) #name,
+enum { SWITCHES(AS_ENUM) COUNT };
+static double p[COUNT] = {SWITCHES(AS_VALUE)};
+static const char *const names[COUNT] = {SWITCHES(AS_NAME)};
+
+enum { OTHER = 1, COM = 2, NO_DEVICE = 5, TIMEOUT = 7, EXPERT_OFF = 9, NOT_IMPLEMENTED = 10, NOT_READY = 12, IN_USE = 20 };
+static const char *const texts[] = {"no error", "error", "communication error", "busy", "no driver found",
+  "no device found", "not available", "timeout", "geometry error", "expert mode disabled", "not implemented",
+  "out of memory", "device not ready", "file not found", "configuration error", "invalid index", "deprecated",
+  "null argument", "redundant encoders disagree", "not enabled", "device in use", "invalid", "no regulation"};
+
+static _Thread_local int last_error;
+static atomic_flag busy = ATOMIC_FLAG_INIT;
+static double x[3], v[3], command[3], shown[3], started_s = -1, integrated_s, last_command_s, reset_s;
+
+static double wall_s(void) {
+  struct timespec t;
+  timespec_get(&t, TIME_UTC);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void lock(void) { while (atomic_flag_test_and_set(&busy)) {} }
+static void unlock(void) { atomic_flag_clear(&busy); }
+static int find(const char *name, size_t length) {
+  for (int i = 0; i < COUNT; i++)
+    if (strlen(names[i]) == length && !strncmp(names[i], name, length)) return i;
+  return -1;
+}
+
+static void start(void) {
+  if (started_s >= 0) return;
+  started_s = wall_s();
+  const char *at = getenv("HAPTEQ_STUB");
+  while (at && *at) {
+    const char *equals = strchr(at, '='), *comma = strchr(at, ',');
+    if (!equals) break;
+    int i = find(at, (size_t)(equals - at));
+    if (i >= 0) p[i] = atof(equals + 1);
+    at = comma ? comma + 1 : NULL;
+  }
+}
+
+static void drop(int cause_of_drop) {
+  p[force_on] = 0, p[brake] = 1, p[cause] = cause_of_drop;
+}
+
+/* One tenth of a millisecond of device and firmware. */
+static void step(double dt) {
+  double norm = 0;
+  if (p[force_on] && p[watchdog] > 0 && p[watchdog_works] &&
+      p[now] - last_command_s > p[watchdog] * 125e-6 * p[watchdog_stretch])
+    drop(3);
+  if (p[off_by]) drop((int)p[off_by]);
+  for (int i = 0; i < 3; i++) {
+    double applied = p[force_on] && !p[brake] ? command[i] : 0;
+    int lifted = i < 2 || (p[gravity] && p[force_on]);
+    double force = applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - (lifted ? 0 : p[weight]);
+    p[fx + i] = applied, p[ax + i] = force / p[mass];
+    v[i] += dt * p[ax + i], x[i] += dt * v[i];
+    norm += applied * applied;
+  }
+  p[peak_n] = fmax(p[peak_n], sqrt(norm));
+}
+
+static void run_to(double seconds) {
+  if (seconds - integrated_s > 0.5) integrated_s = seconds - 0.5;
+  while (integrated_s < seconds) {
+    double dt = fmin(1e-4, seconds - integrated_s);
+    integrated_s += dt, p[now] = integrated_s;
+    step(dt);
+  }
+}
+
+static void catch_up(void) {
+  start();
+  if (p[wall_time]) run_to(wall_s() - started_s);
+}
+
+static void come_late(double count) {
+  if (p[late_every] > 0 && fmod(count, p[late_every]) == 0) {
+    double until_s = wall_s() + p[late_s];
+    while (wall_s() < until_s) {}
+  }
+}
+
+static int fail(int code) { last_error = code; return -1; }
+static int answer(void) { return p[unplugged] ? fail(COM) : p[opened] ? 0 : fail(NO_DEVICE); }
+static int begin(void) { lock(); catch_up(); return answer(); }
+static int end(int code) { unlock(); return code; }
+#define PLAIN(...) do { int code = begin(); if (!code) { __VA_ARGS__; } return end(code); } while (0)
+
+/* For tests. */
+EXPORT void stub_set(const char *name, double value) {
+  lock(), start();
+  int i = find(name, strlen(name));
+  if (i >= 0) p[i] = value;
+  if (i == frozen) memcpy(shown, x, sizeof x);
+  unlock();
+}
+EXPORT double stub_get(const char *name) {
+  lock(), catch_up();
+  int i = find(name, strlen(name));
+  double value = i < 0 ? NAN : p[i];
+  unlock();
+  return value;
+}
+EXPORT void stub_advance(double seconds) { lock(), start(), run_to(integrated_s + seconds), unlock(); }
+EXPORT void stub_move(double to_x, double to_y, double to_z) { lock(), x[0] = to_x, x[1] = to_y, x[2] = to_z, unlock(); }
+
+/* The vendor's names. */
+EXPORT int dhdErrorGetLast(void) { return last_error; }
+EXPORT const char *dhdErrorGetStr(int code) { return code < 0 || code > 22 ? "unknown" : texts[code]; }
+EXPORT const char *dhdErrorGetLastStr(void) { return dhdErrorGetStr(last_error); }
+EXPORT void dhdGetSDKVersion(int *major, int *minor, int *release, int *revision) {
+  start();
+  *major = 3, *minor = (int)p[sdk_minor], *release = 5, *revision = 0;
+}
+EXPORT int dhdGetDeviceCount(void) { start(); return p[unplugged] ? 0 : (int)p[devices]; }
+EXPORT int dhdGetAvailableCount(void) { return p[in_use] ? 0 : dhdGetDeviceCount(); }
+EXPORT int dhdOpenID(char id) {
+  lock(), catch_up();
+  int code = 0;
+  if (p[unplugged] || id >= p[devices]) code = fail(NO_DEVICE);
+  else if (p[in_use]) code = fail(IN_USE);
+  else if (p[open_fails]) code = fail((int)p[open_fails]);
+  else p[opened] = 1;
+  return end(code ? code : id);
+}
+EXPORT int dhdClose(char id) { (void)id; PLAIN(p[opened] = 0; p[closes]++; drop(4)); }
+EXPORT int dhdStop(char id) {
+  (void)id;
+  PLAIN(if (p[stop_fails] > 0) { p[stop_fails]--; code = fail(COM); } else {
+    memset(command, 0, sizeof command), p[stops]++, drop(4); });
+}
+EXPORT int dhdGetSystemType(char id) { (void)id; int code = begin(); return end(code ? code : (int)p[type]); }
+EXPORT const char *dhdGetSystemName(char id) { (void)id; return p[type] == 33 ? "omega.3" : "another device"; }
+EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN(*serial = 4242); }
+EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = 2.41); }
+EXPORT int dhdGetStatus(int *status, char id) {
+  (void)id;
+  PLAIN(memset(status, 0, 17 * sizeof(int)); status[0] = p[powered] != 0; status[1] = status[2] = 1;
+        status[3] = p[calibrated] != 0; status[4] = !p[force_on] && !p[brake]; status[5] = p[force_on] != 0;
+        status[6] = p[brake] != 0; status[10] = p[gravity] != 0; status[11] = p[guard] != 0;
+        status[14] = (int)p[cause]);
+}
+EXPORT int dhdEnableForce(unsigned char value, char id) {
+  (void)id;
+  PLAIN(p[enables]++; memset(command, 0, sizeof command); if (!value) drop(4); else if (p[powered] && p[force_enables]) {
+    p[force_on] = 1; p[brake] = 0; p[cause] = 0; last_command_s = p[now]; });
+}
+EXPORT int dhdSetBrakes(int value, char id) {
+  (void)id;
+  PLAIN(p[brake] = value != 0; if (value) memset(command, 0, sizeof command));
+}
+EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
+  (void)id;
+  int code = begin();
+  double count = ++p[reads];
+  if (!code && p[read_fails]) code = fail((int)p[read_fails]);
+  if (!code) {
+    int stale = p[stale_every] > 0 && fmod(count, p[stale_every]) == 0;
+    if (!stale && !p[frozen]) memcpy(shown, x, sizeof x);
+    *px = p[no_number] ? NAN : shown[0] + p[jump_m], *py = shown[1], *pz = shown[2];
+    code = stale ? 1 : 0;
+  }
+  end(code);
+  come_late(count);
+  return code;
+}
+EXPORT int dhdGetLinearVelocity(double *vx, double *vy, double *vz, char id) {
+  (void)id;
+  PLAIN(*vx = v[0]; *vy = v[1]; *vz = v[2]);
+}
+EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
+  (void)id;
+  int code = begin();
+  if (!code && p[write_fails]) code = fail((int)p[write_fails]);
+  if (!code) {
+    double asked = sqrt(x_n * x_n + y_n * y_n + z_n * z_n), most = fmin(p[max_n], p[scaled_from_n]);
+    if (p[cap_n] >= 0) most = fmin(most, p[cap_n]);
+    double share = asked > most * (1 + 1e-9) ? most / asked : 1;
+    command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
+    p[writes]++, p[last_write] = asked, last_command_s = p[now];
+    if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;
+    code = share < 1 ? 2 : 0;
+    if (!p[wall_time]) run_to(integrated_s + 0.001);
+  }
+  return end(code);
+}
+EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
+  (void)id;
+  PLAIN(*x_n = p[fx]; *y_n = p[fy]; *z_n = p[fz]);
+}
+EXPORT double dhdGetComFreq(char id) { (void)id; return 1.0; }
+EXPORT unsigned int dhdGetButtonMask(char id) { (void)id; return (unsigned int)p[buttons]; }
+EXPORT int dhdSetGravityCompensation(int value, char id) { (void)id; PLAIN(p[gravity] = value); }
+EXPORT int dhdSetEffectorMass(double kg, char id) { (void)id; PLAIN(p[effector] = kg); }
+EXPORT int dhdGetEffectorMass(double *kg, char id) { (void)id; PLAIN(*kg = p[effector]); }
+EXPORT int dhdSetMaxForce(double newtons, char id) { (void)id; PLAIN(p[cap_n] = newtons); }
+EXPORT double dhdGetMaxForce(char id) { (void)id; return p[cap_n]; }
+EXPORT int dhdConfigLinearVelocity(int ms, int mode, char id) { (void)ms, (void)mode, (void)id; PLAIN((void)0); }
+EXPORT int dhdReset(char id) { (void)id; PLAIN(p[calibrated] = 0; p[resetting] = 1; reset_s = wall_s()); }
+EXPORT int dhdWaitForReset(int ms, char id) {
+  (void)id;
+  double until_s = wall_s() + 1e-3 * ms;
+  while (wall_s() < until_s)
+    if (p[resetting] && wall_s() - reset_s > p[reset_after_s]) PLAIN(p[calibrated] = 1; p[resetting] = 0);
+  return fail(TIMEOUT);
+}
+EXPORT int dhdEnableExpertMode(void) { p[expert] = 1; return 0; }
+EXPORT int dhdDisableExpertMode(void) { p[expert] = 0; return 0; }
+EXPORT int dhdSetTimeGuard(int us, char id) { (void)id; PLAIN(if (!p[expert]) code = fail(EXPERT_OFF); else p[guard] = us); }
+EXPORT int dhdSetWatchdog(unsigned char units, char id) {
+  (void)id;
+  PLAIN(if (!p[expert]) code = fail(EXPERT_OFF); else if (!p[watchdog_settable]) code = fail(NOT_IMPLEMENTED);
+        else { p[watchdog] = units; last_command_s = p[now]; });
+}
+EXPORT int dhdGetWatchdog(unsigned char *units, char id) { (void)id; PLAIN(*units = (unsigned char)p[watchdog]); }

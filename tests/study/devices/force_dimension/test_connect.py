@@ -1,0 +1,160 @@
+"""Opening the vendor's devices by name: what works, and what is said where something is missing."""
+
+import contextlib
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from study.devices.clock import RealClock, VirtualClock
+from study.devices.force_dimension import connect
+from study.devices.force_dimension.usb import Plugged
+from study.devices.opening import REAL, open_device
+from study.errors import DeviceError, ExitCode
+
+
+@pytest.fixture
+def opened(rigs):
+    def opening(name: str = "omega3", hand: bool = True):
+        settings = replace(rigs.SETTINGS, hand_on_handle=hand)
+        return contextlib.closing(open_device(name, settings, RealClock(), seed=1))
+
+    return opening
+
+
+def refused(opened, name: str = "omega3", hand: bool = True) -> str:
+    with pytest.raises(DeviceError) as refusal, opened(name, hand):
+        pass
+    assert refusal.value.exit_code is ExitCode.DEVICE
+    assert refusal.value.do_now
+    return str(refusal.value)
+
+
+def test_it_opens_says_what_it_is_and_ends_braked(stub, opened, rigs):
+    with opened() as device:
+        assert (device.info.name, device.info.simulated, device.info.sample_rate_hz) == ("omega.3", False, 1000.0)
+        assert device.info.details == "serial 4242, firmware 2.41, SDK 3.17.5.0"
+        assert stub.get("cap_n") == rigs.LIMITS.total_cap_n
+        assert stub.get("effector") == 0.148
+        assert (stub.get("gravity"), stub.get("guard"), stub.get("watchdog")) == (1, 0, 240)
+        assert stub.get("force_on")
+    assert stub.safe
+    assert (stub.get("opened"), stub.get("peak_n")) == (0, 0)
+
+
+@pytest.mark.parametrize(("name", "system_type"), [("omega6", 36), ("omega7", 35), ("delta3", 63), ("sigma7", 104)])
+def test_the_vendor_s_other_devices_open_by_their_names(stub, opened, name, system_type):
+    stub.set("type", system_type)
+    with opened(name) as device:
+        assert device.info.name.replace(".", "") == name
+    assert stub.safe
+
+
+def test_without_the_library_the_places_and_the_cure_are_named(stub, opened, monkeypatch, tmp_path):
+    monkeypatch.setenv("FDSDK", str(tmp_path / "nowhere"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    said = refused(opened)
+    assert "library is not installed" in said
+    assert str(tmp_path / "nowhere") in said and "FDSDK" in said
+
+
+@pytest.fixture
+def another(tmp_path, monkeypatch, vendor):
+    """A place for another library than the stub, which is loaded already."""
+    monkeypatch.setenv("FDSDK", str(tmp_path / "other"))
+    path = tmp_path / "other" / "lib" / vendor.FILE
+    path.parent.mkdir(parents=True)
+    return path
+
+
+def test_a_file_that_is_no_library_is_named(another, opened):
+    another.write_text("this is no library")
+    assert f"cannot be loaded. {another}" in refused(opened)
+
+
+def test_an_old_library_is_too_old(stub, opened):
+    stub.set("sdk_minor", 9)
+    assert "too old" in (said := refused(opened))
+    assert "3.9.5.0" in said and "3.16.0 or newer" in said
+
+
+def test_a_library_without_a_function_is_too_old(another, vendor, opened, tmp_path):
+    source = tmp_path / "old.c"
+    source.write_text("int dhdErrorGetLast(void) { return 0; }")
+    subprocess.run([*vendor.compiler(), "-shared", "-fPIC", "-o", str(another), str(source)], check=True)
+    assert "has no dhdErrorGetLastStr, dhdGetSDKVersion" in refused(opened)
+
+
+@pytest.mark.parametrize(
+    ("switches", "said"),
+    [
+        ({"devices": 0}, "No device of the vendor answers. Plug its USB cable in"),
+        ({"unplugged": 1}, "No device of the vendor answers"),
+        ({"type": 63}, "Found instead: delta3. Use --device delta3"),
+        ({"type": 999}, "Found instead: another device"),
+        ({"in_use": 1}, "another program has it. Close the other program"),
+        ({"open_fails": 2}, "cannot be opened: dhdOpenID: communication error (error 2)"),
+        ({"powered": 0}, "has no power"),
+        ({"calibrated": 0}, "not calibrated. It does not know where its handle is. Push the handle gently"),
+        ({"force_enables": 0}, "takes no forces"),
+        ({"write_fails": 2}, "dhdSetForce: communication error"),
+        ({"watchdog_works": 0}, "watchdog is not proved"),
+        ({"off_by": 6}, "dead-man"),
+        ({"watchdog_settable": 0}, "no watchdog of its own"),
+    ],
+)
+def test_what_hinders_it_is_said_and_it_is_left_braked(stub, opened, switches, said):
+    for name, value in switches.items():
+        stub.set(name, value)
+    assert said in refused(opened)
+    for name in switches:
+        stub.set(name, {"devices": 1, "powered": 1}.get(name, 0))
+    assert stub.safe
+    assert (stub.get("opened"), stub.get("peak_n")) == (0, 0)
+
+
+def test_without_a_watchdog_it_opens_where_no_hand_is_on_the_handle(stub, opened):
+    stub.set("watchdog_settable", 0)
+    with opened(hand=False) as device:
+        assert device.look().position_m is not None
+    assert stub.safe
+
+
+def test_a_device_that_this_account_may_not_open_looks_as_if_it_were_not_there(stub, opened, monkeypatch):
+    stub.set("devices", 0)
+    monkeypatch.setattr(connect, "plugged_in", lambda: (Plugged("omega.3", may_open=False),))
+    said = refused(opened)
+    assert "this account may not open it" in said and "udev" in said and '"1451"' in said
+
+
+def test_settings_that_are_not_safe_close_it_again(stub, rigs):
+    settings = replace(rigs.SETTINGS, limits=replace(rigs.LIMITS, stimulus_cap_n=3.5))
+    with pytest.raises(DeviceError, match="limits are not safe"):
+        open_device("omega3", settings, RealClock(), seed=1)
+    assert stub.safe
+    assert stub.get("opened") == 0
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_devices_are_not_played_in_virtual_time(stub, rigs, name):
+    with pytest.raises(DeviceError, match="needs real time"):
+        open_device(name, rigs.SETTINGS, VirtualClock(), seed=1)
+    assert stub.get("opened") == 0
+
+
+def test_what_a_lab_knows_of_its_device_is_taken_from_its_file(stub, opened, tmp_path, monkeypatch):
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
+    (tmp_path / "device.toml").write_text("effector_mass_kg = 0.16\neffective_mass_kg = 0.3\n")
+    with opened() as device:
+        assert (stub.get("effector"), device.info.effective_mass_kg) == (0.16, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("effector_mass_kg = -1", "effector_mass_kg"), ("colour = 'red'", "colour"), ("nonsense", "device.toml")],
+)
+def test_a_file_of_the_lab_that_is_wrong_is_named(stub, opened, tmp_path, monkeypatch, text, said):
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
+    (tmp_path / "device.toml").write_text(text)
+    assert said in refused(opened)
+    assert stub.get("opened") == 0

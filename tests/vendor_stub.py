@@ -1,0 +1,108 @@
+"""The stub of the vendor's library: compiled once a run, and copied for each test, since each copy is a device."""
+
+import contextlib
+import ctypes
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.device import DeviceInfo
+from study.devices.force_dimension.connect import make_ready
+from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.library import Library
+from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.rig import ForceDimensionRig
+from study.devices.force_dimension.rigs import info_of
+
+SOURCE = Path(__file__).parent / "study" / "devices" / "force_dimension" / "dhd_stub.c"
+FILE = "libdrd.so.3.17.5"
+
+
+def compiler() -> list[str]:
+    """The system's, or the one that pip installs. Without one these tests fail: none of them is skipped."""
+    found = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
+    if found:
+        return [found]
+    if find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc"]
+    raise RuntimeError("No C compiler is here: install one, or `pip install '.[compiler]'`.")
+
+
+def compile_stub(out: Path, with_compiler: list[str] | None = None) -> Path:
+    command = [*(with_compiler or compiler()), "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    subprocess.run([*command, "-o", str(out), str(SOURCE), "-lm"], check=True, capture_output=True, timeout=240)
+    return out
+
+
+class Stub:
+    """One device. Its switches and what it knows: the list in dhd_stub.c."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._library = ctypes.CDLL(str(path))
+        self._library.stub_set.argtypes = [ctypes.c_char_p, ctypes.c_double]
+        self._library.stub_get.argtypes, self._library.stub_get.restype = [ctypes.c_char_p], ctypes.c_double
+        self._library.stub_advance.argtypes = [ctypes.c_double]
+        self._library.stub_move.argtypes = [ctypes.c_double] * 3
+
+    def set(self, name: str, value: float) -> None:
+        self._library.stub_set(name.encode(), value)
+
+    def get(self, name: str) -> float:
+        value = float(self._library.stub_get(name.encode()))
+        assert value == value, f"the stub knows no {name}"
+        return value
+
+    def advance(self, seconds: float) -> None:
+        self._library.stub_advance(seconds)
+
+    def move(self, x_m: float, y_m: float, z_m: float) -> None:
+        self._library.stub_move(x_m, y_m, z_m)
+
+    @property
+    def applied_n(self) -> FloatArray:
+        return np.array([self.get(f"f{axis}") for axis in "xyz"])
+
+    @property
+    def safe(self) -> bool:
+        """No force, and braked."""
+        return not self.get("force_on") and bool(self.get("brake")) and not self.applied_n.any()
+
+    def opened(self) -> Handle:
+        """As the library opens a device, before anything is set."""
+        library = Library(self.path)
+        return Handle(library, library.call("dhdOpenID", 0))
+
+    def rig(self, cap_n: float = 4.5, sensed: bool = True, rests: bool = False) -> ForceDimensionRig:
+        """Ready for forces. sensed: with an accelerometer that tells the truth."""
+        model, handle = MODELS["omega3"], self.opened()
+        drops_after_s = make_ready(handle, model, cap_n, None)
+        info: DeviceInfo = info_of(handle, handle.library, model, None)
+        return ForceDimensionRig(handle, info, drops_after_s, cap_n, TrueSensor(self) if sensed else None, rests)
+
+
+class TrueSensor:
+    def __init__(self, stub: Stub) -> None:
+        self._stub = stub
+        self.closed = False
+
+    def latest(self) -> tuple[FloatArray, bool]:
+        return np.array([self._stub.get(f"a{axis}") for axis in "xyz"]), False
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@contextlib.contextmanager
+def copied(compiled: Path, folder: Path) -> Iterator[Stub]:
+    """In the place below `folder` where the SDK would be."""
+    place = folder / "lib" / FILE
+    place.parent.mkdir(parents=True)
+    shutil.copy(compiled, place)
+    yield Stub(place)
