@@ -10,11 +10,11 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, plain_axes
-from equalizer.identification.coupling import worst_coupling
-from equalizer.identification.coupling_onset import CouplingOnset
-from equalizer.identification.frequency_bands import FrequencyBand
-from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.octave_bins import octave_bins
+from equalizer.identification.frequency_response.coupling import worst_coupling
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
+from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.octave_bins import octave_bins
 
 _COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
 _HALF, _TALLER = 0.4, 0.35

@@ -7,7 +7,7 @@ from matplotlib.ticker import LogLocator
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
-from equalizer.identification.order_report import VISIBLE, OrderReport
+from equalizer.identification.state_space.order_report import VISIBLE, OrderReport
 
 
 def model_order_picture(report: OrderReport, chosen: int) -> Picture:

@@ -11,7 +11,7 @@ from analysis.figures.transfer_functions import transfer_functions_picture
 from analysis.reproduction.equalized_findings import EqualizedRows
 from analysis.reproduction.measured_device import MeasuredDevice
 from analysis.study_analysis import StudyAnalysis
-from equalizer.identification.frequency_bands import FrequencyBand
+from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
 
 
 def reproduction_pictures(

@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, new_figure, plain_axes, say_nothing_to_draw
-from equalizer.identification.frequency_response import BoolArray, FrequencyResponse
-from equalizer.identification.octave_bins import OctaveBins, octave_bins
+from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
+from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 

@@ -10,11 +10,11 @@ from analysis.figures.model_order import model_order_picture
 from analysis.figures.picture import Picture
 from analysis.figures.transfer_functions import ResponseCurve, transfer_functions_picture
 from analysis.reports.page import Page, Section, Table, render_page
-from equalizer.identification.coupling_onset import CouplingOnset
-from equalizer.identification.frequency_bands import FrequencyBand
-from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.order_report import OrderReport
-from equalizer.identification.resonances import Resonance
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
+from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.resonances import Resonance
+from equalizer.identification.state_space.order_report import OrderReport
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from equalizer.identification.coupling_onset import CouplingOnset
-from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.resonances import Resonance
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.resonances import Resonance
 
 
 @dataclass(frozen=True, slots=True, eq=False)

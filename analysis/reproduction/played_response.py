@@ -11,7 +11,7 @@ from equalizer.signals.excitation import log_sweep
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.multisine import lines_between, multisines
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.quality import quality
+from equalizer.tracking.feedforward.quality import quality
 
 SignalKind = Literal["sweep", "multisine"]
 

@@ -7,10 +7,10 @@ import numpy as np
 from analysis.reproduction.document import FigureFindings, Finding
 from analysis.reproduction.study_findings import LIMIT_RULE
 from analysis.wording import signed
-from equalizer.identification.coupling_onset import CouplingOnset
-from equalizer.identification.frequency_bands import FrequencyBand
-from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.resonances import COUPLING, Resonance
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
+from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.resonances import COUPLING, Resonance
 
 NEAR = 0.2
 """Frequencies that differ by less than this, relative, are near each other."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.equalizer import Equalizer
+from equalizer.tracking.feedforward.equalizer import Equalizer
 from protocols.apparatus import TestDirections
 from protocols.study_protocol import StimulusSettings
 from study.session.held_stimulus import HeldStimulus

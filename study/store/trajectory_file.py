@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from equalizer.tracking.trajectory import TableError, Trajectory, parse_trajectory, trajectory_csv
+from equalizer.tracking.feedforward.trajectory import TableError, Trajectory, parse_trajectory, trajectory_csv
 from study.store.file_errors import UnusableFileError
 from study.store.text_file import read_text, write_text
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.model_order import model_order_picture
-from equalizer.identification.order_report import OrderReport, OrderRow
+from equalizer.identification.state_space.order_report import OrderReport, OrderRow
 
 
 @pytest.fixture

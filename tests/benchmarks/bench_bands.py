@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.band_split import BandEdges, CausalSplit, LinearPhaseSplit
-from equalizer.tracking.banded_equalizer import BandedEqualizer, HighBand, LowBand
-from equalizer.tracking.high_band import MeasuredResponse
-from equalizer.tracking.rigid_model import fit_rigid_model
+from equalizer.tracking.bands.banded_equalizer import BandedEqualizer, HighBand, LowBand
+from equalizer.tracking.bands.high_band import MeasuredResponse
+from equalizer.tracking.bands.rigid_model import fit_rigid_model
+from equalizer.tracking.feedforward.band_split import BandEdges, CausalSplit, LinearPhaseSplit
 
 TESTS = Path(__file__).parents[1]
 SEEDS, SECONDS = (1, 2, 3), 0.5

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equalizer.signals.signal import Signal
-from equalizer.tracking.trajectory import (
+from equalizer.tracking.feedforward.trajectory import (
     FORCES,
     TRAJECTORY,
     TableError,

@@ -6,13 +6,13 @@ from types import ModuleType
 
 import numpy as np
 
-from equalizer.identification.modal_structure import at_driven_axes
+from equalizer.identification.mechanical.modal_structure import at_driven_axes
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.band_part import band_part
-from equalizer.tracking.iteration import rms
-from equalizer.tracking.trajectory import Trajectory
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.trajectory import Trajectory
+from equalizer.tracking.learning.iteration import rms
 from study.cli.main import main
 from study.store.mechanical_model_file import write_mechanical_model
 from study.store.recording_file import write_recording

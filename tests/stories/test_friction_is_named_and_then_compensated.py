@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
-from equalizer.tracking.trajectory import Trajectory
+from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.cli.main import main
 from study.store.diagnosis_file import read_diagnosis
 from study.store.trajectory_file import read_trajectory, write_trajectory

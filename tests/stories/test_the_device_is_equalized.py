@@ -10,11 +10,11 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from equalizer.identification.identify import identify
-from equalizer.identification.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.identify import identify
 from equalizer.signals.signal import Signal
-from equalizer.tracking.model_equalizer import ModelEqualizer
-from equalizer.tracking.quality import quality
+from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
+from equalizer.tracking.feedforward.quality import quality
 from protocols.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings

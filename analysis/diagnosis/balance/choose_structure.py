@@ -19,8 +19,8 @@ from analysis.diagnosis.balance.model_structures import (
 )
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.data.closed_loop import in_closed_loop
-from equalizer.identification.mechanical_free_simulation import simulation_errors
-from equalizer.identification.mechanical_lines import roles, segment_lines
+from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
+from equalizer.identification.mechanical.mechanical_lines import roles, segment_lines
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

@@ -12,9 +12,9 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
-from equalizer.identification.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.open_tolerance import opened
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
+from equalizer.identification.mechanical.open_tolerance import opened
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording

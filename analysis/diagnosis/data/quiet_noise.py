@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.experiments import instrument_of
-from equalizer.identification.noise_floor import SETTLING_S, over_neighbours
+from equalizer.identification.frequency_response.experiments import instrument_of
+from equalizer.identification.frequency_response.noise_floor import SETTLING_S, over_neighbours
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

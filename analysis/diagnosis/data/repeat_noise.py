@@ -14,7 +14,7 @@ from analysis.diagnosis.data.periods import Periods, look_samples, look_spectra
 from analysis.diagnosis.data.quiet_noise import hiss_at_rest
 from analysis.diagnosis.data.rounding import rounded_noise, rounding_step
 from analysis.diagnosis.types import Mask
-from equalizer.identification.noise_floor import over_neighbours, spread_over_looks
+from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

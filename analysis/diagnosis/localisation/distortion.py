@@ -14,7 +14,7 @@ from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.localisation.driven_looks import DrivenLook, driven_looks
 from analysis.diagnosis.types import Mask
-from equalizer.identification.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 

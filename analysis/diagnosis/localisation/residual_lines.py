@@ -11,7 +11,7 @@ from analysis.diagnosis.data.detection_lines import detection_lines, held_sample
 from analysis.diagnosis.data.frequency_cells import Band, driving_inputs, octaves_between, within
 from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods, spectra
 from analysis.diagnosis.types import Mask
-from equalizer.identification.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 

@@ -11,7 +11,7 @@ from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.types import Mask
-from equalizer.identification.experiments import instrument_of
+from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray

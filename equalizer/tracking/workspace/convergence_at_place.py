@@ -5,8 +5,8 @@ import numpy as np
 from equalizer.plant.model_response import model_response
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.convergence import Convergence, convergence
-from equalizer.tracking.virtual_spring import VirtualSpring
+from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
+from equalizer.tracking.learning.convergence import Convergence, convergence
 from equalizer.tracking.workspace.feedforward_at_place import used_models
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 

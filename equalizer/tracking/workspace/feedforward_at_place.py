@@ -6,10 +6,10 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
-from equalizer.tracking.feedforward import NO_CAP_N, Feedforward, FeedforwardSettings, feedforward
-from equalizer.tracking.iteration import Invert
-from equalizer.tracking.limits import require_within
-from equalizer.tracking.model_inverse import InverseOfLength, inverse_of
+from equalizer.tracking.feedforward.feedforward import NO_CAP_N, Feedforward, FeedforwardSettings, feedforward
+from equalizer.tracking.learning.iteration import Invert
+from equalizer.tracking.learning.model_inverse import InverseOfLength, inverse_of
+from equalizer.tracking.lqr.limits import require_within
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 

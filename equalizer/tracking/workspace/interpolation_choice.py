@@ -10,8 +10,8 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.periodic_inverse import WEIGHT
-from equalizer.tracking.quality import Quality, quality
+from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
+from equalizer.tracking.feedforward.quality import Quality, quality
 from equalizer.tracking.workspace.blended_inverse import blended_at
 from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError

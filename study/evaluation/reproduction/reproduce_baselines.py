@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.reproduction.played_response import PlayedResponse, lines_of_band
-from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.baselines import Inverse
-from equalizer.tracking.comparison import baseline_inverses
+from equalizer.tracking.feedforward.baselines import Inverse
+from equalizer.tracking.feedforward.comparison import baseline_inverses
 from equalizer.tracking.workspace.blended_inverse import blended_at
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, only, through
 from study.evaluation.reproduction.reproduce_playback import Driver, Playing, play_row

@@ -7,7 +7,7 @@ from analysis.reproduction.equalized_findings import EqualizedRows
 from analysis.reproduction.played_response import PlayedResponse, scaled
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.periodic_inverse import periodic_command
+from equalizer.tracking.feedforward.periodic_inverse import periodic_command
 from equalizer.tracking.workspace.blended_inverse import blended_at
 from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis.reproduction.document import UsedModel
-from equalizer.identification.held_out import HeldOut, held_out
+from equalizer.identification.state_space.held_out import HeldOut, held_out
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.evaluation.reproduction.reproduce_recordings import Recorded

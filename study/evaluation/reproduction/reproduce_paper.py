@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 from analysis.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.reproduction.measured_device import MeasuredDevice
 from analysis.study_analysis import analyse_study
-from equalizer.identification.coupling_onset import coupling_onset
-from equalizer.identification.resonances import find_resonances
-from equalizer.identification.transfer_estimate import TransferEstimateError, transfer_estimate
+from equalizer.identification.frequency_response.coupling_onset import coupling_onset
+from equalizer.identification.frequency_response.resonances import find_resonances
+from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, transfer_estimate
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
 from study.errors import LeftError, StudyError

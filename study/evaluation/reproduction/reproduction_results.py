@@ -8,7 +8,7 @@ from analysis.reproduction.document import UsedModel
 from analysis.reproduction.measured_device import MeasuredDevice
 from analysis.reproduction.played_response import PlayedResponse
 from analysis.study_analysis import StudyAnalysis
-from equalizer.identification.held_out import HeldOut
+from equalizer.identification.state_space.held_out import HeldOut
 from study.evaluation.reproduction.reproduce_equalized import Played
 
 

@@ -12,7 +12,11 @@ from analysis.reproduction.equalized_findings import equalized_findings
 from analysis.reproduction.played_response import played_row
 from analysis.reproduction.response_findings import band_findings, response_findings
 from analysis.reproduction.study_findings import direction_limit_hz, study_findings
-from equalizer.identification.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, FrequencyBand, frequency_bands
+from equalizer.identification.frequency_response.frequency_bands import (
+    PUBLISHED_DIRECTION_LIMIT_HZ,
+    FrequencyBand,
+    frequency_bands,
+)
 from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 from study.evaluation.reproduction.reproduction_results import Results
 from study.local_clock import local_now

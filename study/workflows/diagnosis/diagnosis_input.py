@@ -23,9 +23,9 @@ from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wan
 from analysis.diagnosis.search.by_balance import balances_of
 from analysis.diagnosis.types import Patience, Progress
 from analysis.wording import listed
-from equalizer.identification.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical_fit_result import MechanicalFitRefused
-from equalizer.identification.open_tolerance import opened
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
+from equalizer.identification.mechanical.open_tolerance import opened
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError

@@ -8,9 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from equalizer.identification.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical_fit_result import MechanicalFit, MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical_level import AsOnePiece, as_one_piece, without_friction
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.mechanical_fit_result import (
+    MechanicalFit,
+    MechanicalFitRefused,
+    MechanicalFitSettings,
+)
+from equalizer.identification.mechanical.mechanical_level import AsOnePiece, as_one_piece, without_friction
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.recording_protocol import RecordingProtocol

@@ -8,11 +8,11 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.tracking.feedforward import Feedforward, FeedforwardSettings
-from equalizer.tracking.known_physics import Compensation, compensate
-from equalizer.tracking.limits import ForceLimitError, Peaks, require_within
-from equalizer.tracking.trajectory import TRAJECTORY, Trajectory, require_rate
-from equalizer.tracking.two_models import BandFacts, banded_feedforward
+from equalizer.tracking.bands.two_models import BandFacts, banded_feedforward
+from equalizer.tracking.compensation.known_physics import Compensation, compensate
+from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
+from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
+from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_within
 from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.mechanical_model_file import read_mechanical_model

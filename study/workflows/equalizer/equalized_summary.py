@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.plant.model_quality import quality_document, quality_sentence
-from equalizer.tracking.feedforward import within_band
+from equalizer.tracking.feedforward.feedforward import within_band
 from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
 
 WORTH_SAYING = 0.01

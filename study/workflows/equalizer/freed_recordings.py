@@ -7,8 +7,8 @@ import numpy as np
 
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
-from equalizer.tracking.effect_roles import why_not
-from equalizer.tracking.without_effects import without_effects
+from equalizer.tracking.compensation.effect_roles import why_not
+from equalizer.tracking.compensation.without_effects import without_effects
 from study.errors import StudyError
 
 LEFT_OUT = 0.005

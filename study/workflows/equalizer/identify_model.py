@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from equalizer.identification.frequency_response import FrequencyResponse
-from equalizer.identification.held_out import HeldOut, held_out
-from equalizer.identification.identify import Identified
-from equalizer.identification.identify_recordings import IdentifiedRecordings, identify_recordings
-from equalizer.identification.misfit import misfit_of_estimate
-from equalizer.identification.misfit_causes import held_out_remarks
-from equalizer.identification.refusals import IdentificationRefused
-from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import TransferEstimateError
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError
+from equalizer.identification.state_space.held_out import HeldOut, held_out
+from equalizer.identification.state_space.identify import Identified
+from equalizer.identification.state_space.identify_recordings import IdentifiedRecordings, identify_recordings
+from equalizer.identification.state_space.misfit import misfit_of_estimate
+from equalizer.identification.state_space.misfit_causes import held_out_remarks
+from equalizer.identification.state_space.refusals import IdentificationRefused
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.plant.model_quality import ModelQuality, model_quality

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.band_part import band_part
-from equalizer.tracking.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
-from equalizer.tracking.model_inverse import under_spring
-from equalizer.tracking.padding import CAUSAL
-from equalizer.tracking.trajectory import FORCES
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.trajectory import FORCES
+from equalizer.tracking.learning.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
+from equalizer.tracking.learning.model_inverse import under_spring
+from equalizer.tracking.lqr.padding import CAUSAL
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, Fault, Played
 from study.devices.opening import needs_real_time, open_device

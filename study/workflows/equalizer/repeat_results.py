@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.iteration import IterationState, Verdict
-from equalizer.tracking.model_inverse import InverseOfLength
-from equalizer.tracking.trajectory import FORCES, Trajectory, trajectory_csv
-from equalizer.tracking.virtual_spring import NO_SPRING, VirtualSpring
+from equalizer.tracking.feedforward.trajectory import FORCES, Trajectory, trajectory_csv
+from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
+from equalizer.tracking.learning.iteration import IterationState, Verdict
+from equalizer.tracking.learning.model_inverse import InverseOfLength
 from study.devices.device import DeviceSettings, Played
 from study.errors import StudyError
 from study.store.provenance import gather_provenance
@@ -32,7 +32,7 @@ class RepeatPlan:
     repeats: int = 10
     """After the first play."""
     first_gain: float = 1.0
-    """See `equalizer.tracking.convergence`."""
+    """See `equalizer.tracking.learning.convergence`."""
     spring: VirtualSpring = NO_SPRING
     """What acts on the device and is not in the model already."""
     first: FloatArray | None = None

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.band_part import band_part
-from equalizer.tracking.convergence import Convergence
-from equalizer.tracking.iteration import LOWEST_GAIN, Verdict, fitting_share
-from equalizer.tracking.model_inverse import under_spring
-from equalizer.tracking.virtual_spring import VirtualSpring
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
+from equalizer.tracking.learning.convergence import Convergence
+from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, fitting_share
+from equalizer.tracking.learning.model_inverse import under_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import inverse_at
 from study.devices.device import DeviceSettings

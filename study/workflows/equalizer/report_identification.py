@@ -8,12 +8,12 @@ from analysis.reports.identification_report import (
     identification_pictures,
     render_identification_report,
 )
-from equalizer.identification.coupling_onset import coupling_onset
-from equalizer.identification.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, frequency_bands
-from equalizer.identification.order_report import OrderReport, order_report
-from equalizer.identification.refusals import IdentificationRefused
-from equalizer.identification.resonances import find_resonances
-from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.frequency_response.coupling_onset import coupling_onset
+from equalizer.identification.frequency_response.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, frequency_bands
+from equalizer.identification.frequency_response.resonances import find_resonances
+from equalizer.identification.state_space.order_report import OrderReport, order_report
+from equalizer.identification.state_space.refusals import IdentificationRefused
+from equalizer.identification.state_space.settings import IdentificationSettings
 from study.local_clock import local_now
 from study.store.text_file import write_text
 from study.workflows.equalizer.identified_summary import summary_lines

@@ -3,7 +3,7 @@
 import math
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.virtual_spring import NO_SPRING, VirtualSpring
+from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from study.errors import StudyError
 
 SAME = 0.01

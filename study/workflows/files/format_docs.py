@@ -18,7 +18,7 @@ from analysis.reproduction import document as reproduction_document
 from analysis.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
 from equalizer.signals.units import ALLOWED
-from equalizer.tracking.trajectory import STEP_TOLERANCE, TABLE_KINDS
+from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.schema import protocol_schema
 from protocols.trial import Trial
 from study.session.live import Live

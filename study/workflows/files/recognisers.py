@@ -8,7 +8,7 @@ from analysis.look.driven_band import silent_segments
 from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from equalizer.plant.model_quality import quality_brief
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
-from equalizer.tracking.trajectory import TRAJECTORY
+from equalizer.tracking.feedforward.trajectory import TRAJECTORY
 from protocols.loading import ProtocolError, load_protocol
 from protocols.recording_protocol import RecordingProtocol
 from protocols.schema import ADAPTERS, protocol_schema

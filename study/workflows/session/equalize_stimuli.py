@@ -10,10 +10,10 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import quality_sentence
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.equalizer import Equalizer, Identity
-from equalizer.tracking.model_equalizer import ModelEqualizer
-from equalizer.tracking.periodic_inverse import inverse_response
-from equalizer.tracking.virtual_spring import VirtualSpring
+from equalizer.tracking.feedforward.equalizer import Equalizer, Identity
+from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
+from equalizer.tracking.feedforward.periodic_inverse import inverse_response
+from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from protocols.study_protocol import StudyProtocol
 from study.devices.device import DeviceInfo
 from study.errors import StudyError

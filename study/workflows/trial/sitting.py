@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from equalizer.tracking.equalizer import Equalizer
+from equalizer.tracking.feedforward.equalizer import Equalizer
 from study.devices.clock import Clock
 from study.devices.device import Device
 from study.session.events import Event, NoteTaken

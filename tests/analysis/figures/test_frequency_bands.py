@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from analysis.figures.frequency_bands import draw_frequency_bands, frequency_bands_picture
-from equalizer.identification.coupling_onset import CouplingOnset, coupling_onset
-from equalizer.identification.frequency_bands import frequency_bands
-from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset, coupling_onset
+from equalizer.identification.frequency_response.frequency_bands import frequency_bands
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 
 LINES = np.arange(1, 15000) / 30.0
 

@@ -5,7 +5,7 @@ from matplotlib.colors import to_hex
 from analysis.figures.picture import picture_svg
 from analysis.figures.style import BLUE, ORANGE, VERMILLION
 from analysis.figures.transfer_functions import ResponseCurve, draw_transfer_functions, transfer_functions_picture
-from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 
 LINES = np.arange(1, 15000) / 30.0
 

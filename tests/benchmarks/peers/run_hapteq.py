@@ -2,9 +2,9 @@
 
 from exchange import Data, Model, run
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 

@@ -10,8 +10,8 @@ import plants
 from exchange import Data
 from run_hapteq import recording_of
 
-from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.settings import IdentificationSettings
 
 PERIODS = 2
 REST_S = 1.5

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from equalizer.identification.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.plant.model_response import model_response
 
 AXES = ("x", "y", "z")

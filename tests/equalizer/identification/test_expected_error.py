@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 
 BAND = np.linspace(5, 35, 3001)
 NOISE = 0.05

@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[3]
 SCRIPT = """
 import importlib.util, json, sys, time
 import numpy as np
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 
 def load(name, path):
     spec = importlib.util.spec_from_file_location(name, path)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.tracking_problem import TrackingProblem, TrackingWeights, augmented
+from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, augmented
 
 PEAK_GAIN = 10.0
 """Largest singular value of the response over all frequencies: rho is read against its square."""

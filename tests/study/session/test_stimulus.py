@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from equalizer.signals.signal import Signal
-from equalizer.tracking.equalizer import Identity
+from equalizer.tracking.feedforward.equalizer import Identity
 from protocols.apparatus import TestDirections
 from study.session.limits import limits_of_study
 from study.session.stimulus import direction_vector, held_stimulus, loop_length

@@ -9,7 +9,7 @@ from analysis.diagnosis.document import diagnosis_from_json
 from equalizer.plant.mechanical_model import ActuatorLimits, SensorLimits, Tolerance
 from equalizer.plant.mechanical_model_toml import MATRICES, parse_mechanical_model
 from equalizer.signals.signal import Signal
-from equalizer.tracking.trajectory import Trajectory
+from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.store.diagnosis_file import read_diagnosis, write_diagnosis
 from study.store.file_errors import AlreadyThereError, CannotReadError, UnusableFileError
 from study.store.mechanical_model_file import LAYOUT, read_mechanical_model, write_mechanical_model

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.mechanical_fit import fit_mechanical_model
-from equalizer.identification.open_tolerance import opened
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.open_tolerance import opened
 
 SEED = 4
 

@@ -9,10 +9,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.quality import Quality, quality
+from equalizer.tracking.feedforward.quality import Quality, quality
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
 
 LENGTH_M = 0.06

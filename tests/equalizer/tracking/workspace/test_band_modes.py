@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.tracking.workspace.band_modes import BandMode, band_modes
 

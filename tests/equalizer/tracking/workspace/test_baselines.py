@@ -7,9 +7,9 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.tracking.baselines import ours, raw_estimate, rigid_body
-from equalizer.tracking.comparison import baseline_inverses, compare
-from equalizer.tracking.quality import quality
+from equalizer.tracking.feedforward.baselines import ours, raw_estimate, rigid_body
+from equalizer.tracking.feedforward.comparison import baseline_inverses, compare
+from equalizer.tracking.feedforward.quality import quality
 
 LINES = np.arange(5.0, 35.001, 0.1)
 NAMES = [

@@ -11,8 +11,8 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.plant.model_quality import NOT_STORED, ModelQuality
 from equalizer.signals.signal import Signal
-from equalizer.tracking.padding import band_error
-from equalizer.tracking.trajectory import Trajectory
+from equalizer.tracking.feedforward.trajectory import Trajectory
+from equalizer.tracking.lqr.padding import band_error
 from study.errors import StudyError, WrongUseError
 from study.store.file_errors import CannotReadError, UnusableFileError
 from study.store.identified_model_file import write_identified_model

@@ -8,9 +8,9 @@ import pytest
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
-from equalizer.tracking.band_part import band_part
-from equalizer.tracking.iteration import rms
-from equalizer.tracking.trajectory import Trajectory
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.trajectory import Trajectory
+from equalizer.tracking.learning.iteration import rms
 from study.cli.main import main
 from study.errors import StudyError
 from study.store.identified_model_file import read_identified_model

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.signal import Signal
-from equalizer.tracking.band_part import band_part
-from equalizer.tracking.iteration import Verdict, rms
-from equalizer.tracking.model_inverse import inverse_of
-from equalizer.tracking.trajectory import Trajectory
-from equalizer.tracking.virtual_spring import VirtualSpring
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.trajectory import Trajectory
+from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
+from equalizer.tracking.learning.iteration import Verdict, rms
+from equalizer.tracking.learning.model_inverse import inverse_of
 from protocols.apparatus import SafetySettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import SweepSegment

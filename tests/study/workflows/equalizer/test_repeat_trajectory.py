@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from equalizer.identification.identify import identify
-from equalizer.identification.settings import IdentificationSettings
-from equalizer.identification.transfer_estimate import transfer_estimate
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.identify import identify
+from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import Signal
-from equalizer.tracking.band_part import band_part
-from equalizer.tracking.trajectory import Trajectory
+from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.trajectory import Trajectory
 from protocols.apparatus import SafetySettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import SweepSegment

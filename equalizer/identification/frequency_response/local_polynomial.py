@@ -1,0 +1,100 @@
+"""Smoothing of a measured frequency response by local polynomials (after the local polynomial method of Pintelon and
+Schoukens, here on the response itself): round each line, a parabola through its neighbours.
+
+Bias stays below the noise while the lines taken in span less than about a resonance's half width.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalPolynomial:
+    """What each line takes from its neighbours: fixed by the lines and their weights, linear in the values."""
+
+    window: npt.NDArray[np.int64]
+    """(lines, taken)"""
+    rows: FloatArray
+    """(lines, taken)"""
+    order: int
+
+    @classmethod
+    def over(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
+        """Raises ValueError where there are fewer lines than a polynomial takes."""
+        taken, lines = 2 * neighbours + 1, len(response)
+        if order < 0 or taken < order + 2:
+            raise ValueError(f"a polynomial of order {order} needs more than {taken} lines; let neighbours be larger")
+        if lines < taken:
+            raise ValueError(f"smoothing takes {taken} lines at a time, but there are {lines}")
+        window = np.clip(np.arange(lines) - neighbours, 0, lines - taken)[:, None] + np.arange(taken)
+        weight = _weights(response)[window]
+        powers = _powers(response.frequency_hz, window, order)
+        fitted = np.linalg.pinv(powers * weight[:, :, None])[:, 0, :] * weight
+        return cls(window, fitted, order)
+
+    def of(self, values: ComplexArray) -> ComplexArray:
+        """values: (lines, ...)."""
+        smooth: ComplexArray = np.einsum("lk,lk...->l...", self.rows, values[self.window])
+        return smooth
+
+    def power(self, powers: FloatArray) -> FloatArray:
+        """What becomes of the power of independent errors. powers: (lines, ...)."""
+        smooth: FloatArray = np.einsum("lk,lk...->l...", self.rows**2, powers[self.window])
+        return smooth
+
+
+def smoothed(
+    response: FrequencyResponse, neighbours: int = 8, order: int = 2, about: ComplexArray | None = None
+) -> FrequencyResponse:
+    """Each line from itself and `neighbours` lines on either side; near the ends from as many, further on one side.
+
+    about: (lines, outputs, inputs), of a model that is nearly right: only the difference to it is averaged, so that a
+    resonance narrower than the neighbourhood is not blunted.
+
+    The new noise variance follows from the old one, or from the scatter about the polynomials where that is larger, so
+    that a parabola that does not fit shows. Errors of lines next to each other are no longer independent. Raises
+    ValueError where there are fewer lines than a polynomial takes.
+    """
+    local = LocalPolynomial.over(response, neighbours, order)
+    known = 0.0 if about is None else about
+    rest = replace(response, response=np.asarray(response.response - known, dtype=np.complex128))
+    smooth = np.asarray(local.of(rest.response) + known, dtype=np.complex128)
+    noise = local.power(response.noise_variance)
+    scatter = _scatter(rest, local) * np.sum(local.rows**2, axis=1)[:, None, None]
+    remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
+    return replace(
+        response, response=smooth, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)
+    )
+
+
+def _weights(response: FrequencyResponse) -> FloatArray:
+    """(lines,): of the lines against each other, by their noise; alike where it is not known."""
+    power = response.noise_variance.sum(axis=(1, 2))
+    if not (np.isfinite(power) & (power > 0)).all():
+        return np.ones(len(response))
+    weights: FloatArray = np.sqrt(power.min() / power)
+    return weights
+
+
+def _powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
+    """(lines, taken, order + 1), of the distance from the line itself."""
+    away = frequency_hz[window] - frequency_hz[:, None]
+    powers: FloatArray = (away / np.abs(away).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
+    return powers
+
+
+def _scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
+    """(lines, outputs, inputs): power about an unweighted polynomial in each window, per degree of freedom."""
+    basis, _ = np.linalg.qr(_powers(response.frequency_hz, local.window, local.order))
+    values = response.response[local.window]
+    explained = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2
+    left = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained, axis=1)
+    power: FloatArray = np.maximum(left, 0.0) / (values.shape[1] - local.order - 1)
+    return power

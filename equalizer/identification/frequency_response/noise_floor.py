@@ -1,0 +1,77 @@
+"""How large the errors of an estimate are: from periods that should be alike, from rest, or from line to line."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from equalizer.identification.frequency_response.experiments import instrument_of
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+SETTLING_S = 0.5
+"""After the last excitation, before a rest counts as one."""
+_REST_WINDOW_S = 0.5
+_THIRD_DIFFERENCE_GAIN = 20.0
+"""1² + 3² + 3² + 1²: how much larger the variance of a third difference is than that of a line."""
+
+
+def spread_over_looks(residuals: ComplexArray) -> FloatArray:
+    """Noise power of one look, from what differs between looks. residuals: (looks, lines, outputs), looks >= 2."""
+    around = residuals - residuals.mean(axis=0)
+    power: FloatArray = np.sum(np.abs(around) ** 2, axis=0) / (len(residuals) - 1)
+    return power
+
+
+def scatter_over_lines(response: ComplexArray) -> FloatArray:
+    """Expected |error|² per entry, from what neighbouring lines do not share: a smooth curve has no third difference.
+
+    Catches what repeats exactly, too (friction in a sweep). Where resonances are as narrow as the lines are apart it
+    is too large. response: (lines, ...). NaN everywhere for less than five lines.
+    """
+    if len(response) < 5:
+        return np.full(response.shape, np.nan)
+    third = np.abs(np.diff(response, n=3, axis=0)) ** 2 / _THIRD_DIFFERENCE_GAIN
+    padding = [(1, 2)] + [(0, 0)] * (response.ndim - 1)
+    padded: FloatArray = np.pad(third, padding, mode="edge")
+    return padded
+
+
+def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
+    """Running mean over an odd number of lines. power: (lines, ...)."""
+    smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
+    # A running sum that strong lines have left keeps their rounding, which may be below zero.
+    return np.asarray(np.maximum(smooth, 0.0))
+
+
+def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
+    """Noise power density of the response at rest, as s(f) with s / length the power per line of a look of that
+    length. Returns (lines, outputs), or None where nothing rests long enough."""
+    spectra, lines_hz = [], np.empty(0)
+    for recording in recordings:
+        length = round(_REST_WINDOW_S * recording.sample_rate_hz)
+        lines_hz = np.arange(1, length // 2) * recording.sample_rate_hz / length
+        hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
+        for start, stop in _rests(recording):
+            for at in range(start, stop - length + 1, length // 2):
+                look = recording.response.samples[at : at + length]
+                if np.isfinite(look).all():
+                    spectrum = np.fft.rfft((look - look.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
+                    spectra.append(np.abs(spectrum) ** 2 / length)
+    if not spectra:
+        return None
+    mean = np.mean(spectra, axis=0)
+    # Next to the mean, a window of half a second sees the drift that was taken out of it.
+    mean[:2] = mean[2:3]
+    smooth = over_neighbours(mean, 9)
+    return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
+
+
+def _rests(recording: Recording) -> list[tuple[int, int]]:
+    """Stretches without excitation, settled. Recordings begin at rest."""
+    driven = ~(instrument_of(recording) == 0).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
+    settling = round(SETTLING_S * recording.sample_rate_hz)
+    rests = zip(edges[::2], edges[1::2], strict=True)
+    return [(int(start) + (settling if start else 0), int(stop)) for start, stop in rests]

@@ -1,0 +1,44 @@
+"""Neighbouring lines taken together, in bins of equal width in octaves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OctaveBins:
+    """(bins, ...). Where lines are further apart than a bin is wide, a bin is a line."""
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    """Mean of complex values: noise falls, magnitudes of what turns within a bin a little, too."""
+    lowest: FloatArray
+    """Magnitude of the weakest line of each entry."""
+    highest: FloatArray
+    noise_variance: FloatArray
+    """Of single lines, averaged."""
+    lines: FloatArray
+    """(bins,): how many lie in each."""
+    reliable: BoolArray
+    """(bins,): where most lines are."""
+
+
+def octave_bins(response: FrequencyResponse, octaves: float) -> OctaveBins:
+    """octaves: width of a bin. The response must have lines."""
+    number = np.floor(np.log2(response.frequency_hz / response.frequency_hz[0]) / octaves).astype(np.int64)
+    _, starts, counts = np.unique(number, return_index=True, return_counts=True)
+    lines = counts.astype(np.float64)
+    magnitude = np.abs(response.response)
+    return OctaveBins(
+        np.add.reduceat(response.frequency_hz, starts) / lines,
+        np.asarray(np.add.reduceat(response.response, starts, axis=0) / lines[:, None, None], dtype=np.complex128),
+        np.minimum.reduceat(magnitude, starts, axis=0),
+        np.maximum.reduceat(magnitude, starts, axis=0),
+        np.add.reduceat(response.noise_variance, starts, axis=0) / lines[:, None, None],
+        lines,
+        np.add.reduceat(response.reliable.astype(np.float64), starts) > lines / 2,
+    )

@@ -1,0 +1,98 @@
+"""Which lines of an estimate should not be used, and why, in sentences."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import BoolArray
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_LEAST_INDEPENDENCE = 0.1
+"""Least singular value of the directions that were excited, each of unit length."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReliabilityRules:
+    least_coherence: float = 0.5
+    """Of the worst output."""
+    spring_margin: float = 1.1
+    """Times the spring's natural frequency: below, the spring takes most of the excitation away."""
+    least_energy_db: float = -12.0
+    """Of an experiment's strongest line, per line or per octave, whichever is kinder: sweeps are even per octave,
+    multisines per line, and either falls off steeply outside its band."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judgement:
+    reliable: BoolArray
+    """(lines,)"""
+    remarks: tuple[str, ...]
+
+
+def judge_lines(
+    frequency_hz: FloatArray, excited: BoolArray, coherence: FloatArray, spring_hz: float, rules: ReliabilityRules
+) -> Judgement:
+    """excited: (lines,), by `excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no spring."""
+    remarks = []
+    stiff = frequency_hz < rules.spring_margin * spring_hz
+    if stiff.any():
+        remarks.append(
+            f"Below {rules.spring_margin * spring_hz:.2f} Hz lines are not reliable: the virtual spring "
+            f"({spring_hz:g} Hz) takes most of the excitation away there."
+        )
+    dark = ~excited & ~stiff
+    if dark.any():
+        remarks.append(f"Not reliable for want of excitation in every direction: {_spans(frequency_hz, dark)}.")
+    worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
+    noisy = (worst < rules.least_coherence) & excited & ~stiff
+    if noisy.any():
+        remarks.append(
+            f"Not reliable, because noise is more than {100 * (1 - rules.least_coherence):g} % of an output's power: "
+            f"{_spans(frequency_hz, noisy)}."
+        )
+    return Judgement(~(stiff | dark | noisy), tuple(remarks))
+
+
+def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
+    """Where the experiments with energy point in as many directions as there are inputs.
+
+    excitation: (lines, inputs, experiments). Returns (lines,).
+    """
+    least = 10 ** (least_energy_db / 10)
+    power = np.sum(np.abs(excitation) ** 2, axis=1)
+    per_octave = power * frequency_hz[:, None]
+    strong = (power >= least * power.max(axis=0)) | (per_octave >= least * per_octave.max(axis=0))
+    length = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
+    directions = np.where(strong[:, None, :], excitation / length[:, None, :], 0.0)
+    weakest: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _LEAST_INDEPENDENCE
+    return weakest
+
+
+def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
+    """The stiffest virtual spring that any recording names; 0 where none does."""
+    found = [0.0]
+    for meta in metas:
+        feedback = meta.get("feedback")
+        named = feedback.get("natural_frequency_hz") if isinstance(feedback, Mapping) else None
+        if isinstance(named, int | float) and np.isfinite(named):
+            found.append(float(named))
+    return max(found)
+
+
+def _spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
+    """ "below 4 Hz and above 38 Hz", or how many lines where they are scattered."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    spans = list(zip(ends[::2], ends[1::2] - 1, strict=True))
+    if len(spans) > 3:
+        first, last = frequency_hz[chosen][[0, -1]]
+        return f"{int(chosen.sum())} lines between {first:.4g} and {last:.4g} Hz"
+    return " and ".join(_span(frequency_hz, int(first), int(last)) for first, last in spans)
+
+
+def _span(frequency_hz: FloatArray, first: int, last: int) -> str:
+    if last == len(frequency_hz) - 1 and first > 0:
+        return f"from {frequency_hz[first]:.4g} Hz on"
+    return f"{frequency_hz[first]:.4g} to {frequency_hz[last]:.4g} Hz"

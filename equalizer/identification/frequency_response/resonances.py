@@ -1,0 +1,128 @@
+"""Resonances of a measured response: peaks of its gain or of what goes off axis, with a mode fitted to each."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
+from equalizer.identification.frequency_response.single_mode import fit_single_mode
+from equalizer.signals.signal import FloatArray
+
+GAIN, COUPLING = "gain", "coupling"
+
+
+@dataclass(frozen=True, slots=True)
+class ResonanceSearch:
+    prominence_db: float = 3.0
+    """How far a peak rises above the higher of its two sides."""
+    bin_octaves: float = 1 / 48
+    """Lines are averaged over so much before peaks are looked for."""
+    reach_octaves: float = 1 / 8
+    """How far to either side of a peak its mode is fitted."""
+    draws: int = 200
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Resonance:
+    frequency_hz: float
+    """Of the fitted mode."""
+    frequency_interval_hz: tuple[float, float]
+    """95 %, from resampled noise."""
+    damping_ratio: float
+    damping_interval: tuple[float, float]
+    width_hz: float
+    """Between the points of half power: 2 damping_ratio frequency_hz."""
+    prominence_db: float
+    seen_in: tuple[str, ...]
+    """GAIN: a peak of the largest singular value; COUPLING: of all off-axis entries together."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Peak:
+    frequency_hz: float
+    prominence_db: float
+    seen_in: str
+
+
+def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None = None) -> tuple[Resonance, ...]:
+    """In rising order, between the first and the last reliable line. response: as estimated, not smoothed.
+
+    A peak that no single mode fits, or whose mode is the same as that of a more prominent peak, is not a resonance of
+    its own. Coupling is looked at where inputs and outputs are equally many.
+    """
+    search = search or ResonanceSearch()
+    if not response.reliable.any():
+        return ()
+    ends = np.flatnonzero(response.reliable)[[0, -1]]
+    lines = response.of_lines(np.isin(np.arange(len(response)), np.arange(ends[0], ends[1] + 1)))
+    found: list[Resonance] = []
+    for peak in sorted(_peaks(octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db):
+        resonance = _fitted(lines, peak, search)
+        if resonance is None:
+            continue
+        known = next((other for other in found if _same(other, resonance)), None)
+        if known is None:
+            found.append(resonance)
+        elif peak.seen_in not in known.seen_in:
+            found[found.index(known)] = _also_seen(known, peak.seen_in)
+    return tuple(sorted(found, key=lambda resonance: resonance.frequency_hz))
+
+
+def _peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
+    curves = {GAIN: np.linalg.norm(binned.response, ord=2, axis=(1, 2))}
+    if binned.response.shape[1] == binned.response.shape[2]:
+        off_axis = binned.response * (1 - np.eye(binned.response.shape[1]))
+        curves[COUPLING] = np.linalg.norm(off_axis, axis=(1, 2))
+    found = []
+    for name, curve in curves.items():
+        level_db = 20 * np.log10(np.maximum(curve, np.finfo(np.float64).tiny))
+        places, facts = find_peaks(level_db, prominence=search.prominence_db)
+        for place, prominence_db in zip(places, facts["prominences"], strict=True):
+            found.append(_Peak(float(binned.frequency_hz[place]), float(prominence_db), name))
+    return found
+
+
+def _fitted(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
+    """None where no single mode fits, or where it is not told by its noise."""
+    factor = 2**search.reach_octaves
+    near = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
+    # A hundred points are plenty for one mode; averages of more lines say the same sooner.
+    binned = octave_bins(near, 2 * search.reach_octaves / 100) if len(near) >= 6 else None
+    if binned is None or len(binned.frequency_hz) < 6:
+        return None
+    entries = binned.response.reshape(1, len(binned.frequency_hz), -1)
+    noise = np.nan_to_num(binned.noise_variance / binned.lines[:, None, None]).reshape(entries.shape)
+    natural, damping = fit_single_mode(binned.frequency_hz, entries)
+    if not np.isfinite(natural[0]):
+        return None
+    parts = np.random.default_rng(search.seed).standard_normal((2, search.draws, *entries.shape[1:]))
+    drawn = entries + np.sqrt(noise / 2) * (parts[0] + 1j * parts[1])
+    natural_drawn, damping_drawn = fit_single_mode(binned.frequency_hz, drawn)
+    if np.isnan(natural_drawn).mean() > 0.05:
+        return None
+    return Resonance(
+        frequency_hz=float(natural[0]),
+        frequency_interval_hz=_interval(natural_drawn),
+        damping_ratio=float(damping[0]),
+        damping_interval=_interval(damping_drawn),
+        width_hz=float(2 * damping[0] * natural[0]),
+        prominence_db=peak.prominence_db,
+        seen_in=(peak.seen_in,),
+    )
+
+
+def _interval(drawn: FloatArray) -> tuple[float, float]:
+    low, high = np.nanquantile(drawn, (0.025, 0.975))
+    return float(low), float(high)
+
+
+def _same(one: Resonance, other: Resonance) -> bool:
+    """Closer than a third of the wider one: peaks of gain and of coupling lie a little to either side of a mode."""
+    return abs(one.frequency_hz - other.frequency_hz) < max(one.width_hz, other.width_hz) / 3
+
+
+def _also_seen(resonance: Resonance, where: str) -> Resonance:
+    return replace(resonance, seen_in=tuple(sorted((*resonance.seen_in, where))))

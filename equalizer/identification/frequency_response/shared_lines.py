@@ -1,0 +1,128 @@
+"""The estimate at the lines that one set of experiments shares, with its errors.
+
+G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U the total commands, Y the responses, R the
+excitations as instruments. A feedback that adds to the excitation moves U and Y together and drops out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.experiments import Experiment
+from equalizer.identification.frequency_response.frequency_response import BoolArray
+from equalizer.identification.frequency_response.noise_floor import (
+    over_neighbours,
+    scatter_over_lines,
+    spread_over_looks,
+)
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_RANK_TOLERANCE = 1e-6
+"""Of the strongest line's amplitude: below it is rounding, not excitation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedLines:
+    frequency_hz: FloatArray
+    response: ComplexArray
+    """(lines, outputs, inputs)"""
+    noise_variance: FloatArray
+    """(lines, outputs, inputs)"""
+    coherence: FloatArray
+    """(lines, outputs)"""
+    excitation: ComplexArray
+    """(lines, inputs, experiments), of unit noise density."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """One per experiment, weighted by the root of the samples behind it: noise then has its density as power."""
+
+    command: ComplexArray
+    """(lines, inputs, experiments)"""
+    response: ComplexArray
+    instrument: ComplexArray
+    power: FloatArray
+    """(lines, outputs): of single looks, summed over the experiments."""
+
+
+def solve_shared_lines(
+    experiments: Sequence[Experiment],
+    frequency_hz: FloatArray,
+    rest_density: FloatArray | None,
+    noise_lines: int,
+) -> SharedLines:
+    """experiments: all with exactly these lines. rest_density: (lines, outputs) by `rest_floor`.
+
+    Lines at which the experiments are not independent are left out.
+    """
+    every = _columns(experiments)
+    kept = _independent(every)
+    columns = _Columns(every.command[kept], every.response[kept], every.instrument[kept], every.power[kept])
+    adjoint = np.conj(columns.instrument.swapaxes(1, 2))
+    solution = adjoint @ np.linalg.inv(columns.command @ adjoint)
+    response = columns.response @ solution
+    density = _density_of_looks(experiments, kept, response)
+    if density is None:
+        density = _density_of_residuals(columns, response)
+    if density is not None:
+        density = over_neighbours(density, noise_lines)
+        variance: FloatArray = np.einsum("lpe,lem->lpm", density, np.abs(solution) ** 2)
+        noise = density.sum(axis=2)
+    else:
+        variance = over_neighbours(scatter_over_lines(response), noise_lines)
+        if rest_density is not None:
+            gain = np.sum(np.abs(solution) ** 2, axis=1)
+            variance = np.fmax(variance, rest_density[kept][:, :, None] * gain[:, None, :])
+        noise = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of an output that is always zero nothing is known
+        coherence = np.clip(1 - noise / over_neighbours(columns.power, noise_lines), 0.0, 1.0)
+    return SharedLines(frequency_hz[kept], response, variance, coherence, columns.instrument)
+
+
+def _columns(experiments: Sequence[Experiment]) -> _Columns:
+    def stacked(name: str) -> ComplexArray:
+        weighted = [
+            getattr(one, name).mean(axis=0) * np.sqrt(one.length * one.independent_looks) for one in experiments
+        ]
+        return np.stack(weighted, axis=2)
+
+    power = sum(one.length * np.mean(np.abs(one.response) ** 2, axis=0) for one in experiments)
+    return _Columns(stacked("command"), stacked("response"), stacked("instrument"), np.asarray(power))
+
+
+def _independent(columns: _Columns) -> BoolArray:
+    """(lines,): where excitations and commands both have as many directions as there are inputs."""
+    inputs, experiments = columns.command.shape[1:]
+    kept = np.full(len(columns.command), experiments >= inputs)
+    if experiments >= inputs and len(kept):
+        for stack in (columns.instrument, columns.command):
+            strengths = np.linalg.svd(stack, compute_uv=False)
+            kept &= strengths[:, -1] > _RANK_TOLERANCE * strengths.max()
+    return kept
+
+
+def _density_of_looks(experiments: Sequence[Experiment], kept: BoolArray, response: ComplexArray) -> FloatArray | None:
+    """(lines, outputs, experiments), from what differs between looks once the command is accounted for. Experiments
+    with one look take the mean of the others; None where all have one."""
+    found: list[FloatArray | None] = []
+    for one in experiments:
+        residuals = one.response[:, kept] - np.einsum("lpm,klm->klp", response, one.command[:, kept])
+        found.append(one.length * spread_over_looks(residuals) / one.spread_seen if one.looks > 1 else None)
+    known = [density for density in found if density is not None]
+    if not known:
+        return None
+    mean = np.mean(known, axis=0)
+    return np.stack([mean if density is None else density for density in found], axis=2)
+
+
+def _density_of_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
+    """(lines, outputs, experiments), alike for all experiments; None where there is none to spare."""
+    inputs, experiments = columns.command.shape[1:]
+    if experiments < inputs + 2:
+        return None
+    residuals = np.abs(columns.response - response @ columns.command) ** 2
+    density = residuals.sum(axis=2, keepdims=True) / (experiments - inputs)
+    return np.broadcast_to(density, residuals.shape).copy()

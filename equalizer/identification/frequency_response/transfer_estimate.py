@@ -1,0 +1,173 @@
+"""The transfer functions of all channels, from everything that was recorded (the published figure 4).
+
+Each line uses every experiment whose period holds it, weighted by the samples behind it. Experiments of different
+periods thus meet at the lines that they share; a line that only some have is made from those.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from equalizer.identification.frequency_response.experiments import Experiment, Looks, periodic_looks, windowed_looks
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.noise_floor import rest_floor
+from equalizer.identification.frequency_response.reliable_lines import (
+    ReliabilityRules,
+    excited_lines,
+    judge_lines,
+    spring_frequency_hz,
+)
+from equalizer.identification.frequency_response.shared_lines import SharedLines, solve_shared_lines
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+
+class TransferEstimateError(ValueError):
+    """These recordings do not tell the transfer functions; the text says why, and what would do."""
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateSettings:
+    rules: ReliabilityRules = field(default_factory=ReliabilityRules)
+    noise_lines: int = 17
+    """Lines over which the noise is averaged."""
+    window_s: float = 4.0
+    """Of the windows where nothing is periodic: lines are 1 / window_s apart."""
+
+
+def transfer_estimate(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
+    """From total command to response. Raises TransferEstimateError where the recordings do not belong together, or
+    hold fewer independent experiments than there are inputs."""
+    settings = settings or EstimateSettings()
+    _check_alike(recordings)
+    looks = _looks(recordings, settings)
+    if not looks.experiments:
+        raise TransferEstimateError(
+            "no segment drives the device with more than single sinusoids for a whole period or window; "
+            "record a sweep or a multisine along every axis"
+        )
+    _refuse_still_outputs(recordings)
+    rate_hz = recordings[0].sample_rate_hz
+    parts = []
+    for frequency_hz, experiments in _by_shared_lines(looks.experiments, rate_hz):
+        rest = rest_floor(recordings, frequency_hz)
+        parts.append(solve_shared_lines(experiments, frequency_hz, rest, settings.noise_lines))
+    return _joined([part for part in parts if len(part.frequency_hz)], recordings, looks, settings)
+
+
+def _looks(recordings: Sequence[Recording], settings: EstimateSettings) -> Looks:
+    looks = periodic_looks(recordings)
+    if not looks.experiments:
+        looks = windowed_looks(recordings, settings.window_s)
+    remarks = list(looks.remarks)
+    if looks.experiments and all(one.looks == 1 for one in looks.experiments) and looks.periodic:
+        remarks.append(
+            "No experiment has two counted periods: errors were judged by the scatter from line to line, and by the "
+            "noise at rest where that is larger."
+        )
+    if any(recording.excitation is None and spring_frequency_hz([recording.meta]) for recording in recordings):
+        remarks.append(
+            "A feedback acted, but its share of the command was not recorded: noise that it fed back biases the "
+            "estimate where the response is weak."
+        )
+    return replace(looks, remarks=tuple(remarks))
+
+
+def _by_shared_lines(
+    experiments: Sequence[Experiment], rate_hz: float
+) -> Iterator[tuple[FloatArray, list[Experiment]]]:
+    """Lines that the same experiments have, with those experiments cut down to them."""
+    lengths = sorted({one.length for one in experiments})
+    # Lines as whole numbers: k / length is the same line in every period that holds it.
+    common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
+    numbers = {length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common // length) for length in lengths}
+    every = np.unique(np.concatenate(list(numbers.values())))
+    holders = np.stack([np.isin(every, numbers[length]) for length in lengths], axis=1)
+    for pattern in np.unique(holders, axis=0):
+        shared = every[(holders == pattern).all(axis=1)]
+        chosen = {length for length, holds in zip(lengths, pattern, strict=True) if holds}
+        cut = [_cut(one, shared // (common // one.length) - 1) for one in experiments if one.length in chosen]
+        yield shared * (rate_hz / common), cut
+
+
+def _cut(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
+    return Experiment(
+        experiment.length,
+        experiment.command[:, lines],
+        experiment.response[:, lines],
+        experiment.instrument[:, lines],
+        experiment.borrowed,
+    )
+
+
+def _joined(
+    parts: Sequence[SharedLines], recordings: Sequence[Recording], looks: Looks, settings: EstimateSettings
+) -> FrequencyResponse:
+    command, response = recordings[0].command, recordings[0].response
+    if not parts:
+        raise TransferEstimateError(_too_few(len(command.channels), looks))
+    order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
+    frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
+    excited = np.concatenate(
+        [excited_lines(part.frequency_hz, part.excitation, settings.rules.least_energy_db) for part in parts]
+    )[order]
+    coherence = np.concatenate([part.coherence for part in parts])[order]
+    spring_hz = spring_frequency_hz([recording.meta for recording in recordings])
+    judged = judge_lines(frequency_hz, excited, coherence, spring_hz, settings.rules)
+    return FrequencyResponse(
+        frequency_hz,
+        np.concatenate([part.response for part in parts])[order],
+        np.concatenate([part.noise_variance for part in parts])[order],
+        coherence,
+        judged.reliable,
+        recordings[0].sample_rate_hz,
+        command.channels,
+        response.channels,
+        _unit(command),
+        _unit(response),
+        (*looks.remarks, *judged.remarks),
+    )
+
+
+def _check_alike(recordings: Sequence[Recording]) -> None:
+    if not recordings:
+        raise TransferEstimateError("there is no recording to estimate from")
+    first = recordings[0]
+    for number, other in enumerate(recordings[1:], start=2):
+        for what, one, two in (
+            ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
+            ("command channels", _channels(first.command), _channels(other.command)),
+            ("response channels", _channels(first.response), _channels(other.response)),
+        ):
+            if one != two:
+                raise TransferEstimateError(
+                    f"recording {number} has the {what} {two}, but the first has {one}; estimate them apart"
+                )
+
+
+def _refuse_still_outputs(recordings: Sequence[Recording]) -> None:
+    """Rounding would make a response of a sensor that hangs at a value."""
+    rows = [recording.response.samples for recording in recordings]
+    still = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
+    names = ", ".join(name for name, is_still in zip(recordings[0].response.channels, still, strict=True) if is_still)
+    if names:
+        raise TransferEstimateError(
+            f"nothing at all comes from {names}, not even noise: check the sensor and record again"
+        )
+
+
+def _channels(signal: Signal) -> str:
+    return f"{', '.join(signal.channels)} in {_unit(signal)}"
+
+
+def _unit(signal: Signal) -> str:
+    return signal.unit if isinstance(signal.unit, str) else ", ".join(signal.unit)
+
+
+def _too_few(inputs: int, looks: Looks) -> str:
+    return (
+        f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(looks.experiments)} that "
+        "were found are not: at no line do they drive the inputs in so many directions. Record every axis by itself, "
+        "or as many multisines with phases of their own as there are inputs"
+    )

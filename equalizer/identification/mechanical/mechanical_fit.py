@@ -1,0 +1,176 @@
+"""A linear mechanical model for whoever has none: masses, dampers and springs at the driven axes, and as many
+oscillators on them as the recordings ask for."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.identification.mechanical.mechanical_choice import choose
+from equalizer.identification.mechanical.mechanical_fit_result import (
+    ChannelError,
+    MechanicalFit,
+    MechanicalFitRefused,
+    MechanicalFitSettings,
+)
+from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
+from equalizer.identification.mechanical.mechanical_lines import SegmentLines, of_band, roles, segment_lines
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup, line_groups
+from equalizer.identification.mechanical.mechanical_model_of import readable_model
+from equalizer.identification.mechanical.mechanical_order import stages
+from equalizer.identification.mechanical.mechanical_refinement import Refined, refined
+from equalizer.identification.mechanical.mechanical_refusals import refuse_noise, refuse_unfit, refuse_unstable
+from equalizer.identification.mechanical.mechanical_start import rigid_start
+from equalizer.identification.mechanical.mechanical_structure import Structure
+from equalizer.identification.mechanical.modal_order import in_balance
+from equalizer.identification.mechanical.modal_structure import ModalStructure
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+
+LINES_TO_CHOOSE_BY, IN_ALL = 400, 1600
+"""Of each group at most, and of all; the chosen structure is then fitted to all."""
+_LOW_PARTS = (0.25, 0.5, 1.0)
+"""Of the band in octaves, from its beginning: modes above would draw the start away from the rigid body."""
+
+
+def fit_mechanical_model(
+    recordings: Sequence[Recording],
+    settings: MechanicalFitSettings | None = None,
+    on_progress: Callable[[float], None] = lambda share: None,
+    name: str = "fitted to recordings",
+) -> MechanicalFit:
+    """From the total command to the response. Response i must be the motion where and along which command i acts; what
+    more there are may lie anywhere. Raises MechanicalFitRefused.
+
+    `on_progress(share)`.
+    """
+    settings = settings or MechanicalFitSettings()
+    refuse_unfit(recordings)
+    fit, test = roles(recordings)
+    lines = [one for each in fit if (one := segment_lines(*each)) is not None]
+    segments = of_band(lines, settings.band_hz)
+    if sum(len(segment.frequency_hz) for segment in segments) < 8:
+        raise MechanicalFitRefused(
+            "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
+            "record a sweep, noise or a multisine along every axis"
+        )
+    band = _band(segments)
+    groups = line_groups(segments, settings.floor)
+    structure = _structure(recordings[0], settings, band)
+    fewer = [group.thinned(min(LINES_TO_CHOOSE_BY, -(-IN_ALL // len(groups)))) for group in groups]
+    starts = _rigid_fits(segments, fewer, structure, band, settings)
+    chosen = choose(fewer, starts, band, settings, on_progress)
+    every = [group.of(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
+    final = _refitted(_nothing_left_out(every), chosen.best, band)
+    refuse_unstable(final)
+    tested = [one for each in test if (one := segment_lines(*each)) is not None]
+    on_progress(1.0)
+    model = readable_model(final, name)
+    errors = _channel_errors(model, lines, tested, band, recordings[0].response.channels)
+    return MechanicalFit(
+        model=model,
+        errors=errors[:-1],
+        error=errors[-1].fit,
+        held_out=errors[-1].held_out,
+        noise=errors[-1].noise,
+        band_hz=band,
+        tried=chosen.tried,
+        reason=chosen.reason,
+        remarks=_remarks(final, recordings[0].response.channels, bool(tested)),
+    )
+
+
+def _channel_errors(
+    model: MechanicalModel,
+    fitted: Sequence[SegmentLines],
+    tested: Sequence[SegmentLines],
+    band: tuple[float, float],
+    channels: tuple[str, ...],
+) -> tuple[ChannelError, ...]:
+    """The last one is over all channels. Raises MechanicalFitRefused where nothing is explained."""
+    error, noise = simulation_errors(model, fitted, band)
+    refuse_noise(error, channels)
+    held = simulation_errors(model, tested, band)[0] if tested else None
+    return tuple(
+        ChannelError(
+            channel,
+            float(error[i]),
+            None if held is None else float(held[i]),
+            float(noise[i]) if np.isfinite(noise[i]) else None,
+        )
+        for i, channel in enumerate((*channels, "all"))
+    )
+
+
+def _rigid_fits(
+    segments: Sequence[SegmentLines],
+    groups: Sequence[LineGroup],
+    structure: Structure,
+    band: tuple[float, float],
+    settings: MechanicalFitSettings,
+) -> list[Refined[Structure]]:
+    found: list[Refined[Structure]] = []
+    first = stages(band)[0]
+    lower = [part for group in groups if len((part := group.of(group.frequency_hz <= first)).frequency_hz)]
+    for share in _LOW_PARTS:
+        end = band[0] * (first / band[0]) ** share
+        low = of_band(segments, (band[0], end))
+        if sum(len(each.frequency_hz) for each in low) < 8 * structure.inputs and (found or share != _LOW_PARTS[-1]):
+            continue
+        for delayed in (False, True)[: 1 + settings.fit_delay]:
+            begun, unknowns = rigid_start(low, replace(structure, delayed=delayed), settings.floor)
+            found.append(refined(lower, begun, unknowns, (band[0], first)))
+    return found
+
+
+def _structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
+    inputs, outputs = len(recording.command.channels), len(recording.response.channels)
+    quantity, units = recording.response.quantities[0], (*recording.response.units, *recording.command.units)
+    return Structure(
+        inputs=inputs,
+        outputs=outputs,
+        quantity=quantity,
+        mass_scale=1.0,
+        speed_scale=2 * np.pi * float(np.sqrt(band[0] * band[1])),
+        signs=(1.0,) * inputs,
+        step_s=1 / recording.sample_rate_hz,
+        sensor=settings.sensor,
+        actuator=settings.actuator,
+        rotational=any(unit.startswith(("rad", "N m")) for unit in units),
+    )
+
+
+def _band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
+    return (
+        float(min(segment.frequency_hz[0] for segment in segments)),
+        float(max(segment.frequency_hz[-1] for segment in segments)),
+    )
+
+
+def _refitted(
+    groups: Sequence[LineGroup], best: Refined[Structure] | Refined[ModalStructure], band: tuple[float, float]
+) -> Refined[Structure] | Refined[ModalStructure]:
+    if isinstance(best.structure, ModalStructure):
+        return in_balance(refined(groups, best.structure, best.unknowns, band, most_steps=6))
+    return refined(groups, best.structure, best.unknowns, band)
+
+
+def _nothing_left_out(groups: Sequence[LineGroup]) -> list[LineGroup]:
+    return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
+
+
+def _remarks(
+    final: Refined[Structure] | Refined[ModalStructure], channels: tuple[str, ...], tested: bool
+) -> tuple[str, ...]:
+    structure = final.structure
+    own = ", ".join(channels[: structure.inputs])
+    found = [f"The model is linear and was fitted, as none was given; {own} taken to move as the commands act."]
+    if isinstance(structure, ModalStructure):
+        found.append("The sensors see the modes otherwise than the commands push them: a joint or cable lies between.")
+    elif -1.0 in structure.signs:
+        found.append("The response counts the other way than the command acts.")
+    if isinstance(structure, Structure) and not structure.grounded:
+        found.append("No spring to the ground is seen: the device drifts freely under a constant command.")
+    if not tested:
+        found.append("Nothing was kept for a test: the error is that of the fitted segments.")
+    return tuple(found)

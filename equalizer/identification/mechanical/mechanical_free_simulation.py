@@ -1,0 +1,60 @@
+"""How far a mechanical model's free simulation is from measured segments, channel by channel.
+
+By spectra: the answer to the commands plus that of the state at the segment's beginning, which is fitted. By Parseval's
+theorem that is the simulation's error over the segment, its mean left out.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from equalizer.identification.mechanical.mechanical_lines import SegmentLines
+from equalizer.identification.mechanical.mechanical_response import free_response, sampled_response
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_STATE_LINES = 3000
+"""Tell the state at the beginning well enough."""
+
+
+def simulation_errors(
+    model: MechanicalModel, segments: Sequence[SegmentLines], band_hz: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """(p + 1,), (p + 1,): root-mean-square errors over those of the response and the noise's likewise, NaN where not
+    known; the last entry is over all channels, each in units of its response."""
+    p = model.outputs
+    error, power, noise = np.zeros(p), np.zeros(p), np.zeros(p)
+    for one in segments:
+        inside = (one.frequency_hz >= band_hz[0]) & (one.frequency_hz <= band_hz[1])
+        misfit = simulation_misfit(model, one)[inside]
+        error += (np.abs(misfit) ** 2).sum(axis=0)
+        power += (np.abs(one.response[inside]) ** 2).sum(axis=0)
+        noise += one.noise[inside].sum(axis=0)
+    shares, floor = error / np.maximum(power, 1e-300), noise / np.maximum(power, 1e-300)
+    return (
+        np.sqrt(np.append(shares, shares.mean())),
+        np.sqrt(np.append(floor, floor.mean())),
+    )
+
+
+def simulation_misfit(model: MechanicalModel, one: SegmentLines) -> ComplexArray:
+    """(lines, p)"""
+    response = sampled_response(model, one.frequency_hz, one.rate_hz, one.hold)
+    misfit = one.response - np.einsum("lpm,lm->lp", response, one.command)
+    if not one.transient:
+        return np.asarray(misfit)
+    free = free_response(model, one.frequency_hz, one.rate_hz)
+    if model.quantity == "acceleration":
+        straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
+        free = np.concatenate([free, straight], axis=2)
+    every = max(1, len(free) // _STATE_LINES)
+    # A state shows at low frequencies most; strided lines from the first on keep those that matter.
+    some = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), every)]))
+    size = np.linalg.norm(one.response, axis=0)[:, None] + 1e-300
+    columns = (free[some] / size).reshape(-1, free.shape[2])
+    wanted = (misfit[some] / size[:, 0]).ravel()
+    real = np.concatenate([columns.real, columns.imag])
+    scale = np.maximum(np.linalg.norm(real, axis=0), 1e-300)
+    state = np.linalg.lstsq(real / scale, np.concatenate([wanted.real, wanted.imag]), rcond=1e-10)[0] / scale
+    return np.asarray(misfit - free @ state)

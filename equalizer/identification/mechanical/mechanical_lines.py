@@ -1,0 +1,158 @@
+"""What a mechanical model is fitted to: spectra of commands and responses, segment by segment, with their noise.
+
+Periodic segments give the mean of their periods: what does not repeat with the excitation (a feedback's share of the
+noise too) averages out, so that the excitation serves as the instrument. Others give the spectrum of the whole segment,
+and what the state at its ends adds to it is fitted with the model.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.identification.frequency_response.frequency_response import BoolArray
+from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
+from equalizer.identification.mechanical.local_noise import local_noise
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Hold, Recording, Segment
+from equalizer.signals.signal import FloatArray
+
+EXCITED = 1e-2
+"""Of the strongest line's amplitude: below it nothing was played."""
+MOST_LINES = 2000
+"""Of one segment that does not repeat: beyond, every second, third... is taken."""
+_NOISE_LINES = 9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SegmentLines:
+    """One segment's spectra (rfft / length, without the mean)."""
+
+    frequency_hz: FloatArray
+    """(lines,), above zero"""
+    command: ComplexArray
+    """(lines, m)"""
+    response: ComplexArray
+    """(lines, p)"""
+    noise: FloatArray
+    """(lines, p): expected |error|² of `response`; NaN where nothing tells it."""
+    excited: BoolArray
+    """(lines,)"""
+    transient: bool
+    """Whether the states at both ends show in it."""
+    rate_hz: float
+    hold: Hold
+
+
+def segment_lines(recording: Recording, segment: Segment) -> SegmentLines | None:
+    """None for what drives nothing, or has missing samples throughout."""
+    starts, length = _looks(recording, segment)
+    if not starts or length < 8:
+        return None
+    rate = recording.sample_rate_hz
+    transient = not segment.period or starts == [segment.start]
+    spectra = [_spectra(s.samples, starts, length) for s in (recording.command, recording.response)]
+    driving = recording.command if recording.excitation is None else recording.excitation
+    size = np.linalg.norm(_spectra(driving.samples, starts, length).mean(axis=0), axis=1)
+    if not size.max() > 1e-9 * max(float(np.abs(driving.samples[segment.start : segment.stop]).max()), 1e-300):
+        return None
+    command, response = (spectrum.mean(axis=0) for spectrum in spectra)
+    if len(starts) > 1:
+        noise = over_neighbours(spread_over_looks(spectra[1]), _NOISE_LINES) / len(starts)
+    else:
+        noise = local_noise(command, response)
+    if transient:  # what a segment holds between its own lines counts as driven too
+        size = np.sqrt(over_neighbours(size**2, _NOISE_LINES))
+    frequency = np.arange(1, len(command) + 1) * rate / length
+    excited = size > EXCITED * size.max()
+    return SegmentLines(frequency, command, response, noise, excited, transient, rate, recording.hold)
+
+
+def of_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | None) -> tuple[SegmentLines, ...]:
+    """The excited lines of the band, its ends included: of segments that repeat alike, the same lines for all; of one
+    that does not repeat, no more than a model needs."""
+    low, high = band_hz or (0.0, np.inf)
+    found = []
+    for one in segments:
+        alike = [other.excited for other in segments if repeat_alike(one, other)]
+        excited = one.excited if one.transient else np.any(alike, axis=0)
+        chosen = np.flatnonzero(excited & (one.frequency_hz >= low) & (one.frequency_hz <= high))
+        if one.transient and len(chosen) > MOST_LINES:
+            chosen = chosen[:: -(-len(chosen) // MOST_LINES)]
+        if len(chosen):
+            found.append(_taken(one, chosen))
+    return tuple(found)
+
+
+def repeat_alike(one: SegmentLines, other: SegmentLines) -> bool:
+    return not (one.transient or other.transient) and (one.rate_hz, one.hold, len(one.frequency_hz)) == (
+        other.rate_hz, other.hold, len(other.frequency_hz),
+    )  # fmt: skip
+
+
+def _taken(lines: SegmentLines, chosen: npt.NDArray[np.int64]) -> SegmentLines:
+    return SegmentLines(
+        lines.frequency_hz[chosen],
+        lines.command[chosen],
+        lines.response[chosen],
+        lines.noise[chosen],
+        lines.excited[chosen],
+        lines.transient,
+        lines.rate_hz,
+        lines.hold,
+    )
+
+
+def roles(recordings: Sequence[Recording]) -> tuple[list[tuple[Recording, Segment]], list[tuple[Recording, Segment]]]:
+    """What to fit, and what to keep for a test: by the segments' roles; else the last of several segments, or the last
+    third of the only one."""
+    driven = [(recording, segment) for recording in recordings for segment in _driven(recording)]
+    test = [(recording, segment) for recording, segment in driven if segment.role == "test"]
+    fit = [(recording, segment) for recording, segment in driven if segment.role != "test"]
+    if test or not fit:
+        return fit, test
+    if len(fit) > 2 * fit[0][0].command.samples.shape[1]:
+        return fit[:-1], fit[-1:]
+    recording, last = fit[-1]
+    if len(fit) == 1 and not last.period:
+        middle = last.start + 2 * (last.stop - last.start) // 3
+        parts = (
+            Segment(last.start, middle, last.kind, last.amplitude, 0, "fit"),
+            Segment(middle, last.stop, last.kind, last.amplitude, 0, "test"),
+        )
+        return [(recording, parts[0])], [(recording, parts[1])]
+    return fit, []
+
+
+def _driven(recording: Recording) -> Iterator[Segment]:
+    if not recording.segments:
+        yield Segment(0, len(recording), "noise")
+    for segment in recording.segments:
+        if segment.kind not in ("rest", "free"):
+            yield segment
+
+
+def _looks(recording: Recording, segment: Segment) -> tuple[list[int], int]:
+    """Where whole periods begin, the first left out where others are there; or the longest part without gaps."""
+    signals = [recording.command.samples, recording.response.samples]
+    if recording.excitation is not None:
+        signals.append(recording.excitation.samples)
+    there = np.all([np.isfinite(samples).all(axis=1) for samples in signals], axis=0)
+    if segment.period >= 8:
+        starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
+        whole = [start for start in starts if there[start : start + segment.period].all()]
+        counted = [start for start in whole if start != segment.start] or whole
+        if counted:
+            return counted, segment.period
+    ends = np.flatnonzero(~np.concatenate([[False], there[segment.start : segment.stop], [False]]))
+    longest = int(np.argmax(np.diff(ends)))
+    start, length = segment.start + int(ends[longest]), int(np.diff(ends)[longest]) - 1
+    return ([start] if length > 0 else []), length
+
+
+def _spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
+    """(looks, lines, channels)"""
+    looks = np.stack([samples[start : start + length] for start in starts])
+    looks = looks - looks.mean(axis=1, keepdims=True)
+    return np.asarray(np.fft.rfft(looks, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)

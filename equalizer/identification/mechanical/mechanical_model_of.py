@@ -1,0 +1,82 @@
+"""A fitted structure as a mechanical model for others to read, with oscillators in their own right and tolerances."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.identification.mechanical.mechanical_misfit import jacobian
+from equalizer.identification.mechanical.mechanical_refinement import Refined
+from equalizer.identification.mechanical.mechanical_structure import Structure
+from equalizer.identification.mechanical.modal_structure import ModalStructure, at_driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
+from equalizer.signals.signal import FloatArray
+
+LEAST_TOLERANCE = 0.01
+"""Of the value: no calibration is better than its force sensor or current loop."""
+
+
+AnyFit = Refined[Structure] | Refined[ModalStructure]
+
+
+def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
+    """With a tolerance; absolute coordinates for the oscillators, so that their masses stand on the diagonal."""
+    model = fit.structure.model(fit.unknowns, name)
+    if isinstance(fit.structure, ModalStructure):
+        model = at_driven_axes(model)
+    else:
+        model = _absolute(model, fit.structure.inputs, fit.structure.joint)
+    return replace(model, tolerance=tolerance_of(fit))
+
+
+def tolerance_of(fit: AnyFit) -> Tolerance:
+    """One standard deviation by the misfit's own size, the largest over the driven axes; of modes with shapes of their
+    own only their frequencies', for how hard each is pushed where no sensor sits is not told by the data."""
+    if isinstance(fit.structure, ModalStructure):
+        structure = fit.structure
+        logs = np.sqrt(np.diag(_covariance(fit))).reshape(structure.modes, -1)[:, 0]
+        return Tolerance(modes=max(float(np.median(logs)), LEAST_TOLERANCE))
+    return _of_oscillators(fit.structure, fit)
+
+
+def _of_oscillators(structure: Structure, fit: AnyFit) -> Tolerance:
+    here = _driven_axes(structure, fit.unknowns)
+    slope = jacobian(
+        lambda unknowns: _driven_axes(structure, unknowns), fit.unknowns, here, np.full(structure.parameters, np.inf)
+    )
+    covariance = _covariance(fit)
+    spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
+    spread, values = spread.reshape(3, -1).max(axis=1), here.reshape(3, -1).max(axis=1)
+    mass, damping, stiffness = np.maximum(spread, LEAST_TOLERANCE * values).tolist()
+    of_modes = None
+    if structure.modes:
+        each = np.sqrt(np.diag(covariance)[structure.slices["modes"]]).reshape(structure.modes, -1)
+        of_modes = max(float(np.median(each[:, 0])), LEAST_TOLERANCE)
+    return Tolerance(mass, damping, stiffness, of_modes)
+
+
+def _driven_axes(structure: Structure, unknowns: FloatArray) -> FloatArray:
+    """(3 m,): masses, damping and stiffness to the ground at each."""
+    return np.concatenate([np.diag(part) for part in structure.grounded_parts(unknowns)])
+
+
+def _covariance(fit: AnyFit) -> FloatArray:
+    slope = fit.slope
+    size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+    inverse = np.linalg.pinv((slope / size).T @ (slope / size), rcond=1e-10)
+    left = fit.squares / max(len(slope) - slope.shape[1], 1)
+    return np.asarray(left * inverse / np.outer(size, size))
+
+
+def _absolute(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
+    """e = |L| (z - hᵀ x): z is where an oscillator of mass |L|² is, along its direction h."""
+    n, carrier, rest = model.coordinates, slice(m, 2 * m) if joint else slice(0, m), slice(2 * m if joint else m, None)
+    participation = model.mass[rest, carrier]
+    roots = np.linalg.norm(participation, axis=1)
+    if not len(roots) or roots.min() < 1e-6 * np.sqrt(model.mass[carrier, carrier].max()):
+        return model
+    change = np.eye(n)
+    change[rest, rest], change[rest, carrier] = np.diag(roots), -participation
+    mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
+    # What the change makes zero is zero but for rounding.
+    mass[rest, carrier] = mass[carrier, rest] = 0.0
+    return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness, output=model.output @ change)

@@ -1,0 +1,77 @@
+"""The unknowns of a structure, refined on measured lines: weighted least squares of the output's error."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup, jacobian, misfits, stacked
+from equalizer.identification.mechanical.mechanical_structure import Structure
+from equalizer.identification.mechanical.modal_structure import ModalStructure
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.signal import FloatArray
+
+S = TypeVar("S", Structure, ModalStructure)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Refined(Generic[S]):
+    structure: S
+    unknowns: FloatArray
+    squares: float
+    """Of the fitted lines' misfits."""
+    left_out: float
+    """Sum of squares over the lines that were not fitted."""
+    left_out_count: int
+    slope: FloatArray
+    """(2 rows, parameters) at the solution."""
+
+    @property
+    def error(self) -> float:
+        """On lines left out, where there are any."""
+        return float(np.sqrt(self.left_out / max(self.left_out_count, 1)))
+
+
+def refined(
+    groups: Sequence[LineGroup],
+    structure: S,
+    start: FloatArray,
+    band_hz: tuple[float, float],
+    most_steps: int = 40,
+) -> Refined[S]:
+    """Raises ValueError where the start itself is no model."""
+    fitted = [group.without_left_out() for group in groups]
+    low, high = structure.bounds(band_hz)
+
+    start = np.clip(start, low + 1e-9, high - 1e-9)
+    worst = stacked(misfits(fitted, structure.model(start)))
+
+    def residuals(unknowns: FloatArray) -> FloatArray:
+        try:
+            found = stacked(misfits(fitted, structure.model(unknowns)))
+        except (np.linalg.LinAlgError, MechanicalModelError):
+            return np.full_like(worst, 1e6)
+        return found if np.isfinite(found).all() else np.full_like(worst, 1e6)
+
+    answer = least_squares(
+        residuals,
+        start,
+        jac=lambda unknowns: jacobian(residuals, unknowns, residuals(unknowns), high),
+        bounds=(low, high),
+        method="trf",
+        x_scale="jac",
+        max_nfev=most_steps,
+        ftol=1e-6,
+        xtol=1e-7,
+    )
+    left_out, count = _left_out(groups, structure.model(answer.x))
+    return Refined(structure, answer.x, 2 * float(answer.cost), left_out, count, answer.jac)
+
+
+def _left_out(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
+    """Sum of squares, and how many."""
+    pairs = list(zip(groups, misfits(groups, model), strict=True))
+    squares = sum(np.sum(np.abs(misfit[group.left_out]) ** 2) for group, misfit in pairs)
+    return float(squares), int(sum(group.count[group.left_out].sum() for group in groups))

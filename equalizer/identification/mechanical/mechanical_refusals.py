@@ -1,0 +1,85 @@
+"""When no mechanical model is made of the recordings, and what would do."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
+from equalizer.identification.mechanical.mechanical_refinement import Refined
+from equalizer.identification.mechanical.mechanical_structure import Structure
+from equalizer.identification.mechanical.modal_structure import ModalStructure
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+LEAST_SAMPLES = 64
+ALL_NOISE = 0.97
+"""Simulation's error over the response: a model explains less than a twentieth of its power."""
+
+
+def refuse_unfit(recordings: Sequence[Recording]) -> None:
+    """What can be seen before anything is computed. Raises MechanicalFitRefused."""
+    if not recordings:
+        raise MechanicalFitRefused("there is no recording to fit a model to")
+    first = recordings[0]
+    for number, other in enumerate(recordings[1:], start=2):
+        for what, one, two in (
+            ("sample rate", first.sample_rate_hz, other.sample_rate_hz),
+            ("hold", first.hold.value, other.hold.value),
+            ("command", _words(first.command), _words(other.command)),
+            ("response", _words(first.response), _words(other.response)),
+        ):
+            if one != two:
+                raise MechanicalFitRefused(f"recording {number} has the {what} {two}, the first {one}; fit them apart")
+    quantities = set(first.response.quantities)
+    if len(quantities) > 1 or not quantities <= set(DERIVATIVE_OF_QUANTITY):
+        raise MechanicalFitRefused(
+            f"the responses are {', '.join(sorted(quantities))}, but a mechanical model answers one of "
+            f"{', '.join(DERIVATIVE_OF_QUANTITY)} for all channels"
+        )
+    inputs, outputs = len(first.command.channels), len(first.response.channels)
+    if outputs < inputs:
+        raise MechanicalFitRefused(
+            f"{inputs} commands and {outputs} responses: the motion along every command must be recorded"
+        )
+    _refuse_samples(recordings)
+
+
+def _refuse_samples(recordings: Sequence[Recording]) -> None:
+    if (longest := max(len(recording) for recording in recordings)) < LEAST_SAMPLES:
+        raise MechanicalFitRefused(f"{longest} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
+    for side in ("command", "response"):
+        signals: list[Signal] = [getattr(recording, side) for recording in recordings]
+        for channel, name in enumerate(signals[0].channels):
+            columns = [signal.samples[:, channel] for signal in signals]
+            finite = [column[np.isfinite(column)] for column in columns]
+            if not any(len(column) for column in finite):
+                raise MechanicalFitRefused(f"{side} {name} holds no number, only missing values")
+            if all(not len(column) or np.ptp(column) == 0 for column in finite):
+                raise MechanicalFitRefused(f"{side} {name} is constant throughout, so nothing can be told from it")
+
+
+def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
+    """error: (p + 1,), simulation's over the response's. Raises MechanicalFitRefused where no channel is explained."""
+    if error[:-1].min() > ALL_NOISE:
+        raise MechanicalFitRefused(
+            f"the commands do not tell what {', '.join(channels)} will do: a fitted model leaves "
+            f"{error[:-1].min():.0%} of the best channel; the recording is noise, or of something else"
+        )
+
+
+def refuse_unstable(final: Refined[Structure] | Refined[ModalStructure]) -> None:
+    """Raises MechanicalFitRefused for a fit that moves by itself."""
+    from equalizer.identification.mechanical.mechanical_response import pole_form
+
+    form = pole_form(final.structure.model(final.unknowns))
+    fastest = float(form.poles.real.max())
+    if fastest > 1e-3 * final.structure.speed_scale:
+        raise MechanicalFitRefused(
+            f"the best fit is unstable (it grows e-fold in {1 / fastest:.3g} s): a feedback in the command that was "
+            "not recorded, or a polarity that changes"
+        )
+
+
+def _words(signal: Signal) -> str:
+    return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))

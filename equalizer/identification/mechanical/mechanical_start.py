@@ -1,0 +1,134 @@
+"""Where the fit of a mechanical model starts: least squares on the dynamic stiffness."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.identification.mechanical.mechanical_lines import SegmentLines
+from equalizer.identification.mechanical.mechanical_response import sensor_response
+from equalizer.identification.mechanical.mechanical_structure import Structure, packed_mass, packed_square
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_LEAST_EIGENVALUE = 0.05
+_DELAYS = 33
+_MOST_DELAY_CYCLES = 8.0
+"""Of the highest line."""
+
+
+def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:
+    """Unknowns of a structure without modes; in it the signs and scales that the data ask for."""
+    m = structure.inputs
+    if structure.delayed:
+        delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _DELAYS)
+        solved = [_solved(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
+        delay_s = float(delays_s[int(np.argmin([left for _, left in solved]))])
+    else:
+        delay_s = structure.actuator.delay_s
+    parts = _solved(segments, structure, floor, delay_s)[0].reshape(3, -1)
+    mass, damping, stiffness = (symmetric(part, m) for part in parts)
+    if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
+        return rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
+    values, vectors = np.linalg.eigh(mass)
+    top = max(float(np.abs(values).max()), 1e-300)
+    mass = (vectors * np.maximum(values, _LEAST_EIGENVALUE * top)) @ vectors.T
+    structure = replace(structure, mass_scale=float(np.trace(mass) / m))
+    units = structure.units
+    unknowns = np.zeros(structure.parameters)
+    unknowns[structure.slices["delay"]] = delay_s / structure.step_s
+    unknowns[structure.slices["mass"]] = packed_mass(mass / units[0])
+    unknowns[structure.slices["damping"]] = packed_square(_not_negative(damping) / units[1])
+    if structure.grounded:
+        unknowns[structure.slices["stiffness"]] = packed_square(_not_negative(stiffness) / units[2])
+    if structure.outputs > m:
+        unknowns[structure.slices["rows"]] = _other_rows(segments, m).ravel()
+    return structure, unknowns
+
+
+def _solved(
+    segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
+) -> tuple[FloatArray, float]:
+    """Entries of the three matrices, and the squares that are left."""
+    rows, right = _stiffness_rows(segments, structure, floor, delay_s)
+    found = scaled_least_squares(rows, right)
+    m = structure.inputs
+    return found[: 3 * m * (m + 1) // 2], float(np.sum((right - rows @ found) ** 2))
+
+
+def _stiffness_rows(
+    segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """u = M a + D v + K x, and what a segment's ends add; real rows, weighted by the force's expected error."""
+    m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
+    late_steps = 1.0 if order == 2 else 0.5
+    blocks, right = [], []
+    transients = [i for i, segment in enumerate(segments) if segment.transient]
+    for number, each in enumerate(segments):
+        s = 2j * np.pi * each.frequency_hz
+        z = np.exp(s / each.rate_hz)
+        late = late_steps if each.hold.value == "zero-order" else 0.0
+        shown = sensor_response(structure.sensor.bandwidth_hz, z, each.rate_hz) * z ** (-late)
+        shown = shown * np.exp(-s * delay_s)
+        moved = each.response[:, :m] * np.array(structure.signs) / shown[:, None]
+        size = np.linalg.norm(each.response[:, :m], axis=1)
+        noise = np.sqrt(np.nan_to_num(each.noise[:, :m]).sum(axis=1)) / np.maximum(size, 1e-300)
+        weight = each.excited / (np.linalg.norm(each.command, axis=1) * np.hypot(5 * floor, noise) + 1e-300)
+        columns = [
+            _acting(moved * (s ** (power - order))[:, None], one_of) for power in (2, 1, 0) for one_of in pairs(m)
+        ]
+        ends = np.zeros((len(s), m, 3 * m * len(transients)), dtype=np.complex128)
+        if each.transient:
+            for axis in range(m):
+                first = 3 * (m * transients.index(number) + axis)
+                ends[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
+        block = np.concatenate([np.stack(columns, axis=2), ends], axis=2) * weight[:, None, None]
+        blocks.append(block.reshape(-1, block.shape[2]))
+        right.append((each.command * weight[:, None]).ravel())
+    complex_rows, complex_right = np.concatenate(blocks), np.concatenate(right)
+    return (
+        np.concatenate([complex_rows.real, complex_rows.imag]),
+        np.concatenate([complex_right.real, complex_right.imag]),
+    )
+
+
+def pairs(m: int) -> list[tuple[int, int]]:
+    return list(zip(*(part.tolist() for part in np.tril_indices(m)), strict=True))
+
+
+def _acting(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
+    """(lines, m): force of a unit entry of a symmetric matrix. motion: (lines, m)."""
+    force = np.zeros_like(motion)
+    row, column = pair
+    force[:, row] += motion[:, column]
+    if row != column:
+        force[:, column] += motion[:, row]
+    return force
+
+
+def scaled_least_squares(rows: FloatArray, right: FloatArray) -> FloatArray:
+    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(rows / scale, right, rcond=1e-12)[0] / scale)
+
+
+def symmetric(entries: FloatArray, m: int) -> FloatArray:
+    lower = np.zeros((m, m))
+    lower[np.tril_indices(m)] = entries
+    return np.asarray(lower + np.tril(lower, -1).T)
+
+
+def _not_negative(matrix: FloatArray) -> FloatArray:
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray((vectors * np.maximum(values, 1e-3 * max(np.abs(values).max(), 1e-300))) @ vectors.T)
+
+
+def _other_rows(segments: Sequence[SegmentLines], m: int) -> FloatArray:
+    """(p - m, m): what the other responses see of the driven axes."""
+    own = np.concatenate([segment.response[:, :m] for segment in segments])
+    others = np.concatenate([segment.response[:, m:] for segment in segments])
+    return np.asarray(
+        np.linalg.lstsq(np.concatenate([own.real, own.imag]), np.concatenate([others.real, others.imag]), rcond=None)[
+            0
+        ].T
+    )

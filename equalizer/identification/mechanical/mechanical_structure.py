@@ -1,0 +1,248 @@
+"""The unknowns of a mechanical model: masses, dampers and springs at the driven axes, and oscillators on them.
+
+M a + D v + K x = u at the m driven axes. An oscillator with frequency w, damping ratio d and participation vector L
+(root of its mass times its direction) has the relative coordinate e: e'' + 2 d w e' + w² e = -Lᵀ a. Responses see the
+driven axes through `output` rows, the oscillators through rows of their own. An elastic joint may lie between the
+driven axes and what sensors and oscillators sit on; see `mechanical_joint`.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.identification.mechanical.mechanical_joint import DRIVEN_SHARE, across_joint
+from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
+from equalizer.signals.signal import FloatArray
+
+_WIDEST_LOG = 12.0
+_FARTHEST_MODE = 4.0
+"""Times the band's end, or a part of its beginning."""
+_LARGEST_TURN = 0.3
+_MOST_DELAY_SAMPLES = 200.0
+_WIDEST_JOINT_LOG = 2.5
+_JOINT_LOSS = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What is unknown; its numbers are a vector, in units that make them about one."""
+
+    inputs: int
+    outputs: int
+    """The first `inputs` of them are the driven axes' own motions."""
+    quantity: str
+    mass_scale: float
+    speed_scale: float
+    """rad/s"""
+    signs: tuple[float, ...]
+    """Of the driven axes' own responses: -1 for a sensor that counts the other way."""
+    modes: int = 0
+    grounded: bool = True
+    """Whether springs to the ground may be there."""
+    turned: bool = False
+    """Whether the sensor's axes may be turned against the commands' by a small angle."""
+    shared: bool = False
+    """Whether the driven axes' own sensors see a part of the oscillators' motion beside them."""
+    joint: bool = False
+    """Whether an elastic joint, such as cables, lies between the driven axes and all else."""
+    delayed: bool = False
+    step_s: float = 1e-3
+    sensor: SensorLimits = field(default_factory=SensorLimits)
+    actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
+    rotational: bool = False
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        m, p = self.inputs, self.outputs
+        pairs = m * (m + 1) // 2
+        seen = p if self.shared else p - m
+        sizes = {
+            "mass": pairs, "damping": pairs, "stiffness": pairs if self.grounded else 0,
+            "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.turned else 0,
+            "joint": pairs + 1 if self.joint else 0, "delay": 1 if self.delayed else 0,
+            "modes": self.modes * (2 + m + seen),
+        }  # fmt: skip
+        ends = np.cumsum(list(sizes.values()))
+        return {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+
+    @property
+    def parameters(self) -> int:
+        return int(self.slices["modes"].stop)
+
+    @property
+    def coordinates(self) -> int:
+        return (2 if self.joint else 1) * self.inputs + self.modes
+
+    @property
+    def units(self) -> tuple[float, float, float]:
+        """Of mass, damping and stiffness."""
+        return (
+            self.mass_scale,
+            self.mass_scale * self.speed_scale,
+            self.mass_scale * self.speed_scale**2,
+        )
+
+    def carried_over(self, unknowns: FloatArray, other: "Structure") -> FloatArray:
+        """The same in a structure with more unknowns, which begin at zero, or with fewer."""
+        grown = np.zeros(other.parameters)
+        for name, part in self.slices.items():
+            there = other.slices[name]
+            if name == "modes" and self.modes:
+                old = unknowns[part].reshape(self.modes, -1)
+                new = np.zeros((other.modes, (there.stop - there.start) // other.modes))
+                head = 2 + self.inputs
+                new[: self.modes, :head] = old[:, :head]
+                if old.shape[1] > head:
+                    new[: self.modes, new.shape[1] - (old.shape[1] - head) :] = old[:, head:]
+                grown[there] = new.ravel()
+            elif name != "modes" and part.stop - part.start == there.stop - there.start:
+                grown[there] = unknowns[part]
+        return grown
+
+    def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
+        """In relative coordinates. Raises MechanicalModelError for what is no mass."""
+        m, part = self.inputs, self.slices
+        mass, damping, stiffness = self.grounded_parts(unknowns)
+        frequency, ratio, participation, seen = self.oscillators(unknowns)
+        own = np.diag(self.signs) @ _turn(unknowns[part["turn"]], m)
+        rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
+        whole = MechanicalModel(
+            name=name,
+            quantity=self.quantity,
+            mass=_joined(mass + participation.T @ participation, participation, np.ones(self.modes)),
+            damping=_joined(damping, None, 2 * ratio * frequency),
+            stiffness=_joined(stiffness, None, frequency**2),
+            input=np.concatenate([np.eye(m), np.zeros((self.modes, m))]),
+            output=np.concatenate([rows, seen.T], axis=1),
+            sensor=self.sensor,
+            actuator=replace(self.actuator, delay_s=self.delay_s(unknowns)),
+            rotational=self.rotational,
+        )
+        if not self.joint:
+            return whole
+        joint = unknowns[part["joint"]]
+        lower = _lower(joint[:-1], m)
+        return across_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
+
+    def grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mass without that of oscillators, damping and stiffness at the driven axes, (m, m) each."""
+        m, part, units = self.inputs, self.slices, self.units
+        lower = _lower(unknowns[part["mass"]], m)
+        stiffness = units[2] * _square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
+        return units[0] * lower @ lower.T, units[1] * _square(unknowns[part["damping"]], m), stiffness
+
+    def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+        """Within which unknowns are sought: no negative damper or spring, modes about the band."""
+        low, high = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
+        part, diagonal = self.slices, diagonal_places(self.inputs)
+        for name in ("damping", "stiffness"):
+            if part[name].stop > part[name].start:
+                low[part[name].start + diagonal] = 0.0
+        low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_WIDEST_LOG, _WIDEST_LOG
+        if self.joint:
+            first = part["joint"].start + diagonal
+            at = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
+            low[first], high[first] = at - _WIDEST_JOINT_LOG, at + _WIDEST_JOINT_LOG
+            low[part["joint"].stop - 1], high[part["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
+        low[part["turn"]], high[part["turn"]] = -_LARGEST_TURN, _LARGEST_TURN
+        low[part["delay"]], high[part["delay"]] = 0.0, _MOST_DELAY_SAMPLES
+        if self.modes:
+            size = (part["modes"].stop - part["modes"].start) // self.modes
+            first = part["modes"].start + size * np.arange(self.modes)
+            low[first] = np.log(2 * np.pi * band_hz[0] / _FARTHEST_MODE / self.speed_scale)
+            high[first] = np.log(2 * np.pi * band_hz[1] * _FARTHEST_MODE / self.speed_scale)
+            low[first + 1], high[first + 1] = np.log(1e-4), np.log(3.0)
+        return low, high
+
+    def delay_s(self, unknowns: FloatArray) -> float:
+        if not self.delayed:
+            return self.actuator.delay_s
+        return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)
+
+    def oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """rad/s (modes,), damping ratios (modes,), participations (modes, m), what each response sees (modes, p)."""
+        m, p = self.inputs, self.outputs
+        each = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
+        root = np.sqrt(self.mass_scale)
+        seen = np.zeros((self.modes, p))
+        if self.modes and each.shape[1] > 2 + m:
+            seen[:, p - (each.shape[1] - 2 - m) :] = each[:, 2 + m :] / root
+        return self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1]), root * each[:, 2 : 2 + m], seen
+
+
+def packed_mass(mass: FloatArray) -> FloatArray:
+    """Unknowns of a mass in the structure's unit. mass: (m, m), positive definite."""
+    lower = np.linalg.cholesky(mass)
+    np.fill_diagonal(lower, np.log(np.diag(lower)))
+    return np.asarray(lower[_triangle(len(mass))])
+
+
+def packed_square(matrix: FloatArray) -> FloatArray:
+    """Likewise of a damping or stiffness: as its root, so that none can feed a motion. matrix: positive definite."""
+    return np.asarray(np.linalg.cholesky(matrix)[_triangle(len(matrix))])
+
+
+def begun_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
+    """The unknowns with a joint alike along all axes, whose resonance lies there."""
+    mass = structure.grounded_parts(unknowns)[0]
+    m, part = structure.inputs, structure.slices["joint"]
+    shared = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
+    begun = unknowns.copy()
+    begun[part] = 0.0
+    root = 2 * np.pi * frequency_hz * np.sqrt(shared / structure.units[2])
+    begun[part.start + diagonal_places(m)] = np.log(root)
+    begun[part.stop - 1] = np.log(_JOINT_LOSS * structure.speed_scale / (2 * np.pi * frequency_hz))
+    return begun
+
+
+def without_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
+    part = structure.slices["modes"]
+    rows = np.delete(unknowns[part].reshape(structure.modes, -1), number, axis=0)
+    return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: part.start], rows.ravel()])
+
+
+def diagonal_places(m: int) -> npt.NDArray[np.intp]:
+    """Which of the unknowns of a symmetric matrix stand on its diagonal."""
+    rows, columns = _triangle(m)
+    return np.flatnonzero(rows == columns)
+
+
+@cache
+def _triangle(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    return np.tril_indices(m)  # kept, for a fit asks some ten thousand times
+
+
+def _lower(unknowns: FloatArray, m: int) -> FloatArray:
+    lower = np.zeros((m, m))
+    lower[_triangle(m)] = unknowns
+    np.fill_diagonal(lower, np.exp(np.diag(lower)))
+    return lower
+
+
+def _square(unknowns: FloatArray, m: int) -> FloatArray:
+    lower = np.zeros((m, m))
+    lower[_triangle(m)] = unknowns
+    return np.asarray(lower @ lower.T)
+
+
+def _turn(angles: FloatArray, m: int) -> FloatArray:
+    """Rows that see the axes turned: the rotation that the skew matrix's Cayley transform gives."""
+    if not len(angles):
+        return np.eye(m)
+    skew = np.zeros((m, m))
+    skew[np.tril_indices(m, -1)] = angles / 2
+    skew = skew - skew.T
+    return np.asarray(np.linalg.solve(np.eye(m) - skew, np.eye(m) + skew))
+
+
+def _joined(driven: FloatArray, between: FloatArray | None, own: FloatArray) -> FloatArray:
+    """Driven axes first, then the oscillators. own: (modes,), between: (modes, m)."""
+    m, n = len(driven), len(driven) + len(own)
+    whole = np.zeros((n, n))
+    whole[:m, :m] = driven
+    whole[range(m, n), range(m, n)] = own
+    if between is not None:
+        whole[m:, :m], whole[:m, m:] = between, between.T
+    return whole

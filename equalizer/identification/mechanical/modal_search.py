@@ -1,0 +1,196 @@
+"""Modes of a measured response, found one after the other: frequencies and dampings are searched, shapes follow from
+them by linear least squares (variable projection after Golub and Pereyra, its slope after Kaufman)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup
+from equalizer.identification.mechanical.mechanical_response import pole_answers, sensor_response
+from equalizer.identification.mechanical.mechanical_structure import Structure
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_GRID = 80
+_RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
+_STEP = 1e-6
+_MOST_DELAY_SAMPLES = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundModes:
+    logs: FloatArray
+    """(2 modes,): logs of frequencies (rad/s), then of damping ratios."""
+    delay_s: float
+    shapes: FloatArray
+    """(modes, p, m)"""
+    left_out: float
+    left_out_count: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    misfit: list[ComplexArray]
+    """Per group (lines, p, rows)"""
+    bases: list[FloatArray]
+    """Per output, orthonormal, over the fitted lines' real rows."""
+    shapes: FloatArray
+
+
+class ModalSearch:
+    """Over some groups of lines, none of which holds the transient of a segment that does not repeat."""
+
+    def __init__(
+        self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool
+    ) -> None:
+        self._groups = tuple(groups)
+        self._structure = structure
+        self._order = DERIVATIVE_OF_QUANTITY[structure.quantity]
+        self._band = band_hz
+        self._fit_delay = fit_delay
+        self._known_delay = structure.actuator.delay_s / structure.step_s
+        self._kept = [~group.left_out for group in groups]
+
+    def with_one_more(self, now: FoundModes | None) -> FoundModes:
+        """Begun where one more explains most, then all together."""
+        logs = np.empty(0) if now is None else now.logs
+        delay = self._known_delay if now is None else now.delay_s / self._structure.step_s
+        solved = self._solve(np.append(logs, delay))
+        low, high = np.log(2 * np.pi * np.array([self._band[0] / 2, self._band[1] * 2]))
+        best = max(
+            ((self._explained(solved, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
+            for speed in np.linspace(low, high, _GRID) for ratio in _RATIOS),
+        )  # fmt: skip
+        half = len(logs) // 2
+        return self._refined(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
+
+    def _refined(self, start: FloatArray) -> FoundModes:
+        half, delay = len(start) // 2, start[-1]
+        least, most = (0.0, _MOST_DELAY_SAMPLES) if self._fit_delay and half > 1 else (delay - 1e-9, delay + 1e-9)
+        low = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[0] / 10)), np.full(half, np.log(1e-3))])
+        high = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[1] * 2)), np.full(half, np.log(30.0))])
+        low, high = np.append(low, least), np.append(high, most)
+        answer = least_squares(
+            lambda unknowns: self._stacked(self._solve(unknowns).misfit),
+            np.clip(start, low + 1e-10, high - 1e-10),
+            jac=self._slope,
+            bounds=(low, high),
+            max_nfev=40,
+            ftol=1e-5,
+        )
+        solved = self._solve(answer.x)
+        pairs = list(zip(self._groups, solved.misfit, strict=True))
+        return FoundModes(
+            answer.x[:-1],
+            float(answer.x[-1]) * self._structure.step_s,
+            solved.shapes,
+            float(sum(np.sum(np.abs(part[group.left_out]) ** 2) for group, part in pairs)),
+            int(sum(group.count[group.left_out].sum() for group in self._groups)),
+        )
+
+    def _solve(self, unknowns: FloatArray) -> _Solved:
+        m, p, modes = self._structure.inputs, self._structure.outputs, len(unknowns) // 2
+        basis = [self._answers(group, unknowns) for group in self._groups]
+        shapes = np.zeros((modes, p, m))
+        bases = []
+        for out in range(p):
+            rows = [
+                (group.root[kept, out][..., None, :] * answers[kept, None, :, None]).reshape(
+                    group.target[kept, out].size, modes * m
+                )
+                for group, answers, kept in zip(self._groups, basis, self._kept, strict=True)
+            ]
+            right = [group.target[kept, out].ravel() for group, kept in zip(self._groups, self._kept, strict=True)]
+            design, wanted = _real(np.concatenate(rows)), _real(np.concatenate(right))
+            scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+            q, r = np.linalg.qr(design / scale) if modes else (design, design)
+            bases.append(q)
+            if modes:
+                entries = np.linalg.lstsq(r, q.T @ wanted, rcond=1e-9)[0] / scale
+                shapes[:, out] = entries.reshape(modes, m)
+        misfit = [
+            group.target - (group.root @ np.einsum("lk,kpm->lpm", answers, shapes)[..., None])[..., 0]
+            for group, answers in zip(self._groups, basis, strict=True)
+        ]
+        return _Solved(misfit, bases, shapes)
+
+    def _slope(self, unknowns: FloatArray) -> FloatArray:
+        solved = self._solve(unknowns)
+        half = len(unknowns) // 2
+        columns = []
+        for k in range(len(unknowns)):
+            # A mode's own numbers move its answer alone, the delay all of them.
+            modes = np.arange(half) if k == 2 * half else np.array([k % half])
+            chosen = np.concatenate([modes, half + modes, [2 * half]])
+            moved = unknowns.copy()
+            moved[k] += _STEP
+            change = [
+                -np.einsum(
+                    "lpem,lk,kpm->lpe",
+                    group.root,
+                    (self._answers(group, moved[chosen]) - self._answers(group, unknowns[chosen])) / _STEP,
+                    solved.shapes[modes],
+                    optimize=True,
+                )
+                for group in self._groups
+            ]
+            columns.append(self._projected(change, solved.bases))
+        return np.stack(columns, axis=1)
+
+    def _explained(self, solved: _Solved, unknowns: FloatArray) -> float:
+        """Of the misfit's squares by one more mode, all shapes free."""
+        answers = [self._answers(group, unknowns)[:, 0] for group in self._groups]
+        total = 0.0
+        for out, basis in enumerate(solved.bases):
+            rows = [
+                (group.root[kept, out] * answer[kept, None, None]).reshape(-1, self._structure.inputs)
+                for group, answer, kept in zip(self._groups, answers, self._kept, strict=True)
+            ]
+            design = _real(np.concatenate(rows))
+            wanted = _real(
+                np.concatenate([part[kept, out].ravel() for part, kept in zip(solved.misfit, self._kept, strict=True)])
+            )
+            design = design - basis @ (basis.T @ design)
+            q, _ = np.linalg.qr(design / np.maximum(np.linalg.norm(design, axis=0), 1e-300))
+            total += float(np.sum((q.T @ wanted) ** 2))
+        return total
+
+    def _projected(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
+        parts = []
+        for out, basis in enumerate(bases):
+            column = _real(
+                np.concatenate([part[kept, out].ravel() for part, kept in zip(change, self._kept, strict=True)])
+            )
+            parts.append(column - basis @ (basis.T @ column))
+        return np.concatenate(parts)
+
+    def _stacked(self, misfit: Sequence[ComplexArray]) -> FloatArray:
+        return np.concatenate(
+            [
+                _real(np.concatenate([part[kept, out].ravel() for part, kept in zip(misfit, self._kept, strict=True)]))
+                for out in range(self._structure.outputs)
+            ]
+        )
+
+    def _answers(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
+        """(lines, modes): of modes of unit mass, sampled exactly."""
+        half = len(unknowns) // 2
+        speed, ratio = np.exp(unknowns[:half]), np.exp(unknowns[half : 2 * half])
+        delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz
+        ratio = np.where(np.abs(ratio - 1) < 1e-6, 1 + 1e-6, ratio)
+        root = np.sqrt(ratio.astype(np.complex128) ** 2 - 1)
+        poles = np.concatenate([speed * (-ratio + root), speed * (-ratio - root)])
+        other = np.concatenate([poles[half:], poles[:half]])
+        z = np.exp(2j * np.pi * group.frequency_hz / group.rate_hz)
+        answers, direct = pole_answers(poles, z, group.rate_hz, group.hold, delay_s)
+        weighted = answers * (poles**self._order / (poles - other))
+        through = direct[:, None] if self._order == 2 else 0.0
+        shown = sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
+        return np.asarray((weighted[:, :half] + weighted[:, half:] + through) * shown[:, None])
+
+
+def _real(values: ComplexArray) -> FloatArray:
+    return np.concatenate([values.real, values.imag])

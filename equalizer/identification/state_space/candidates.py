@@ -1,0 +1,125 @@
+"""Starts for the search, each refined to its nearest best fit, and the choice among them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.state_space.canonical_variate import canonical_variate, decimation, driven_records
+from equalizer.identification.state_space.canonical_variate import poles_and_shapes as from_records
+from equalizer.identification.state_space.modal_form import ModalForm
+from equalizer.identification.state_space.refinement import FittedForm, fitted, refine
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.stable_poles import Radius, largest_radius
+from equalizer.identification.state_space.warped_subspace import default_horizon, poles_and_shapes, warped_subspace
+from equalizer.identification.state_space.weighted_lines import (
+    WeightedLines,
+    bin_centres_hz,
+    binned,
+    bins_of,
+)
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording
+
+LINES_PER_BIN = 5
+OCTAVE_SHARE = 1 / 40
+"""Width of a bin of a wide band."""
+LARGEST_GAIN = 100.0
+"""Outside the band, over the largest inside: beyond it a model is a fit by cancellation."""
+MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """Where a search begins."""
+
+    name: str
+    form: ModalForm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """Where it ended."""
+
+    name: str
+    fitted: FittedForm
+    cost: float
+    """Squared residual over noise variance, mean over all entries of all lines: about 1 at the noise."""
+    outside_gain: float
+    """Largest gain outside the band over the largest inside."""
+    radius: Radius
+    """Within which its poles were kept."""
+
+    @property
+    def sane(self) -> bool:
+        return self.outside_gain <= LARGEST_GAIN
+
+
+def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
+    return tuple(subspace_start(lines, settings, longer) for longer in settings.longer_horizons)
+
+
+def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longer: int) -> Start:
+    radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
+    horizon = default_horizon(settings.order, lines.response.shape[1]) + longer
+    subspace = warped_subspace(lines, horizon, settings.centre_hz)
+    return Start(f"warped subspace, horizon {horizon}", poles_and_shapes(subspace, settings.order, radius))
+
+
+def record_starts(
+    recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
+) -> tuple[Start, ...]:
+    """From the time domain; none where the band leaves nothing to decimate."""
+    factor = decimation(lines.sample_rate_hz, settings.band_hz[1])
+    if factor < 2:
+        return ()
+    records = driven_records(recordings, factor)
+    p, m = lines.response.shape[1:]
+    radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
+    starts = []
+    for horizon in settings.record_horizons:
+        observed = canonical_variate(records, m, horizon) if horizon * p > settings.order + p else None
+        if observed is not None:
+            form = from_records(observed, p, settings.order, factor, radius)
+            starts.append(Start(f"canonical variates, horizon {horizon}", form))
+    return tuple(starts)
+
+
+def candidate(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+    radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
+    return refined(start.name, fitted(start.form, lines), lines, settings, radius)
+
+
+def refined(
+    name: str, found: FittedForm, lines: WeightedLines, settings: IdentificationSettings, radius: Radius
+) -> Candidate:
+    """On bins, which are formed anew about each pass's result, and at last on all lines of a narrow band."""
+    for steps in MOST_STEPS:
+        found = refine(found.form, bins_about(found, lines, settings), radius, steps)
+    if not settings.wide:
+        found = refine(found.form, lines, radius, LAST_STEPS)
+    cost = lines.cost(found.response(lines.z)) / lines.response.size
+    return Candidate(name, found, cost, outside_gain(found, lines), radius)
+
+
+def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
+    """The lines in bins, their means taken about a model that is nearly right."""
+    bins = bins_of(lines, 1, OCTAVE_SHARE) if settings.wide else bins_of(lines, LINES_PER_BIN, 0.0)
+    centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
+    return binned(lines, bins, found.response(lines.z), found.response(centres))
+
+
+def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
+    """The largest response anywhere over the largest on the lines."""
+    every = np.exp(1j * np.linspace(0, np.pi, 2000))
+    return float(_largest(found.response(every)) / _largest(found.response(lines.z)))
+
+
+def best(found: Sequence[Candidate]) -> Candidate:
+    """The cheapest of the sane ones; of none sane, the least extreme."""
+    sane = [one for one in found if one.sane]
+    return min(sane, key=lambda one: one.cost) if sane else min(found, key=lambda one: one.outside_gain)
+
+
+def _largest(response: ComplexArray) -> float:
+    return float(np.linalg.norm(response, ord=2, axis=(1, 2)).max())

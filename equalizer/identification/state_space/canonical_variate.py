@@ -1,0 +1,90 @@
+"""Poles and output shapes from time records: canonical variate analysis (Larimore 1990) of several records at once.
+
+Each record is reduced to the triangle of its own orthogonal factorisation, and the triangles are stacked: no record
+meets the samples of another, and a second record costs what the first did.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import resample_poly
+
+from equalizer.identification.state_space.modal_form import ModalForm, from_poles
+from equalizer.identification.state_space.stable_poles import reflected
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+RATE_OVER_BAND = 3.5
+"""Records are decimated to about this many samples per period of the band's upper end."""
+LEAST_SAMPLES = 4
+"""Per row of the stacked past and future, for a record to count."""
+_SILENT_KINDS = ("rest", "free")
+
+
+def decimation(sample_rate_hz: float, high_hz: float) -> int:
+    return max(1, int(sample_rate_hz / (RATE_OVER_BAND * high_hz)))
+
+
+def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatArray]:
+    """Commands and responses side by side, (n, m + p) each: every driven segment that no test was kept for, its mean
+    taken off, both sides decimated alike. Segments with missing samples are left out."""
+    records = []
+    for recording in recordings:
+        both = np.hstack([recording.command.samples, recording.response.samples])
+        for segment in recording.segments:
+            part = both[segment.start : segment.stop]
+            if segment.kind in _SILENT_KINDS or segment.role == "test" or not np.isfinite(part).all():
+                continue
+            centred = part - part.mean(axis=0)
+            records.append(resample_poly(centred, 1, factor, axis=0) if factor > 1 else centred)
+    return records
+
+
+def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) -> FloatArray | None:
+    """Extended observability matrix (horizon p, horizon p), strongest direction first; None if too little is there.
+
+    records: (n, m + p) each, commands first; horizon: past and future samples.
+    """
+    rows = 2 * horizon * records[0].shape[1] if records else 0
+    long = [record for record in records if len(record) > LEAST_SAMPLES * rows / max(len(records), 1) + 2 * horizon]
+    if not long:
+        return None
+    triangle = np.vstack([_triangle(_past_and_future(record, inputs, horizon)) for record in long])
+    triangle = _triangle(triangle)
+    p = records[0].shape[1] - inputs
+    known, future = horizon * inputs, triangle.shape[1] - horizon * p
+    by_past, by_chance = triangle[known:future, future:], triangle[future:, future:]
+    spread = by_past.T @ by_past + by_chance.T @ by_chance
+    spread[np.diag_indices_from(spread)] += 1e-13 * np.trace(spread)
+    root = np.linalg.cholesky(spread)
+    vectors, correlations, _ = np.linalg.svd(np.linalg.solve(root, by_past.T), full_matrices=False)
+    return np.asarray(root @ (vectors * np.sqrt(correlations)), dtype=np.float64)
+
+
+def _triangle(rows: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+
+
+def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArray:
+    """Future commands, then the past of both, then future responses: a row per instant."""
+    windows = np.lib.stride_tricks.sliding_window_view(record, 2 * horizon, axis=0).transpose(0, 2, 1)
+    past, future = windows[:, :horizon], windows[:, horizon:]
+    instants = len(windows)
+    return np.hstack(
+        [
+            future[:, :, :inputs].reshape(instants, -1),
+            past.reshape(instants, -1),
+            future[:, :, inputs:].reshape(instants, -1),
+        ]
+    )
+
+
+def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
+    """At the full rate: a pole of the decimated records becomes its root. radius: largest pole at the full rate."""
+    seen = observed[:, :order]
+    values, vectors = np.linalg.eig(np.linalg.lstsq(seen[:-outputs], seen[outputs:], rcond=None)[0])
+    slow: ComplexArray = reflected(values, radius**factor)
+    # A negative real pole has no real root: taken for the equally fast positive one.
+    turned = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
+    return from_poles(reflected(turned ** (1 / factor), radius), seen[:outputs] @ vectors)

@@ -1,0 +1,246 @@
+"""From measured frequency responses to a model: starts, refinement, choice, uncertainty."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.state_space.candidates import (
+    Candidate,
+    Start,
+    best,
+    bins_about,
+    candidate,
+    record_starts,
+    subspace_start,
+    subspace_starts,
+)
+from equalizer.identification.state_space.misfit import Misfit, misfit_of, unknowns_of
+from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
+from equalizer.identification.state_space.model_uncertainty import parameter_draws, response_deviation
+from equalizer.identification.state_space.refusals import IdentificationRefused, lines_or_refusal
+from equalizer.identification.state_space.relaxed_poles import Relaxed, SlowPole, relaxed, relaxed_again, slow_poles
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.weighted_lines import WeightedLines
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+FIRST_SEARCH = 0.8
+"""Share of the progress that is told of it; poles are relaxed in the rest."""
+BAND_POINTS = 200
+WIDTHS = np.sinh(np.linspace(-4, 4, 41))
+"""Places about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
+SAMPLED_BEFORE_WRITTEN = 1.0
+"""A response is read just before its row's command is written, so a device answers one sample later at the earliest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identified:
+    """A model and how well it fits what was measured."""
+
+    model: IdentifiedModel
+    cost: float
+    """Squared residual over noise variance, per unknown left free: about 1 when only noise is left."""
+    rms_relative_error: float
+    """Model against estimate over the lines of the band; the estimate's own noise is in it."""
+    worst_relative_error: float
+    """The worst line's, relative to the root mean square of the response."""
+    scatter: float | None
+    """Of the model against the device, as the noise makes it: root mean square over the lines, relative to the
+    response's; from the draws, None without them. What no linear model of this order can follow is not in it."""
+    misfit: Misfit
+    """What is: the lines' own difference to the model beyond their noise."""
+    expected_error: float | None
+    """Likewise relative: scatter, and the most misfit that the lines may hide; in 95 % of cases not exceeded."""
+    lines: int
+    candidates: tuple[Candidate, ...]
+    chosen: Candidate
+    relaxed: tuple[SlowPole, ...]
+    """Poles that the data need slower than the ordinary bound, slowest first."""
+    bound_costs: bool
+    """The bound that was asked for keeps the fit from what the data show."""
+    remarks: tuple[str, ...]
+    """What the user should know about this model, in sentences; `misfit_causes` says what a misfit may come from."""
+
+    @property
+    def slowest_decay_s(self) -> float:
+        """Time constant."""
+        radius = self.model.spectral_radius
+        return float(-1 / (np.log(radius) * self.model.sample_rate_hz)) if radius > 0 else 0.0
+
+
+def identify(
+    response: FrequencyResponse | Sequence[FrequencyResponse],
+    settings: IdentificationSettings | None = None,
+    records: tuple[Recording, ...] = (),
+    on_progress: Callable[[float], None] | None = None,
+    near: Candidate | None = None,
+) -> Identified:
+    """One model of all estimates together, each line counting by its noise. Always stable.
+
+    `records` give further starts in the time domain. `on_progress` is told the share done, 0 to 1. `near`: refined on
+    these lines instead of a search; poles that were relaxed for it are bounded again where that costs nothing.
+    Raises IdentificationRefused when the data do not carry a model.
+    """
+    settings = settings or IdentificationSettings()
+    tell = on_progress or (lambda _: None)
+    responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
+    lines = lines_or_refusal(responses, settings)
+    _refuse_foreign(records, responses[0])
+
+    if near is not None:
+        again = Relaxed(relaxed_again(near, lines, settings), bound_costs=False)
+        return _identified((again.candidate,), again, lines, responses[0], settings)
+    found = _searched(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
+    after = relaxed(best(found), lambda freer: _searched(lines, freer, records, lambda _: None), lines, settings)
+    every = found if after.candidate in found else [*found, after.candidate]
+    identified = _identified(tuple(every), after, lines, responses[0], settings)
+    tell(1.0)
+    return identified
+
+
+def _searched(
+    lines: WeightedLines,
+    settings: IdentificationSettings,
+    records: tuple[Recording, ...],
+    tell: Callable[[float], None],
+) -> list[Candidate]:
+    starts = _starts(lines, settings, records)
+    found = []
+    for number, start in enumerate(starts):
+        tell(number / len(starts))
+        found.append(candidate(start, lines, settings))
+    found += _spare_candidates(best(found), lines, settings)
+    tell(1.0)
+    return found
+
+
+def _starts(
+    lines: WeightedLines, settings: IdentificationSettings, records: tuple[Recording, ...]
+) -> tuple[Start, ...]:
+    try:
+        return (*subspace_starts(lines, settings), *record_starts(records, lines, settings))
+    except np.linalg.LinAlgError as problem:
+        order = settings.order
+        raise IdentificationRefused(
+            f"order {order} asks more of the {len(lines)} lines in the band than can be told apart; "
+            f"choose a lower order, such as {max(order // 4 * 2, 2)}"
+        ) from problem
+
+
+def _spare_candidates(so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> list[Candidate]:
+    """Of a wide band, until one leaves no more than noise."""
+    found: list[Candidate] = []
+    for longer in settings.spare_horizons if settings.wide else ():
+        if best([so_far, *found]).cost <= UNEXPLAINED:
+            break
+        found.append(candidate(subspace_start(lines, settings, longer), lines, settings))
+    return found
+
+
+def _identified(
+    found: tuple[Candidate, ...],
+    after: Relaxed,
+    lines: WeightedLines,
+    like: FrequencyResponse,
+    settings: IdentificationSettings,
+) -> Identified:
+    chosen = after.candidate
+    low, high = settings.band_hz
+    p, m = lines.response.shape[1:]
+    unknowns = unknowns_of(settings.order, p, m)
+    cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
+    inside = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
+    modelled = chosen.fitted.response(lines.z)
+    error = lines.relative_error(modelled)[inside]
+    slow = () if settings.longest_decay_s else slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
+    misfit = misfit_of(lines, modelled, inside, unknowns)
+    model = _model(chosen, lines, cost, like, settings, slow)
+    return Identified(
+        model=model,
+        cost=cost,
+        rms_relative_error=float(np.sqrt((error**2).mean())),
+        worst_relative_error=float(error.max()),
+        scatter=(scatter := _scatter(model, lines.frequency_hz[inside], slow)),
+        misfit=misfit,
+        expected_error=None if scatter is None else float(np.hypot(scatter, misfit.most)),
+        lines=int(inside.sum()),
+        candidates=found,
+        chosen=chosen,
+        relaxed=slow,
+        bound_costs=after.bound_costs,
+        remarks=(*fit_remarks(cost, misfit, slow, after.bound_costs, settings), *outside_remark(chosen)),
+    )
+
+
+def _scatter(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
+    """As an integral over the band, and so also between lines, where a narrow resonance has its peak."""
+    if model.samples is None or len(frequency_hz) < 2:
+        return None
+    low, high = frequency_hz[0], frequency_hz[-1]
+    peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
+    grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
+    each_hz = np.gradient(grid)[:, None, None]
+    size = np.sqrt((each_hz * np.abs(model_response(model, grid)) ** 2).sum())
+    return float(np.sqrt((each_hz * response_deviation(model, grid) ** 2).sum()) / size)
+
+
+def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:
+    for record in records:
+        told = (record.sample_rate_hz, record.command.channels, record.response.channels)
+        if told != (like.sample_rate_hz, like.input_channels, like.output_channels):
+            raise IdentificationRefused(
+                f"a record of {', '.join(told[2])} per {', '.join(told[1])} at {told[0]:g} Hz does not belong to a "
+                f"response of {', '.join(like.output_channels)} per {', '.join(like.input_channels)} at "
+                f"{like.sample_rate_hz:g} Hz; give the records that the response was estimated from"
+            )
+
+
+def outside_remark(chosen: Candidate) -> list[str]:
+    """Empty where the model stays small outside its band."""
+    if chosen.sane:
+        return []
+    return [
+        f"outside the band the model's gain is {chosen.outside_gain:.0f} times that inside: "
+        f"keep what is played within the band, or lower the order"
+    ]
+
+
+def _model(
+    chosen: Candidate,
+    lines: WeightedLines,
+    cost: float,
+    like: FrequencyResponse,
+    settings: IdentificationSettings,
+    slow: tuple[SlowPole, ...],
+) -> IdentifiedModel:
+    fitted = chosen.fitted
+    samples = None
+    if settings.draws:
+        noise_factor = float(np.sqrt(max(cost, 1.0)))
+        bins = bins_about(fitted, lines, settings)
+        samples = parameter_draws(fitted, bins, chosen.radius, noise_factor, settings.draws, settings.seed)
+    return IdentifiedModel(
+        A=fitted.form.state_matrix,
+        B=fitted.B,
+        C=fitted.form.C,
+        D=fitted.D,
+        sample_rate_hz=like.sample_rate_hz,
+        band_hz=settings.band_hz,
+        input_unit=like.input_unit,
+        output_unit=like.output_unit,
+        input_channels=like.input_channels,
+        output_channels=like.output_channels,
+        delay_samples=SAMPLED_BEFORE_WRITTEN,
+        samples=samples,
+        provenance={
+            "method": "subspace identification, refined by maximum likelihood on the lines of the response",
+            "start": chosen.name,
+            "residual_over_noise": float(np.sqrt(cost)),
+            "longest_decay_s": settings.decay_s,
+            "relaxed_poles": [[pole.frequency_hz, pole.decay_s] for pole in slow],
+        },
+    )

@@ -1,0 +1,135 @@
+"""From recordings to a model: estimate, fit, and again where something rings so long that starts are heard in the
+estimate, or where the lines scatter more than their noise."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from equalizer.identification.frequency_response.experiments import periodic_looks
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.frequency_response.local_polynomial import smoothed
+from equalizer.identification.frequency_response.transfer_estimate import transfer_estimate
+from equalizer.identification.state_space.identify import Identified, identify, outside_remark
+from equalizer.identification.state_space.misfit import misfit_of_estimate
+from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.settled_recordings import settled, slow_part
+from equalizer.identification.state_space.stable_poles import largest_radius
+from equalizer.plant.model_response import model_response
+from equalizer.signals.recording import Recording
+
+HEARD_S = 1.0
+"""Time constant from which the start of a period is heard in the estimate, which leaves out its first 5 s."""
+MOST_ROUNDS = 8
+SETTLED = 1e-4
+"""Relative change of the slowest decay from round to round that is not worth another one."""
+SMOOTHED = (
+    "The lines differ from the model by more than their noise: the fit was made to a local average over neighbouring "
+    "lines (--no-smooth fits the lines themselves)."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentifiedRecordings:
+    estimate: FrequencyResponse
+    fitted: FrequencyResponse
+    """What the model was fitted to: the estimate, or its local averages."""
+    identified: Identified
+
+
+def identify_recordings(
+    recordings: tuple[Recording, ...],
+    settings: IdentificationSettings,
+    smooth: bool | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> IdentifiedRecordings:
+    """smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, for they would
+    blunt what it stands for; None: where the lines scatter more than their noise. `on_progress` is told the share
+    done. Raises TransferEstimateError, IdentificationRefused."""
+    estimate = transfer_estimate(recordings)
+    looked_twice = _looked_twice(recordings)
+    if not looked_twice:
+        settings = replace(settings, longest_decay_s=settings.decay_s)
+    found = _fitted(estimate, recordings, settings, smooth, on_progress or (lambda _: None))
+    if looked_twice and found.fitted is found.estimate:
+        return found
+    return _with_causes(found, settings, looked_twice)
+
+
+def _fitted(
+    estimate: FrequencyResponse,
+    recordings: tuple[Recording, ...],
+    settings: IdentificationSettings,
+    smooth: bool | None,
+    tell: Callable[[float], None],
+) -> IdentifiedRecordings:
+    if smooth and settings.longest_decay_s is not None:
+        return _smooth(estimate, recordings, settings, None, tell)
+    identified = identify(estimate, settings, recordings, lambda share: tell(share / 2))
+    estimate, identified = _settled(estimate, identified, recordings, settings)
+    if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED):
+        tell(1.0)
+        return IdentifiedRecordings(estimate, estimate, identified)
+    return _smooth(estimate, recordings, settings, identified, lambda share: tell(0.5 + share / 2))
+
+
+def _with_causes(
+    found: IdentifiedRecordings, settings: IdentificationSettings, looked_twice: bool
+) -> IdentifiedRecordings:
+    """What a fit to averages leaves always runs smoothly, for neighbours share their lines: only the lines tell."""
+    identified, averaged = found.identified, found.fitted is not found.estimate
+    misfit = misfit_of_estimate(identified.model, found.estimate) if averaged else identified.misfit
+    misfit = misfit if looked_twice else replace(misfit, smooth=None)
+    cost = misfit.cost if averaged else identified.cost
+    causes = fit_remarks(cost, misfit, identified.relaxed, identified.bound_costs, settings)
+    remarks = (*([SMOOTHED] if averaged else []), *causes, *outside_remark(identified.chosen))
+    return replace(found, identified=replace(identified, misfit=misfit, remarks=remarks))
+
+
+def _looked_twice(recordings: Sequence[Recording]) -> bool:
+    """Whether every experiment has two counted periods.
+
+    In a single period, or in windows, transient and leakage look like lightly damped resonances, so that poles are not
+    relaxed on their evidence. Noise that is judged by the scatter of the lines does not tell what a misfit is, either.
+    """
+    looks = periodic_looks(recordings)
+    return bool(looks.experiments) and all(experiment.looks > 1 for experiment in looks.experiments)
+
+
+def _settled(
+    estimate: FrequencyResponse,
+    identified: Identified,
+    recordings: Sequence[Recording],
+    settings: IdentificationSettings,
+) -> tuple[FrequencyResponse, Identified]:
+    """Freed of what rings from period to period, by a model that is nearly right, and then by a better one."""
+    heard, quick = largest_radius(HEARD_S, estimate.sample_rate_hz), replace(settings, draws=0)
+    rounds = 0
+    while (slow := slow_part(identified, heard)) is not None and rounds < MOST_ROUNDS:
+        before, rounds = identified.slowest_decay_s, rounds + 1
+        estimate = transfer_estimate(settled(recordings, slow))
+        identified = identify(estimate, quick, near=identified.chosen)
+        if abs(identified.slowest_decay_s / before - 1) < SETTLED:
+            break
+    return estimate, identify(estimate, settings, near=identified.chosen) if rounds else identified
+
+
+def _smooth(
+    estimate: FrequencyResponse,
+    recordings: tuple[Recording, ...],
+    settings: IdentificationSettings,
+    known: Identified | None,
+    tell: Callable[[float], None],
+) -> IdentifiedRecordings:
+    relaxed = known is not None and bool(known.relaxed)
+    if known is not None and relaxed:
+        fitted = smoothed(estimate, about=model_response(known.model, estimate.frequency_hz))
+        identified = identify(fitted, settings, near=known.chosen)
+    else:
+        fitted = smoothed(estimate)
+        # Averaged lines are not independent, so they cannot tell whether a pole needs more than the bound.
+        held = replace(settings, longest_decay_s=settings.decay_s)
+        identified = identify(fitted, held, recordings, tell)
+    tell(1.0)
+    # Averaged lines do not tell what the bound costs, either.
+    bound_costs = known is not None and known.bound_costs
+    return IdentifiedRecordings(estimate, fitted, replace(identified, bound_costs=bound_costs))

@@ -1,0 +1,69 @@
+"""What a model leaves of the lines beyond their noise: how much, and whether it runs smoothly from line to line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
+from equalizer.identification.state_space.weighted_lines import WeightedLines, weighted_lines
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+NOISE_TRUSTED = 1.1
+"""The noise power of an estimate is itself estimated, from few looks: below this factor nothing is said to be left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    error: float
+    """Root mean square of model - estimate beyond the noise, relative to the response's; 0 where only noise is left."""
+    most: float
+    """Likewise, the most that the lines would still take for noise in 95 % of cases: the chance scatter of noise and of
+    its estimate, and what the fit took up of it, hide that much. Not below `error`."""
+    cost: float
+    """Squared difference over noise variance, mean over all entries of the lines: about 1 at the noise."""
+    smooth: float | None
+    """Correlation of what is left beyond the noise between neighbouring lines: near 1 for a linear answer that the
+    model lacks, near 0 for lines that scatter; None where only noise is left, or where the noise itself was judged
+    by the scatter of the lines."""
+
+
+ONE_SIDED_95 = 1.645
+
+
+def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:
+    """modelled: (lines, p, m). inside: (lines,), those that count. unknowns: that the fit had, in real numbers."""
+    left = (modelled - lines.response)[inside]
+    weight = lines.weight[inside]
+    size = float((np.abs(lines.response[inside]) ** 2).sum())
+    beyond = float((np.abs(left) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
+    hidden = float((np.abs(left) ** 2).sum() - _least_noise(1 / weight**2, unknowns))
+    weighted = weight * left
+    power = float((np.abs(weighted) ** 2).sum())
+    smooth = None
+    if power > NOISE_TRUSTED * weighted.size and len(weighted) > 1:
+        both = float((weighted[1:] * weighted[:-1].conj()).real.sum()) * len(weighted) / (len(weighted) - 1)
+        smooth = both / (power - weighted.size)
+    error, most = (float(np.sqrt(max(part, 0.0) / max(size, 1e-300))) for part in (beyond, max(beyond, hidden)))
+    return Misfit(error, most, power / max(weighted.size, 1), smooth)
+
+
+def _least_noise(variance: FloatArray, unknowns: int) -> float:
+    """Power of the noise that is left beside a fit, at the low end of its chances."""
+    total = float(variance.sum())
+    entries = total**2 / max(float((variance**2).sum()), 1e-300)  # those that carry it
+    return total * (1 - unknowns / (2 * max(variance.size, 1)) - ONE_SIDED_95 * float(np.sqrt(2 / max(entries, 1.0))))
+
+
+def misfit_of_estimate(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:
+    """Of the reliable lines in the model's band."""
+    lines = weighted_lines((estimate,), model.band_hz)
+    modelled, every = model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
+    return misfit_of(lines, modelled, every, unknowns_of(model.order, *model.D.shape))
+
+
+def unknowns_of(order: int, p: int, m: int) -> int:
+    """Of a model of p outputs and m inputs: real numbers that no change of its state's coordinates alters."""
+    return order * (p + m) + p * m

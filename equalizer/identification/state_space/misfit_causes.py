@@ -1,0 +1,102 @@
+"""What a model's misfit comes from, as far as the evidence tells; where it does not, that is what is said."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from equalizer.identification.state_space.held_out import HeldOut
+from equalizer.identification.state_space.misfit import Misfit
+from equalizer.identification.state_space.relaxed_poles import SlowPole
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.signals.recording import Recording
+
+UNEXPLAINED = 1.5
+"""Cost above which a model is said to leave more than noise."""
+SMOOTH = 0.5
+"""Correlation of neighbouring lines from which what is left is taken for a linear answer."""
+HELD_OUT_BEYOND = 2.0
+"""Times its noise and the misfit of the fit: a held-out error above needs a cause of its own."""
+LEVEL_RATIO = 1.25
+"""Of the amplitudes of test and fit, from which they are two levels."""
+LIMIT_SAMPLES = 10
+"""Neighbouring pairs at one and the same extreme value, from which a sensor is said to be at its limit."""
+
+
+def fit_remarks(
+    cost: float, misfit: Misfit, relaxed: Sequence[SlowPole], bound_costs: bool, settings: IdentificationSettings
+) -> list[str]:
+    """Of the fit alone, in sentences without their full stop; the bound first, since it imitates all others."""
+    bound_s, order = settings.decay_s, settings.order
+    found = [
+        f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
+        f"than the ordinary bound of {bound_s:g} s allows; its pole was relaxed to a decay of {pole.decay_s:.2f} s"
+        for pole in relaxed
+    ]
+    if bound_costs:
+        found.append(
+            f"a pole sits on the bound of the decay, {bound_s:g} s, and without it the fit would improve beyond "
+            "noise: something rings longer, or the transient of a start is in a sweep without two counted periods; "
+            "record three periods of every sweep, or raise --longest-decay"
+        )
+    if cost > UNEXPLAINED and not bound_costs:
+        left = f"the model leaves {np.sqrt(cost):.2g} times the noise"
+        if misfit.smooth is None:
+            found.append(
+                f"{left}: the order {order} may be too low, or the device is not linear, as with friction; without two "
+                "counted periods of every sweep the lines do not tell which"
+            )
+        elif misfit.smooth >= SMOOTH:
+            found.append(
+                f"{left}, and what is left runs smoothly from line to line, as a linear answer does: the order {order} "
+                "may be too low; weak friction can do this too, and then a higher order does not help"
+            )
+        else:
+            found.append(
+                f"{left}, and what is left scatters from line to line, as no linear answer does: a higher order does "
+                "not help; the device is not linear (friction does this, clipping, a grip that moves), or it changed "
+                "from one sweep to the next; the lines do not tell which"
+            )
+    return found
+
+
+def held_out_remarks(
+    tested: HeldOut | None, cost: float, misfit: Misfit, recordings: Sequence[Recording]
+) -> tuple[str, ...]:
+    """Whole sentences about an error on the test that the fit does not explain."""
+    found = [f"The sensor is at its limit: {channel} stays at one extreme value." for channel in _at_limit(recordings)]
+    if tested is None:
+        return tuple(found)
+    expected = float(np.hypot(tested.noise or 0.0, misfit.error))
+    if tested.noise is None or tested.error <= HELD_OUT_BEYOND * expected or cost > UNEXPLAINED:
+        return tuple(found)
+    fit, test = (_amplitude(recordings, test=test) for test in (False, True))
+    if min(fit, test) > 0 and max(fit, test) > LEVEL_RATIO * min(fit, test):
+        found.append(
+            f"The test errs more than the fit, and was played at another level (up to {test:.3g} N, the fit {fit:.3g} "
+            "N): the answer may depend on the amplitude, as with friction."
+        )
+    else:
+        found.append(
+            "The test errs more than the fit explains, at the same level: the device differed between the two, or "
+            "its answer depends on the kind of signal; these recordings do not tell which."
+        )
+    return tuple(found)
+
+
+def _amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
+    found = [segment.amplitude for one in recordings for segment in one.segments if (segment.role == "test") is test]
+    return max(found, default=0.0)
+
+
+def _at_limit(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Channels that stay at one and the same largest or smallest value, again and again."""
+    found: dict[str, None] = {}
+    for recording in recordings:
+        samples = recording.response.samples
+        for column, channel in enumerate(recording.response.channels):
+            values = samples[np.isfinite(samples[:, column]), column]
+            for extreme in (values.max(initial=-np.inf), values.min(initial=np.inf)):
+                at = values == extreme
+                if np.sum(at[1:] & at[:-1]) >= LIMIT_SAMPLES and np.ptp(values) > 0 and not at.all():
+                    found[channel] = None
+    return tuple(found)

@@ -1,0 +1,107 @@
+"""What an order buys and costs: singular values, error on lines that were held out, multiplications per tick."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.state_space.candidates import best, candidate, subspace_starts
+from equalizer.identification.state_space.refusals import lines_or_refusal
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.warped_subspace import default_horizon, warped_subspace
+from equalizer.identification.state_space.weighted_lines import WeightedLines
+from equalizer.signals.signal import FloatArray
+
+VISIBLE = 2.0
+"""A singular value this far above the noise's is a state that the data show."""
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRow:
+    order: int
+    held_out_cost: float
+    """Squared error over noise variance on lines that the fit did not see: 1 plus what the model adds."""
+    held_out_error: float
+    """Root mean square relative to the response's; noise included."""
+    multiply_adds_per_tick: int
+    """One step of the state and one output, poles in blocks of two."""
+    dense_multiply_adds_per_tick: int
+    """The same with a full state matrix."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OrderReport:
+    singular_values: FloatArray
+    """Whitened, strongest first: about 1 where there is only noise."""
+    visible_order: int
+    """Singular values that stand clear of the noise."""
+    rows: tuple[OrderRow, ...]
+    """By rising order."""
+    held_out_noise: float
+    """What `held_out_error` cannot fall below."""
+    suggested_order: int
+    """The lowest whose error on held-out lines is not worse than the best one's by more than its standard error."""
+
+
+def order_report(
+    response: FrequencyResponse | Sequence[FrequencyResponse],
+    settings: IdentificationSettings | None = None,
+    orders: Sequence[int] = (10, 14, 16, 20, 26),
+    on_progress: Callable[[float], None] | None = None,
+) -> OrderReport:
+    """Every second line fits, the others test. Raises IdentificationRefused where the highest order has too few."""
+    settings = settings or IdentificationSettings()
+    tell = on_progress or (lambda _: None)
+    responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
+    highest = replace(settings, order=max(orders))
+    fit, test = (lines_or_refusal([one.of_lines(_every_second(one, k)) for one in responses], highest) for k in (0, 1))
+    per_line = []
+    rows = []
+    for number, order in enumerate(sorted(orders)):
+        tell(number / len(orders))
+        at_order = replace(settings, order=order)
+        found = best([candidate(start, fit, at_order) for start in subspace_starts(fit, at_order)])
+        modelled = found.fitted.response(test.z)
+        squared = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
+        per_line.append(squared)
+        error = float(np.sqrt((test.relative_error(modelled) ** 2).mean()))
+        p, m = test.response.shape[1:]
+        rows.append(
+            OrderRow(order, float(squared.mean()), error, multiply_adds(order, p, m), dense_multiply_adds(order, p, m))
+        )
+    tell(1.0)
+    whole = lines_or_refusal(responses, highest)
+    subspace = warped_subspace(whole, default_horizon(max(orders), whole.response.shape[1]), settings.centre_hz)
+    values = subspace.singular_values
+    return OrderReport(
+        values, int((values > VISIBLE).sum()), tuple(rows), _noise_of(test), rows[_suggested(per_line)].order
+    )
+
+
+def multiply_adds(order: int, outputs: int, inputs: int) -> int:
+    """Per tick, poles in blocks of two: three for a block's own poles, and B, C and D."""
+    return 3 * order // 2 + order * (outputs + inputs) + outputs * inputs
+
+
+def dense_multiply_adds(order: int, outputs: int, inputs: int) -> int:
+    return order**2 + order * (outputs + inputs) + outputs * inputs
+
+
+def _every_second(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.asarray(np.arange(len(response)) % 2 == first)
+
+
+def _noise_of(lines: WeightedLines) -> float:
+    """Relative like `WeightedLines.relative_error`."""
+    return float(np.sqrt((1 / lines.weight**2).sum() / (np.abs(lines.response) ** 2).sum()))
+
+
+def _suggested(per_line: Sequence[FloatArray]) -> int:
+    """Compared line by line, so that the noise both models meet drops out of the comparison."""
+    lowest = int(np.argmin([cost.mean() for cost in per_line]))
+    for number, cost in enumerate(per_line):
+        worse = cost - per_line[lowest]
+        if worse.mean() <= worse.std() / np.sqrt(len(worse)):
+            return number
+    return lowest

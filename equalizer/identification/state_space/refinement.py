@@ -1,0 +1,133 @@
+"""Maximum-likelihood fit of a model to lines with known noise, by Levenberg-Marquardt.
+
+B and D enter linearly and are solved for at every step (variable projection, Golub and Pereyra 1973, with Kaufman's
+Jacobian), so the search is over the poles and the output matrix only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.state_space.input_matrices import by_input, input_matrices, weighted_regressors
+from equalizer.identification.state_space.modal_form import ModalForm
+from equalizer.identification.state_space.stable_poles import Radius, bounded_blocks
+from equalizer.identification.state_space.weighted_lines import WeightedLines
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+LEAST_GAIN = 1e-7
+"""Relative fall of the cost over a step that is not worth another step."""
+
+UNSEEN = 1e-13
+"""Share of a state's column that is its own, below which it counts as not there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedForm:
+    """A modal form with its B and D."""
+
+    form: ModalForm
+    B: FloatArray
+    """(n, m)"""
+    D: FloatArray
+    """(p, m)"""
+
+    def response(self, z: ComplexArray) -> ComplexArray:
+        """(lines, p, m)"""
+        return np.asarray(self.form.from_states(z) @ self.B + self.D, dtype=np.complex128)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """The cost at one choice of poles and outputs, and what a step from there needs."""
+
+    form: ModalForm
+    basis: FloatArray
+    """(m, rows, n + p): orthonormal; what B and D can explain."""
+    solved: FloatArray
+    """(m, n + p): B and D of each input."""
+    residual: FloatArray
+    """(m, rows): model minus measured, weighted."""
+    cost: float
+
+
+def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: int = 60) -> FittedForm:
+    """The nearest fit of lowest cost whose poles stay within the radius, of all blocks or one for each."""
+    point = _point(form, lines)
+    damping, growth = 1e-3, 2.0
+    for _ in range(most_steps):
+        jacobian = _jacobian(point, lines)
+        normal = np.einsum("jra,jrb->ab", jacobian, jacobian, optimize=True)
+        gradient = np.einsum("jra,jr->a", jacobian, point.residual, optimize=True)
+        while True:
+            step = _damped_step(normal, gradient, damping)
+            trial = _point(_moved(point.form, step, radius), lines)
+            if trial.cost < point.cost or damping > 1e12:
+                break
+            damping, growth = damping * growth, growth * 2
+        gained = point.cost - trial.cost
+        if not gained > 0:
+            break
+        expected = -float(step @ (2 * gradient + normal @ step))
+        damping *= max(1 / 3, 1 - (2 * min(gained / expected, 1.5) - 1) ** 3) if expected > 0 else 1.0
+        growth = 2.0
+        small = gained < LEAST_GAIN * point.cost
+        point = trial
+        if small:
+            break
+    n = form.C.shape[1]
+    return FittedForm(point.form, point.solved[:, :n].T, point.solved[:, n:].T)
+
+
+def fitted(form: ModalForm, lines: WeightedLines) -> FittedForm:
+    """Without a search: B and D for the form as it is."""
+    return FittedForm(form, *input_matrices(form, lines))
+
+
+def _damped_step(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+    scale = np.diag(normal) + 1e-300
+    root = np.sqrt(scale)
+    scaled = normal / root[:, None] / root
+    scaled[np.diag_indices_from(scaled)] += damping
+    return np.asarray(-np.linalg.solve(scaled, gradient / root) / root, dtype=np.float64)
+
+
+def _moved(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
+    blocks = len(form.a)
+    a, b = bounded_blocks(form.a + step[:blocks], form.b + step[blocks : 2 * blocks], radius)
+    return ModalForm(a, b, form.C + step[2 * blocks :].reshape(form.C.shape))
+
+
+def _point(form: ModalForm, lines: WeightedLines) -> _Point:
+    phi = weighted_regressors(form, lines)
+    size = np.linalg.norm(phi, axis=1, keepdims=True)
+    size[size == 0] = 1.0
+    basis, triangle = np.linalg.qr(phi / size)
+    measured = by_input(lines.weight * lines.response)
+    along = np.einsum("jrs,jr->js", basis, measured)
+    residual = np.einsum("jrs,js->jr", basis, along) - measured
+    # A state that nothing shows (its column is zero, or another's) would stop the fit here.
+    unseen = np.abs(np.diagonal(triangle, axis1=1, axis2=2)) < UNSEEN
+    triangle = triangle + np.eye(triangle.shape[1]) * np.where(unseen, 1.0, 0.0)[:, None]
+    solved = np.linalg.solve(triangle, along[:, :, None])[:, :, 0] / size[:, 0]
+    return _Point(form, basis, solved, residual, float((residual**2).sum()))
+
+
+def _jacobian(point: _Point, lines: WeightedLines) -> FloatArray:
+    """(m, rows, parameters): poles a, then b, then C row by row; what B and D can take up is taken off."""
+    form, z = point.form, lines.z
+    p, n = form.C.shape
+    blocks = n // 2
+    B = point.solved[:, :n].T
+    seen, driven = form.from_states(z), form.to_states(z, B)
+    m = B.shape[1]
+    rows = np.zeros((m, len(z), p, 2 * blocks + p * n), dtype=np.complex128)
+    both = np.einsum("lis,lsj->jlis", seen, driven)
+    rows[..., :blocks] = both[..., ::2] + both[..., 1::2]
+    rows[..., blocks : 2 * blocks] = np.einsum("lis,lsj->jlis", seen[:, :, 1::2], driven[:, ::2])
+    for i in range(p):
+        rows[:, :, i, 2 * blocks + i * n : 2 * blocks + (i + 1) * n] = driven.transpose(2, 0, 1)
+    rows *= lines.weight.transpose(2, 0, 1)[..., None]
+    flat = rows.reshape(m, -1, rows.shape[-1])
+    real = np.concatenate([flat.real, flat.imag], axis=1)
+    return np.asarray(real - point.basis @ (point.basis.transpose(0, 2, 1) @ real), dtype=np.float64)

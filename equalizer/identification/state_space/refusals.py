@@ -1,0 +1,131 @@
+"""When no model is made of the data, and what would do."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.warped_subspace import default_horizon
+from equalizer.identification.state_space.weighted_lines import WeightedLines, weighted_lines
+
+LEAST_SIGNAL_TO_NOISE = 2.0
+"""Of amplitudes, the typical line's strongest entry."""
+LARGEST_GAP = 0.1
+"""Of the band, in octaves, without a line..."""
+SPACINGS = 3.0
+"""...if it is also this many times the usual step from line to line."""
+
+
+class IdentificationRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
+    """The data do not carry a model; the text says what would do."""
+
+
+def lines_or_refusal(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> WeightedLines:
+    """The band's lines, if a model can be fitted to them. Raises IdentificationRefused."""
+    _refuse_what_does_not_belong_together(responses)
+    high, rate = settings.band_hz[1], responses[0].sample_rate_hz
+    if high >= rate / 2:
+        raise IdentificationRefused(
+            f"the band ends at {high:g} Hz, but at {rate:g} samples per second nothing is known "
+            f"from {rate / 2:g} Hz on; choose a lower end or record faster"
+        )
+    _refuse_unexcited_inputs(responses, settings)
+    _refuse_dead_outputs(responses, settings)
+    lines = weighted_lines(responses, settings.fitted_hz)
+    _refuse_an_empty_band(responses, lines, settings)
+    _refuse_noise(lines, settings)
+    _refuse_too_high_an_order(lines, settings)
+    return lines
+
+
+def _refuse_what_does_not_belong_together(responses: Sequence[FrequencyResponse]) -> None:
+    if not responses:
+        raise IdentificationRefused("no frequency response was given; estimate one from a recorded sweep first")
+    first = responses[0]
+    for other in responses[1:]:
+        for name in ("sample_rate_hz", "input_channels", "output_channels", "input_unit", "output_unit"):
+            if getattr(other, name) != getattr(first, name):
+                raise IdentificationRefused(
+                    f"the records differ in {name} ({getattr(first, name)} and {getattr(other, name)}); "
+                    f"identify each by itself or convert one"
+                )
+
+
+def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
+    known = [np.isfinite(estimate.within(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses]
+    missing = ~np.any(known, axis=0)
+    names = ", ".join(name for name, is_missing in zip(responses[0].input_channels, missing, strict=True) if is_missing)
+    if names and not missing.all():
+        raise IdentificationRefused(
+            f"nothing tells what {names} does: as many experiments as inputs are needed, "
+            f"{len(missing)} here; record one sweep per input"
+        )
+
+
+def _refuse_dead_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
+    answers = [np.nan_to_num(estimate.within(*settings.band_hz).response) for estimate in responses]
+    dead = ~np.any([(answer != 0).any(axis=(0, 2)) for answer in answers], axis=0)
+    names = ", ".join(name for name, is_dead in zip(responses[0].output_channels, dead, strict=True) if is_dead)
+    if names and any(len(answer) for answer in answers):
+        raise IdentificationRefused(
+            f"nothing at all comes from {names}, not even noise: check the sensor and record again"
+        )
+
+
+def _refuse_an_empty_band(
+    responses: Sequence[FrequencyResponse], lines: WeightedLines, settings: IdentificationSettings
+) -> None:
+    low, high = settings.band_hz
+    measured = sum(len(estimate.within(low, high)) for estimate in responses)
+    if not len(lines):
+        reasons = "; ".join(dict.fromkeys(remark for estimate in responses for remark in estimate.remarks))
+        which = "none of its lines is reliable" if measured else "no line was excited there"
+        raise IdentificationRefused(
+            f"no data in {low:g} to {high:g} Hz: {which}{f' ({reasons})' if reasons else ''}; "
+            f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz"
+        )
+    _refuse_a_hole(lines, settings)
+
+
+def _refuse_a_hole(lines: WeightedLines, settings: IdentificationSettings) -> None:
+    low, high = settings.band_hz
+    ends = np.clip(np.concatenate([[low], lines.frequency_hz, [high]]), low, high)
+    octaves, steps = np.diff(np.log2(ends)), np.diff(ends)
+    usual = float(np.median(np.diff(lines.frequency_hz))) if len(lines) > 1 else 0.0
+    widest = int(np.argmax(octaves))
+    if octaves[widest] <= LARGEST_GAP or steps[widest] <= SPACINGS * usual:
+        return
+    below, above = ends[widest], ends[widest + 1]
+    left, right = max((low, below), (above, high), key=lambda side: float(side[1] / side[0]))
+    raise IdentificationRefused(
+        f"between {below:.3g} and {above:.3g} Hz no line can be used, but the band is {low:g} to {high:g} Hz; "
+        f"record a sweep from {low / 1.1:.3g} to {high * 1.06:.3g} Hz, or choose a band that the lines cover "
+        f"({left:.3g} to {right:.3g} Hz)"
+    )
+
+
+def _refuse_noise(lines: WeightedLines, settings: IdentificationSettings) -> None:
+    strongest = (lines.weight * np.abs(lines.response)).max(axis=(1, 2))
+    ratio = float(np.median(strongest))
+    if ratio < LEAST_SIGNAL_TO_NOISE * np.sqrt(np.log(lines.response[0].size) + 1):
+        low, high = settings.band_hz
+        raise IdentificationRefused(
+            f"the band {low:g} to {high:g} Hz holds noise only: its typical line stands {ratio:.1f} times above the "
+            f"noise; excite it more strongly or for longer (twice the time gives 3 dB)"
+        )
+
+
+def _refuse_too_high_an_order(lines: WeightedLines, settings: IdentificationSettings) -> None:
+    p, m = lines.response.shape[1:]
+    n = settings.order
+    free = n * (p + m) + p * m
+    rows = default_horizon(n, p) + max(settings.longer_horizons)
+    needed = max(-(-free // (p * m)), -(-rows * (p + m) // (2 * m)))
+    if len(lines) < needed:
+        spacing = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / max(len(lines) - 1, 1)
+        longer = f", or record longer periods (now {1 / spacing:.3g} s)" if spacing > 0 else ""
+        raise IdentificationRefused(
+            f"order {n} has {free} unknowns and needs at least {needed} lines, but the band holds {len(lines)}; "
+            f"choose a lower order{longer}"
+        )

@@ -1,0 +1,78 @@
+"""Poles and output shapes from a frequency response, by subspace identification in the frequency domain.
+
+After McKelvey, Akçay and Ljung (1996), with two changes that noisy data need: the unit circle is turned by an
+all-pass map until the band fills it, and block rows are made white before their singular values are compared. The
+horizon is short on purpose: the noise of a long one swamps the order that is looked for.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.state_space.modal_form import ModalForm, from_poles
+from equalizer.identification.state_space.stable_poles import reflected
+from equalizer.identification.state_space.weighted_lines import WeightedLines
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subspace:
+    """What the lines can see, strongest first, before an order is chosen."""
+
+    directions: FloatArray
+    """(horizon p, horizon p): columns span the extended observability matrix, noise coloured back."""
+    singular_values: FloatArray
+    """(horizon p,) of the whitened data: about 1 and falling slowly where there is only noise."""
+    outputs: int
+    warp: float
+
+
+def default_horizon(order: int, outputs: int) -> int:
+    """Block rows: just enough to see the order, and a few to average over."""
+    return -(-order // outputs) + 3
+
+
+def warp_coefficient(centre_hz: float, sample_rate_hz: float) -> float:
+    """c of zeta = (z - c) / (1 - c z), which puts the centre at a quarter turn."""
+    half = np.pi * centre_hz / sample_rate_hz
+    return float((1 - np.tan(half)) / (1 + np.tan(half)))
+
+
+def warped_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Subspace:
+    c = warp_coefficient(centre_hz, lines.sample_rate_hz)
+    zeta = (lines.z - c) / (1 - c * lines.z)
+    powers = zeta[:, None] ** np.arange(horizon)
+    p, m = lines.response.shape[1:]
+    # Noise is taken as a size per output times one per line and input: then columns can be scaled to equal noise.
+    deviation = 1 / lines.weight
+    of_output = np.exp(np.log(deviation).mean(axis=(0, 2)))
+    of_column = np.exp(np.log(deviation / of_output[:, None]).mean(axis=1))
+    scaled = lines.response / of_output[:, None] / of_column[:, None, :]
+    entered = np.einsum("lq,lj,jk->qklj", powers, 1 / of_column, np.eye(m)).reshape(horizon * m, -1)
+    came_out = np.einsum("lq,lij->qilj", powers, scaled).reshape(horizon * p, -1)
+    unexplained = _without_inputs(entered, came_out)
+    noise = np.kron(np.linalg.cholesky((powers.T @ powers.conj()).real / len(zeta)), np.eye(p))
+    vectors, values, _ = np.linalg.svd(np.linalg.solve(noise, unexplained))
+    coloured = np.tile(of_output, horizon)[:, None] * (noise @ vectors)
+    return Subspace(coloured, values / np.sqrt(len(zeta) * m), p, c)
+
+
+def _without_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatArray:
+    """(horizon p, horizon p): the outputs' rows with all that the inputs' rows explain taken off."""
+    stacked = np.concatenate([entered, came_out])
+    real = np.concatenate([stacked.real, stacked.imag], axis=1)
+    upper = np.asarray(np.linalg.qr(real.T, mode="r"))
+    return np.asarray(upper[len(entered) :, len(entered) :].T, dtype=np.float64)
+
+
+def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:
+    """A model's poles (all within the radius) and outputs, of the `order` strongest directions."""
+    observed = subspace.directions[:, :order]
+    p, c = subspace.outputs, subspace.warp
+    size = np.linalg.norm(observed.reshape(-1, p, order), axis=(0, 2))
+    evened = observed / np.tile(size, len(observed) // p)[:, None]
+    shifted = np.linalg.lstsq(evened[:-p], evened[p:], rcond=None)[0]
+    values, vectors = np.linalg.eig(shifted)
+    # B is fitted afterwards, so what the map does to C may be left to it.
+    return from_poles(reflected((values + c) / (1 + c * values), radius), observed[:p] @ vectors)

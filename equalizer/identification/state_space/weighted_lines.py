@@ -1,0 +1,105 @@
+"""The lines that a model is fitted to: where they lie, what was measured there, and how much each number counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+LEAST_NOISE = 1e-9
+"""Of the strongest entry: what a measurement is trusted to at most, so that noise-free data leave weights finite."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeightedLines:
+    """Measured responses, each with the inverse of its standard error as weight."""
+
+    frequency_hz: FloatArray
+    """(lines,), rising; a frequency measured twice stands twice."""
+    response: ComplexArray
+    """(lines, outputs, inputs)"""
+    weight: FloatArray
+    """(lines, outputs, inputs), 1 / standard error."""
+    sample_rate_hz: float
+
+    @property
+    def z(self) -> ComplexArray:
+        """The lines on the unit circle, (lines,)."""
+        return np.asarray(np.exp(2j * np.pi * self.frequency_hz / self.sample_rate_hz), dtype=np.complex128)
+
+    def __len__(self) -> int:
+        return len(self.frequency_hz)
+
+    def cost(self, modelled: ComplexArray) -> float:
+        """Twice the negative log-likelihood of a model's responses (lines, outputs, inputs), up to a constant."""
+        return float((np.abs(self.weight * (modelled - self.response)) ** 2).sum())
+
+    def relative_error(self, modelled: ComplexArray) -> FloatArray:
+        """(lines,): Frobenius norm of the difference to the measured response over the latter's root mean square."""
+        size = np.sqrt((np.abs(self.response) ** 2).sum(axis=(1, 2)).mean())
+        return np.asarray(np.linalg.norm(modelled - self.response, axis=(1, 2)) / size, dtype=np.float64)
+
+
+def weighted_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
+    """All reliable lines of the band, of all estimates together. A line's noise, where it is not told, is read from
+    how far it lies off its neighbours."""
+    inside = [estimate.within(*band_hz) for estimate in responses]
+    chosen = [
+        estimate.of_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2))) for estimate in inside
+    ]
+    chosen = [estimate for estimate in chosen if len(estimate)]
+    if not chosen:
+        p, m = len(responses[0].output_channels), len(responses[0].input_channels)
+        return WeightedLines(
+            np.empty(0), np.empty((0, p, m), complex), np.empty((0, p, m)), responses[0].sample_rate_hz
+        )
+    frequency = np.concatenate([estimate.frequency_hz for estimate in chosen])
+    rising = np.argsort(frequency, kind="stable")
+    response = np.concatenate([estimate.response for estimate in chosen])[rising]
+    variance = np.concatenate([_told_or_seen(estimate) for estimate in chosen])[rising]
+    least = LEAST_NOISE * float(np.abs(response).max())
+    weight = 1 / np.sqrt(np.maximum(variance, least**2))
+    return WeightedLines(frequency[rising], response, weight, chosen[0].sample_rate_hz)
+
+
+def _told_or_seen(estimate: FrequencyResponse) -> FloatArray:
+    told = estimate.noise_variance
+    return np.where(np.isfinite(told), told, scatter(estimate.response))
+
+
+def scatter(response: ComplexArray) -> FloatArray:
+    """Noise variance (lines, p, m) as second differences show it, averaged over all lines of an entry."""
+    if len(response) < 3:
+        return np.abs(response) ** 2
+    second = np.diff(response, n=2, axis=0)
+    # A middle value rather than a mean: a sharp resonance is no noise. ln 2 is the median of a unit exponential.
+    typical = np.median(np.abs(second) ** 2, axis=0) / (6 * np.log(2))
+    return np.asarray(np.broadcast_to(typical, response.shape), dtype=np.float64)
+
+
+def binned(lines: WeightedLines, bins: Sequence[slice], about: ComplexArray, centres: ComplexArray) -> WeightedLines:
+    """Each bin one line at its middle. Averaged is the difference to a model that is nearly right (`about`: its
+    responses on `lines`, `centres`: at the bins' middles), so that a resonance within a bin is not blunted."""
+    power = lines.weight**2
+    difference = power * (lines.response - about)
+    weight = np.array([power[part].sum(axis=0) for part in bins])
+    mean = np.array([difference[part].sum(axis=0) for part in bins]) / weight
+    return replace(lines, frequency_hz=bin_centres_hz(lines, bins), response=centres + mean, weight=np.sqrt(weight))
+
+
+def bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
+    return np.array([lines.frequency_hz[part].mean() for part in bins])
+
+
+def bins_of(lines: WeightedLines, smallest: int, octave_share: float) -> tuple[slice, ...]:
+    """Neighbouring lines in groups of `smallest`, or as many as lie in that share of an octave."""
+    edges, frequency = [0], lines.frequency_hz
+    while edges[-1] < len(lines):
+        start = edges[-1]
+        wide = int(np.searchsorted(frequency, frequency[start] * 2**octave_share))
+        edges.append(min(max(start + smallest, wide), len(lines)))
+    return tuple(slice(start, stop) for start, stop in pairwise(edges))

@@ -1,0 +1,91 @@
+"""The low band: a slow motion is planned, and a rigid model says which force moves the device along it.
+
+The handle is rendered in a closed loop there: springs, walls and their forces answer to where it is. Playback is
+superposed on that, so what is added is the model's force along the planned motion less what the rendered spring will
+do along it by itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.bands.rigid_model import RigidModel
+from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
+
+CORNER_HZ = 0.5
+"""Below it less and less is played: an acceleration that lasts would take the handle out of its workspace."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlowMotion:
+    """Each (N, m), and consistent: velocity and acceleration are the position's derivatives."""
+
+    position_m: FloatArray
+    velocity_m_s: FloatArray
+    acceleration: FloatArray
+    """m/s²: what is really played of the wanted one."""
+
+    @property
+    def travel_m(self) -> float:
+        """Farthest from the place it starts at."""
+        return float(np.linalg.norm(self.position_m, axis=1).max(initial=0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LowBandForces:
+    total: FloatArray
+    """(N, m), N: what must enter the device along the motion"""
+    superposed: FloatArray
+    """(N, m), N: what is added to the rendered spring's force to give `total`"""
+    motion: SlowMotion
+
+
+def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
+    """wanted: (N, m), m/s², known beforehand and quiet at both ends.
+
+    Two-sided, so that there is no phase error: x = a / (s² - w²), an exponential kernel that decays both ways. Of the
+    wanted acceleration f² / (f² + corner²) is played.
+    """
+    a, corner = np.asarray(wanted, dtype=np.float64), _checked_corner(corner_hz, sample_rate_hz)
+    run = int(np.ceil(8 * sample_rate_hz / corner))
+    padded = np.pad(a, ((run, run), (0, 0)))
+    s = 2j * np.pi * np.fft.rfftfreq(len(padded), 1 / sample_rate_hz)[:, None]
+    position = np.fft.rfft(padded, axis=0) / (s**2 - corner**2)
+    parts = [np.fft.irfft(part, len(padded), axis=0)[run:][: len(a)] for part in (position, s * position)]
+    return SlowMotion(parts[0], parts[1], a + corner**2 * parts[0])
+
+
+def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
+    """wanted: (N, m), m/s², from rest at the first row, as after a contact. x = a / (s + w)²: it leads by
+    2 atan(corner / f)."""
+    a, corner = np.asarray(wanted, dtype=np.float64), _checked_corner(corner_hz, sample_rate_hz)
+    c = 2 * sample_rate_hz
+    integral = np.array([1.0, 1.0]) / (c + corner), np.array([1.0, (corner - c) / (c + corner)])
+    velocity_like = lfilter(*integral, a, axis=0)
+    position = lfilter(*integral, velocity_like, axis=0)
+    # s / (s + w) = 1 - w / (s + w), so that the three are derivatives of each other to rounding.
+    velocity = velocity_like - corner * position
+    return SlowMotion(position, velocity, a - 2 * corner * velocity_like + corner**2 * position)
+
+
+def low_band_forces(
+    motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float, spring: VirtualSpring = NO_SPRING
+) -> LowBandForces:
+    """Inverse dynamics along the motion, early by the rigid model's delay: to first order, which is enough where the
+    band is slow."""
+    early = rigid.delay_s + 0.5 / sample_rate_hz
+    x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
+    later_x, later_v = x + early * v, v + early * a
+    later_a = a + early * np.gradient(a, 1 / sample_rate_hz, axis=0) if len(a) > 1 else a
+    total = later_a @ rigid.mass_kg.T + later_v @ rigid.damping_n_s_per_m.T + later_x @ rigid.stiffness_n_per_m.T
+    rendered = -(spring.stiffness_n_per_m * x + spring.damping_n_s_per_m * v)
+    return LowBandForces(total, total - rendered, motion)
+
+
+def _checked_corner(corner_hz: float, sample_rate_hz: float) -> float:
+    """In rad/s."""
+    if not 0 < corner_hz < sample_rate_hz / 2:
+        raise ValueError(f"corner_hz is {corner_hz}; it must be above zero and below half the sample rate")
+    return 2 * np.pi * corner_hz

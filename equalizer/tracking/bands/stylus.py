@@ -1,0 +1,64 @@
+"""A separate actuator at the stylus: the highest part of what is wanted, off the motors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.bands.high_band import WEIGHT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StylusActuator:
+    """Raises ValueError where its numbers cannot be."""
+
+    frequency_hz: FloatArray
+    """(lines,), rising: where its response was measured. Nothing is sent to it outside."""
+    response: ComplexArray
+    """(lines,): acceleration of the stylus (m/s²) per unit of its command"""
+    from_hz: float
+    """It takes over here, at half amplitude; the motors play what is below."""
+    limit: float
+    """Largest command, in its unit."""
+    transition_hz: float = 20.0
+
+    def __post_init__(self) -> None:
+        if np.shape(self.response) != np.shape(self.frequency_hz):
+            raise ValueError(
+                f"response has shape {np.shape(self.response)}, but there are {len(self.frequency_hz)} frequencies"
+            )
+        for name in ("from_hz", "limit", "transition_hz"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be a positive number")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StylusShare:
+    command: FloatArray
+    """(N,), in the actuator's unit"""
+    played: FloatArray
+    """(N,), m/s²: what the command gives, by the response"""
+    motors: FloatArray
+    """(N,), m/s²: what is left to the motors. With `taken` it adds up to what is wanted."""
+    taken: FloatArray
+    """(N,), m/s²"""
+
+
+def share_with_stylus(wanted: FloatArray, sample_rate_hz: float, stylus: StylusActuator) -> StylusShare:
+    """wanted: (N,), one degree of freedom, quiet at both ends. A command above the actuator's limit is scaled down as
+    a whole, and what it then leaves goes back to the motors."""
+    n = len(wanted)
+    lines = np.fft.rfftfreq(n, 1 / sample_rate_hz)
+    rising = np.clip((lines - stylus.from_hz) / stylus.transition_hz + 0.5, 0, 1)
+    known = (lines >= stylus.frequency_hz[0]) & (lines <= stylus.frequency_hz[-1])
+    part = np.fft.rfft(wanted) * np.sin(np.pi / 2 * rising) ** 2 * known
+    length = np.interp(lines, stylus.frequency_hz, np.abs(stylus.response))
+    answer = length * np.exp(1j * np.interp(lines, stylus.frequency_hz, np.unwrap(np.angle(stylus.response))))
+    command = part * answer.conj() / (np.abs(answer) ** 2 + WEIGHT)
+    peak = float(np.abs(np.fft.irfft(command, n)).max(initial=0.0))
+    scale = min(1.0, stylus.limit / peak) if peak > 0 else 1.0
+    taken = scale * np.fft.irfft(part, n)
+    return StylusShare(
+        scale * np.fft.irfft(command, n), scale * np.fft.irfft(command * answer, n), wanted - taken, taken
+    )

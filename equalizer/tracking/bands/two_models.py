@@ -1,0 +1,184 @@
+"""Two models of one place, one narrow and exact, one wide: three bands for what is wanted, as a table row by row.
+
+Below the narrow model's band a rigid one that is fitted to its lowest lines, in its band the narrow model, above it
+the wide one's response along one direction. The run-in and run-out of the outer bands are no rows of a table and are
+cut off; the middle band is solved for the rows alone, and for what the cut forces leave to it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.bands.banded_equalizer import BandedEqualizer, HighBand, LowBand
+from equalizer.tracking.bands.banded_forces import BandedForces
+from equalizer.tracking.bands.high_band import ModelledResponse, delivered
+from equalizer.tracking.bands.rigid_model import RigidModel, fit_rigid_model
+from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
+from equalizer.tracking.feedforward.feedforward import (
+    EDGE_ROOM_HZ,
+    LEAKED,
+    Feedforward,
+    FeedforwardSettings,
+    solved_causally,
+    within_band,
+)
+from equalizer.tracking.feedforward.periodic_inverse import check_wanted
+from equalizer.tracking.lqr.limits import require_within
+from equalizer.tracking.lqr.padding import answer, band_error
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, augmented
+
+RIGID_OCTAVES = 0.6
+"""Above the lower end of the narrow band, where the rigid model is fitted: below the first resonance."""
+RIGID_LINES = 30
+LEAST_REACH = 2.0
+"""Of the wider band beyond the narrower: a high band of less than an octave, one direction for all of it, is none."""
+BINS_PER_OCTAVE = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoModels:
+    """Raises ValueError where they are not one within the other, with room for a band above."""
+
+    narrow: IdentifiedModel
+    wide: IdentifiedModel
+
+    def __post_init__(self) -> None:
+        (low, high), (lowest, highest) = self.narrow.band_hz, self.wide.band_hz
+        if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * EDGE_ROOM_HZ):
+            raise ValueError(
+                f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz do not add up: the wider one must "
+                f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
+                "above 2 Hz"
+            )
+        told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
+        if told[0] != told[1] and None not in told[0] + told[1]:
+            raise ValueError(
+                f"the narrower one was made {_made(self.narrow)}, the wider one {_made(self.wide)}: two bands must be "
+                "of one device, held and driven alike"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BandFacts:
+    edges_hz: tuple[float, float]
+    cut_error: float
+    """In the middle band, were run-in and run-out only cut off."""
+    whole_error: float
+    """Likewise, were they played."""
+    level_error: float | None
+    """Of the high band's level, by sixths of an octave, of the rows alone; None where nothing is wanted there."""
+    direction: tuple[float, ...]
+    """Of the high band's force."""
+    travel_m: float
+    """How far the low band moves the handle."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BandedFeedforward:
+    feedforward: Feedforward
+    """`error`: in the middle band, by the narrow model."""
+    facts: BandFacts
+
+
+def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
+    """Raises ForceLimitError above the cap, TrackingError where nothing is wanted in the middle band or the cap leaves
+    no solution, ValueError for a signal or a weight that does not fit."""
+    check_wanted(models.narrow, wanted)
+    check_wanted(models.wide, wanted)
+    equalizer, rate_hz = banded_equalizer(models, settings.weight), wanted.sample_rate_hz
+    below = _below(wanted.samples, models.wide)
+    played = equalizer.play(below)
+    rows = played.rows_of_wanted(len(wanted))
+    if not np.linalg.norm(played.bands.middle[rows]) > LEAKED * np.linalg.norm(wanted.samples):
+        low, high = models.narrow.band_hz
+        raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the narrower model's band")
+    problem = augmented(models.narrow, TrackingWeights(settings.weight))
+    others = (played.by_band[0] + played.by_band[2])[rows]
+    left = within_band(models.narrow, below - answer(problem, others))
+    middle, loss = solved_causally(problem, left, settings, others)
+    forces = middle + others
+    predicted = answer(problem, forces)
+    slow = np.zeros_like(below) if played.motion is None else played.motion.acceleration[rows]
+    inside = slow + (played.bands.middle + played.bands.high)[rows]
+    found = Feedforward(
+        forces=Signal(forces, rate_hz, "force", "N", models.narrow.input_channels),
+        wanted=inside,
+        predicted=predicted,
+        error=band_error(below, predicted, rate_hz, models.narrow.band_hz),
+        left_out=float(np.linalg.norm(wanted.samples - inside) / np.linalg.norm(wanted.samples)),
+        peaks=require_within(forces, settings.cap_n, rate_hz),
+        loss=loss,
+    )
+    return BandedFeedforward(found, _facts(models, equalizer, played, below, forces))
+
+
+def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
+    low, high = models.narrow.band_hz
+    edges = BandEdges(low - EDGE_ROOM_HZ, high + EDGE_ROOM_HZ)
+    return BandedEqualizer(
+        models.narrow,
+        LinearPhaseSplit(edges, models.narrow.sample_rate_hz),
+        LowBand(rigid_part(models.narrow)),
+        HighBand(ModelledResponse(models.wide)),
+        TrackingWeights(weight),
+    )
+
+
+def rigid_part(model: IdentifiedModel) -> RigidModel:
+    low, high = model.band_hz
+    lines_hz = np.geomspace(low, min(high, low * 2**RIGID_OCTAVES), RIGID_LINES)
+    return fit_rigid_model(lines_hz, model_response(model, lines_hz), model.sample_rate_hz)
+
+
+def level_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float | None:
+    """Of the power of all axes together, by sixths of an octave: above the limit of direction perception nothing else
+    is felt. None where nothing is wanted in the band."""
+    length = 2 * len(wanted)
+    lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
+    count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
+    bins = np.digitize(lines_hz, np.geomspace(*band_hz, count + 1))
+    levels = []
+    for samples in (wanted, played):
+        power = (np.abs(np.fft.rfft(samples, length, axis=0)) ** 2).sum(axis=1)
+        levels.append(np.sqrt(np.bincount(bins, power, minlength=count + 2)))
+    size = float(np.linalg.norm(levels[0][1:-1]))
+    if size <= LEAKED * float(np.linalg.norm(levels[0])):
+        return None
+    return float(np.linalg.norm((levels[1] - levels[0])[1:-1]) / size)
+
+
+def _below(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
+    """Without what lies above the wide band."""
+    edge_hz = wide.band_hz[1] + EDGE_ROOM_HZ
+    if edge_hz + EDGE_ROOM_HZ >= wide.sample_rate_hz / 2:
+        return wanted
+    bands = LinearPhaseSplit(BandEdges(None, edge_hz), wide.sample_rate_hz).split(wanted)
+    return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
+
+
+def _facts(
+    models: TwoModels, equalizer: BandedEqualizer, played: BandedForces, wanted: FloatArray, forces: FloatArray
+) -> BandFacts:
+    edges, rows, band_hz = equalizer.split.edges, played.rows_of_wanted(len(wanted)), models.narrow.band_hz
+    rate_hz, problem = models.narrow.sample_rate_hz, augmented(models.narrow, equalizer.weights)
+    whole, cut = answer(problem, played.entering)[rows], answer(problem, played.entering[rows])
+    upper_hz = band_hz[1] + 2 * EDGE_ROOM_HZ, models.wide.band_hz[1]
+    above = delivered(forces, rate_hz, ModelledResponse(models.wide))
+    return BandFacts(
+        edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
+        cut_error=band_error(wanted, cut, rate_hz, band_hz),
+        whole_error=band_error(wanted, whole, rate_hz, band_hz),
+        level_error=level_error(wanted, above, rate_hz, upper_hz),
+        direction=() if played.high is None else tuple(float(part) for part in played.high.direction),
+        travel_m=0.0 if played.motion is None else played.motion.travel_m,
+    )
+
+
+def _made(model: IdentifiedModel) -> str:
+    """In words, of what the provenance says."""
+    held = "in a hand" if "held" in str(model.provenance.get("hand")) else "without a hand"
+    spring = "with" if model.provenance.get("input") == "excitation" else "without"
+    return f"{held} and {spring} the spring in it"

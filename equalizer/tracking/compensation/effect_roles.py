@@ -1,0 +1,66 @@
+"""What a feedforward can do about each effect: compensate it, count it in the timing, or leave it, and then why."""
+
+import numpy as np
+
+from equalizer.effects.discovered_law import axis_names
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.tracking.compensation.known_forces import LAWS
+from equalizer.tracking.compensation.law_forces import why_law_stays
+
+IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
+
+LEFT_ALONE = {
+    "viscous_damping": IN_MODEL,
+    "added_mass": IN_MODEL,
+    "extra_mode": IN_MODEL,
+    "hand_impedance": IN_MODEL,
+    "constant_force": "the spring carries it before anything is played, and a constant has nothing in the band",
+    "gravity_torque": "over a small motion it is a spring, which the identified model has",
+    "cogging": "amplitude and pitch do not say where along the way it pulls which way",
+    "backlash": "no force jumps a gap",
+    "loose_joint": "no force jumps a gap",
+    "body_on_actuator": IN_MODEL,
+    "end_stop": "a motion that reaches a stop should be made smaller",
+    "pose_dependent_inertia": "take a model identified at the place; over a vibration the inertia stays the same",
+    "time_varying_grip": "the grip is not known ahead of time",
+    "force_saturation": "there is no more force than that: the cap keeps it",
+    "slew_limit": "there is no faster force than that",
+}
+SENSORS = "it is the sensor's: a force against it would make the handle do what the sensor gets wrong"
+SCALED = "in the identified model as far as it is linear; used to scale what is added"
+TIMED = "in the identified model; used to send what is added ahead of time"
+
+SCALING, TIMING = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
+
+
+def why_not(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
+    """Empty for an effect that is compensated. inputs: channels of the commands."""
+    kind = effect.kind
+    if effect.law is not None:
+        return why_law_stays(effect.law, axis_names(inputs))
+    if kind in LAWS or kind == "force_deadband":
+        return ""
+    if kind in SCALING:
+        return SCALED
+    if kind in TIMING:
+        return TIMED
+    if EFFECTS_BY_NAME[kind].place == "sensor":
+        return SENSORS
+    return LEFT_ALONE[kind]
+
+
+def lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
+    """From the row in which a force is commanded to the row in which its effect is read: half a held sample, actuator,
+    sensor. The identified model has all this in it; what is added to its forces must count it by itself."""
+    corners = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
+    late = 0.5 / sample_rate_hz + physics.actuator.delay_s
+    for effect in physics.effects:
+        match effect.kind:
+            case "amplifier_lag":
+                late += effect.parameters["time_constant"]
+            case "transport_delay":
+                late += effect.parameters["delay"]
+            case "sensor_lag":
+                corners[1] = effect.parameters["bandwidth"]
+    return late + sum(1 / (2 * np.pi * corner) for corner in corners if corner > 0)

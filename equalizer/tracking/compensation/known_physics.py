@@ -1,0 +1,173 @@
+"""Known nonlinear physics in the feedforward: forces of effects that a diagnosis has named, along the planned motion.
+
+A linear model that was identified on a device with friction has an equivalent of that friction in it, and friction
+added on top would be counted twice: worse than none. Best is to identify on recordings freed of the effects
+(`without_effects`). Where only a model is at hand, the equivalent that a sinusoid of the identification's amplitude
+leaves in it is taken off. That is a part of the truth: an axis that hardly moved while another was swept stuck, and no
+equivalent of sticking is in this.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.effects.discovered_law import axis_names
+from equalizer.laws.law import Law as FoundLaw
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.plant.model_response import model_response
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.compensation.effect_roles import lead_s, why_not
+from equalizer.tracking.compensation.known_forces import LAWS, Law, deadband_share, equivalent_impedance
+from equalizer.tracking.compensation.law_forces import along_own_axis, force_against, linear_share, undone
+from equalizer.tracking.feedforward.band_part import band_share, padded_length
+from equalizer.tracking.feedforward.planned_motion import PlannedMotion, planned_motion
+from equalizer.tracking.learning.iteration import fitting_share
+
+SLIP_SHARE = 0.05
+"""Of an axis' rms velocity: where a friction force changes sign smoothly. Slower, it would chatter with the plan's
+own error about zero velocity; faster, it would miss the force that is there."""
+
+LEAST_SPEED = 1e-9
+"""Stands for an axis that stood still in an identification, m/s."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compensation:
+    forces: FloatArray
+    """(N, m): to be played instead of those given"""
+    used: tuple[ModelEffect, ...]
+    not_used: tuple[tuple[ModelEffect, str], ...]
+    """With the reason."""
+    share: float
+    """Of the compensation that fitted under the cap; 1 = all."""
+
+
+def compensate(
+    forces: FloatArray,
+    wanted: FloatArray,
+    model: IdentifiedModel,
+    physics: MechanicalModel,
+    identified_with_n: float | None,
+    cap_n: float | None = None,
+) -> Compensation:
+    """forces (N, m), from the model alone, for what is wanted (N, p), from rest to rest; p = m, axis by axis.
+
+    identified_with_n: amplitude of the sinusoidal forces (sweeps, one axis after the other) with which the model was
+    identified on the device that has the effects; None = the model is of a device without them. Raises ValueError for
+    an axis that the model does not have, and where forces and responses are not axis by axis.
+    """
+    if forces.shape != wanted.shape:
+        raise ValueError(f"forces of shape {forces.shape} do not go axis by axis with what is wanted, {wanted.shape}")
+    if identified_with_n is not None and not identified_with_n > 0:
+        raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
+    rate_hz = model.sample_rate_hz
+    motion = planned_motion(wanted, rate_hz, model.band_hz, lead_s(physics, rate_hz))
+    reasons = [(effect, why_not(effect, model.input_channels)) for effect in physics.effects]
+    used = tuple(effect for effect, reason in reasons if not reason)
+    gain = axis_gains(physics, model.input_channels, model.output_channels)
+    played, added = forces.copy(), np.zeros_like(forces)
+    for effect, axis in _by_axis(used, model):
+        if effect.kind in LAWS or _is_force(effect):
+            added[:, axis] += _beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
+    for effect, axis in _by_axis(used, model):
+        if effect.kind == "force_deadband":
+            _out_of_deadband(effect.parameters["width"], played, added, axis, identified_with_n)
+        elif effect.law is not None and not _is_force(effect):
+            _undone(effect.law, played, added, axis, identified_with_n)
+    difference = played + added - forces
+    share = 1.0 if cap_n is None else fitting_share(forces, difference, cap_n)
+    not_used = tuple((effect, reason) for effect, reason in reasons if reason)
+    return Compensation(forces + share * difference, used, not_used, share)
+
+
+def axes_of(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
+    """Columns of forces that an effect acts on: all where it names no axis. Raises ValueError for one not there."""
+    named = tuple(
+        number
+        for number, channels in enumerate(zip(inputs, outputs, strict=True))
+        if effect.axis is None or any(effect.axis in (channel, channel[-1:]) for channel in channels)
+    )
+    if not named:
+        raise ValueError(
+            f"{effect.kind} is on the axis '{effect.axis}', but there are {', '.join(inputs)} and {', '.join(outputs)}"
+        )
+    return named
+
+
+def axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> FloatArray:
+    """(m,): force at the handle over force commanded."""
+    gain = np.ones(len(inputs))
+    for effect in physics.effects:
+        if effect.kind == "force_gain":
+            gain[list(axes_of(effect, inputs, outputs))] *= effect.parameters["gain"]
+    return gain
+
+
+def slip_speed(velocity: FloatArray) -> float:
+    return SLIP_SHARE * float(np.sqrt(np.mean(velocity**2)))
+
+
+def _by_axis(effects: tuple[ModelEffect, ...], model: IdentifiedModel) -> Iterator[tuple[ModelEffect, int]]:
+    for effect in effects:
+        for axis in axes_of(effect, model.input_channels, model.output_channels):
+            yield effect, axis
+
+
+def _beyond_model(
+    effect: ModelEffect, axis: int, motion: PlannedMotion, model: IdentifiedModel, identified_with_n: float | None
+) -> FloatArray:
+    """(N,): the effect's force along the motion, less what of it the linear model holds already."""
+    v = motion.velocity[:, axis]
+    slip = slip_speed(v)
+    law, force = force_law(effect, axis, motion, (model.input_channels, model.sample_rate_hz), slip)
+    if identified_with_n is None:
+        return force
+    length = padded_length(len(v), model.sample_rate_hz)
+    lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / model.sample_rate_hz), dtype=np.float64)
+    inside = np.flatnonzero(band_share(lines_hz, model.band_hz) > 0)
+    along = np.abs(model_response(model, lines_hz[inside])[:, axis, axis])
+    speed = np.maximum(along * identified_with_n / (2 * np.pi * lines_hz[inside]), LEAST_SPEED)
+    held = np.zeros(len(lines_hz), dtype=np.complex128)
+    held[inside] = equivalent_impedance(law, effect.parameters, lines_hz[inside], speed, SLIP_SHARE)
+    return np.asarray(force - np.fft.irfft(held * np.fft.rfft(v, length), length)[: len(v)])
+
+
+def force_law(
+    effect: ModelEffect, axis: int, motion: PlannedMotion, sampled: tuple[tuple[str, ...], float], slip: float
+) -> tuple[Law, FloatArray]:
+    """The force (N,) to be added along a motion, and the law that gives it along one axis. sampled: channels of the
+    commands, and the rate, Hz."""
+    if effect.law is not None:
+        letters = axis_names(sampled[0])
+        against = force_against(effect.law, letters, motion, sampled[1], slip)
+        return along_own_axis(effect.law, letters, axis), against
+    law, v = LAWS[effect.kind], motion.velocity[:, axis]
+    if slip == 0:
+        return law, np.zeros_like(v)
+    return law, law(effect.parameters, motion.position[:, axis], v, slip)
+
+
+def _is_force(effect: ModelEffect) -> bool:
+    return effect.law is not None and effect.law.acts_on == "force"
+
+
+def _undone(law: FoundLaw, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None) -> None:
+    """What must be commanded so that the force behind a command map is the one that is meant, in place."""
+    if identified_with_n is not None:
+        played[:, axis] *= linear_share(law, identified_with_n)
+    meant = played[:, axis] + added[:, axis]
+    added[:, axis] += undone(law, meant) - meant
+
+
+def _out_of_deadband(
+    width: float, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
+) -> None:
+    """What must be commanded so that the force behind the dead band is the one that is meant, in place."""
+    if identified_with_n is not None:
+        played[:, axis] *= deadband_share(width, identified_with_n)
+    meant = played[:, axis] + added[:, axis]
+    level = float(np.sqrt(np.mean(meant**2)))
+    if level > 0:
+        added[:, axis] += width * np.tanh(meant / (SLIP_SHARE * level))

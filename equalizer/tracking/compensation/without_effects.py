@@ -1,0 +1,52 @@
+"""A recording as it would be of a device without known effects: their forces, along the motion that was measured, are
+taken off the commands. A model identified from it is of the linear rest, and `compensate` then adds the effects whole.
+
+An axis that sticks shows no motion to take a force from: recordings in which all axes move all the time (multisines on
+all of them, well above friction) are freed well, one axis swept after the other is not.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.laws.evaluate import evaluate
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.tracking.compensation.effect_roles import lead_s, why_not
+from equalizer.tracking.compensation.known_physics import axes_of, axis_gains, force_law, slip_speed
+from equalizer.tracking.feedforward.planned_motion import planned_motion
+
+HIGHEST_SHARE = 3.0
+"""The motion is taken up to so many times the upper end of what was excited: friction has harmonics."""
+LOWEST_SHARE = 0.75
+
+
+def without_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:
+    """The response must be the acceleration, axis by axis with the commands. excited_hz: where the commands have their
+    power. The excitation is left as it was. Raises ValueError for another response, missing samples, unknown axes."""
+    inputs, outputs = recording.command.channels, recording.response.channels
+    if recording.response.quantity != "acceleration" or len(inputs) != len(outputs):
+        raise ValueError(
+            f"the motion is integrated from accelerations, one per command; there are {len(inputs)} commands and "
+            f"{len(outputs)} channels of {recording.response.quantity}"
+        )
+    if not (np.isfinite(recording.response.samples).all() and np.isfinite(recording.command.samples).all()):
+        raise ValueError("the recording has missing samples; a motion cannot be integrated across them")
+    rate_hz = recording.sample_rate_hz
+    band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], 0.45 * rate_hz))
+    motion = planned_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
+    gain, freed = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
+    for effect in physics.effects:
+        for axis in axes_of(effect, inputs, outputs):
+            if effect.law is not None and effect.law.acts_on == "command" and not why_not(effect, inputs):
+                freed[:, axis] = evaluate(effect.law, {effect.law.variables[0]: freed[:, axis]}, rate_hz)
+            if effect.kind == "force_deadband":
+                beyond = np.maximum(np.abs(freed[:, axis]) - effect.parameters["width"], 0.0)
+                freed[:, axis] = np.copysign(beyond, freed[:, axis])
+    for effect in physics.effects:
+        acts_on = "force" if effect.law is None else effect.law.acts_on
+        if acts_on == "force" and effect.kind != "force_deadband" and not why_not(effect, inputs):
+            for axis in axes_of(effect, inputs, outputs):
+                slip = max(slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
+                freed[:, axis] -= force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]
+    return replace(recording, command=replace(recording.command, samples=freed))

@@ -1,0 +1,6 @@
+"""Forces of one model for one wanted acceleration.
+
+`trajectory` (a table) -> `band_split` -> `feedforward` (finite, by the tracker) or `periodic_inverse` (repeated for
+ever) -> `quality`. `model_equalizer` implements the port `equalizer` for stimuli of a session; `baselines` and
+`comparison` are other ways to compute forces. Begin at `feedforward.py`.
+"""

@@ -1,0 +1,94 @@
+"""Other ways to turn wanted accelerations into forces, for comparison: each gives its inverse line by line.
+
+Costs are multiply-adds per sample of a form that runs sample by sample at the response's rate; loops that are computed
+beforehand cost nothing while they play.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response, regularised_inverse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inverse:
+    """Forces per wanted acceleration."""
+
+    name: str
+    response: ComplexArray
+    """(lines, m, p)"""
+    multiply_adds: int
+    """Per sample of all channels."""
+
+
+def nothing(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+    """The number that is wanted in m/s² is commanded in N."""
+    return Inverse("nothing", _everywhere(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
+
+
+def static_gain(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+    """One gain for all axes: it sets their geometric mean over the lines right."""
+    along = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
+    gain = float(np.exp(-np.log(along).mean()))
+    return Inverse("static gain", _everywhere(gain * np.eye(*model.D.shape[::-1]), frequency_hz), model.D.shape[1])
+
+
+def acceleration_matching(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+    """Each axis by itself, its own response inverted as if there were no coupling (Kuchenbecker et al. 2006).
+
+    Cost: a transfer function of the model's order per axis."""
+    along = np.einsum("lii->li", model_response(model, frequency_hz))
+    inverse = np.einsum("li,ij->lij", 1 / along, np.eye(along.shape[1]))
+    return Inverse("acceleration matching", inverse, along.shape[1] * (2 * model.order + 1))
+
+
+def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+    """Mass, damping and stiffness matrices, fitted so that the forces they ask for give what is wanted over the given
+    lines: force = M a + B v + K x."""
+    G = model_response(model, frequency_hz)
+    lines, p, m = G.shape
+    w = 2 * np.pi * frequency_hz
+    parts = (np.ones(lines, dtype=complex), 1 / (1j * w), -1 / w**2)
+    system = np.concatenate([part[:, None, None] * G for part in parts], axis=2).reshape(lines * p, 3 * m)
+    wanted = np.tile(np.eye(p), (lines, 1))
+    real = np.vstack([system.real, system.imag])
+    scale = np.linalg.norm(real, axis=0)
+    matrices = np.linalg.lstsq(real / scale, np.vstack([wanted, 0 * wanted]), rcond=None)[0] / scale[:, None]
+    M, B, K = matrices.reshape(3, m, p)
+    inverse = sum(part[:, None, None] * matrix for part, matrix in zip(parts, (M, B, K), strict=True))
+    # Three matrices, and two integrations per axis.
+    return Inverse("rigid-body dynamics", np.asarray(inverse, dtype=complex), 3 * m * p + 2 * p)
+
+
+def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
+    """The measured response itself, between its lines linear in the complex plane. Cost: a filter as long as one
+    period of the finest line. Raises ValueError for frequencies outside the lines."""
+    lines = measured.of_lines(measured.reliable)
+    low, high = (lines.frequency_hz[0], lines.frequency_hz[-1]) if len(lines) else (np.inf, -np.inf)
+    if not len(lines) or frequency_hz.min() < low or frequency_hz.max() > high:
+        raise ValueError(
+            f"the measured response has reliable lines from {low:g} to {high:g} Hz, "
+            f"but {frequency_hz.min():g} to {frequency_hz.max():g} Hz is wanted"
+        )
+    p, m = lines.response.shape[1:]
+    entries = [np.interp(frequency_hz, lines.frequency_hz, entry) for entry in lines.response.reshape(-1, p * m).T]
+    G = np.stack(entries, axis=1).reshape(-1, p, m)
+    taps = round(measured.sample_rate_hz / float(np.diff(lines.frequency_hz).min()))
+    return Inverse("raw estimate", regularised_inverse(np.asarray(G, dtype=complex), weight), taps * p * m)
+
+
+def ours(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
+    """The identified model's. Cost: its state, and the stored gains on it; less where resonances are kept apart."""
+    m, p = model.D.shape[1], model.D.shape[0]
+    cost = model.order**2 + 2 * model.order * m + m * p
+    return Inverse("identified model", inverse_response(model, frequency_hz, weight), cost)
+
+
+def _everywhere(matrix: FloatArray, frequency_hz: FloatArray) -> ComplexArray:
+    return np.broadcast_to(matrix.astype(complex), (len(frequency_hz), *matrix.shape)).copy()

@@ -1,0 +1,59 @@
+"""Every way to compute forces, at every place, in one table."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.baselines import (
+    Inverse,
+    acceleration_matching,
+    nothing,
+    ours,
+    raw_estimate,
+    rigid_body,
+    static_gain,
+)
+from equalizer.tracking.feedforward.quality import Quality, quality
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonRow:
+    name: str
+    where: str
+    quality: Quality
+    multiply_adds: int
+    """Per sample."""
+
+
+def baseline_inverses(
+    model: IdentifiedModel, measured: FrequencyResponse, frequency_hz: FloatArray
+) -> tuple[Inverse, ...]:
+    """All of them from what one place showed, the identified model's last."""
+    return (
+        nothing(model, frequency_hz),
+        static_gain(model, frequency_hz),
+        acceleration_matching(model, frequency_hz),
+        rigid_body(model, frequency_hz),
+        raw_estimate(measured, frequency_hz),
+        ours(model, frequency_hz),
+    )
+
+
+def compare(
+    inverses: Sequence[Inverse],
+    responses: Mapping[str, ComplexArray],
+    only_at: Mapping[str, Sequence[Inverse]] | None = None,
+) -> tuple[ComparisonRow, ...]:
+    """responses: by place, the true ones, (lines, p, m) at the inverses' lines. `only_at`: inverses that were made for
+    one place, such as the interpolated model's at the edge."""
+    rows = []
+    for where, response in responses.items():
+        for inverse in (*inverses, *(only_at or {}).get(where, ())):
+            delivered = np.asarray(response @ inverse.response)
+            rows.append(ComparisonRow(inverse.name, where, quality(delivered), inverse.multiply_adds))
+    return tuple(rows)

@@ -1,0 +1,67 @@
+"""An identified model as an equalizer: stimuli that are wanted accelerations, and an onset that is one too."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, periodic_command
+from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
+from equalizer.tracking.lqr.lqr import StoredGains, periodic_state, ringing_weight, stored_gains, track
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelEqualizer:
+    """Raises ValueError for an unstable model."""
+
+    model: IdentifiedModel
+    spring: VirtualSpring = NO_SPRING
+    weight: float = WEIGHT
+
+    def __post_init__(self) -> None:
+        if self.model.spectral_radius >= 1:
+            raise ValueError("the model is not stable, so nothing can be played through it")
+
+    @property
+    def name(self) -> str:
+        low, high = self.model.band_hz
+        return f"identified model, order {self.model.order}, {low:g} to {high:g} Hz"
+
+    @property
+    def takes(self) -> str:
+        return "acceleration"
+
+    def periodic(self, wanted: Signal) -> Signal:
+        return periodic_command(self.model, wanted, self.weight, self.spring)
+
+    def onset(self, wanted: Signal, envelope: FloatArray) -> Signal:
+        """From rest into the loop, without a transient after it: the end is weighed by what a state that is not the
+        loop's would play on, its observability."""
+        T, n = len(envelope), len(wanted)
+        gains = _onset_gains(self.model, self.weight, T)
+        loop = periodic_command(self.model, wanted, self.weight)
+        turned = np.roll(loop.samples, -T, axis=0)
+        start = periodic_state(gains.problem, turned)
+        risen = envelope[:, None] * wanted.samples[np.arange(T) % n]
+        forces = track(gains, risen, final_state=start).forces
+        return Signal(forces - self._spring_while_rising(wanted, loop, envelope), *_force_of(loop))
+
+    def _spring_while_rising(self, wanted: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
+        """What the spring does by itself: it comes in with the same envelope as the motion."""
+        alone = loop.samples - self.periodic(wanted).samples
+        ticks = np.arange(len(envelope)) % len(wanted)
+        spring: FloatArray = envelope[:, None] * alone[ticks]
+        return spring
+
+
+def _force_of(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
+    return loop.sample_rate_hz, loop.quantity, loop.unit, loop.channels
+
+
+@lru_cache(maxsize=8)
+def _onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
+    problem = augmented(model, TrackingWeights(weight))
+    return stored_gains(problem, samples, ringing_weight(problem))

@@ -1,0 +1,84 @@
+"""Commands that are repeated for ever: the steady-state inverse of a model, line by line."""
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_response import model_response
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
+
+WEIGHT = 1e-4
+"""Of |force|² against |acceleration error|²: costs a thousandth of a decibel where the device answers 1 m/s² per N,
+and keeps the force finite where it hardly answers."""
+
+EMPTY = 1e-9
+"""Lines below this share of the largest one are rounding."""
+
+
+class OutsideBandError(ValueError):
+    """Something is wanted at a frequency for which the model was not made."""
+
+
+def inverse_response(
+    model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
+) -> ComplexArray:
+    """Forces per wanted output, (lines, m, p): least squares with `weight` on the force that enters the plant."""
+    G = model_response(model, frequency_hz)
+    H = regularised_inverse(G, weight)
+    if spring == NO_SPRING:
+        return H
+    left_to_spring = spring.force_per_acceleration(frequency_hz)[:, None, None] * (G @ H)
+    return np.asarray(H - left_to_spring)
+
+
+def regularised_inverse(G: ComplexArray, weight: float) -> ComplexArray:
+    """(G* G + weight I)^-1 G*, line by line. G: (lines, p, m); returns (lines, m, p)."""
+    adjoint = np.conj(np.swapaxes(G, 1, 2))
+    return np.asarray(np.linalg.solve(adjoint @ G + weight * np.eye(G.shape[2]), adjoint))
+
+
+def periodic_command(
+    model: IdentifiedModel, wanted: Signal, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
+) -> Signal:
+    """One loop of forces (N, m) for one loop of what is wanted (N, p).
+
+    Raises OutsideBandError where something is wanted outside the model's band, ValueError for other rates or units.
+    """
+    check_wanted(model, wanted)
+    n = len(wanted)
+    lines = np.fft.rfft(wanted.samples, axis=0)
+    frequency_hz = np.fft.rfftfreq(n, 1.0 / wanted.sample_rate_hz)
+    size = np.abs(lines).max(axis=1)
+    used = size > EMPTY * size.max()
+    check_band(model, frequency_hz[used])
+    forces = np.zeros((len(lines), model.B.shape[1]), dtype=np.complex128)
+    if used.any():
+        H = inverse_response(model, frequency_hz[used], weight, spring)
+        forces[used] = np.einsum("lmp,lp->lm", H, lines[used])
+    samples = np.fft.irfft(forces, n, axis=0)
+    return Signal(samples, wanted.sample_rate_hz, "force", "N", model.input_channels)
+
+
+def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
+    """Raises OutsideBandError for frequencies that the model does not cover."""
+    low, high = model.band_hz
+    outside = [f for f in np.atleast_1d(frequency_hz) if not low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
+    if outside:
+        named = ", ".join(f"{f:g}" for f in outside[:5]) + (" ..." if len(outside) > 5 else "")
+        raise OutsideBandError(
+            f"the model was made for {low:g} to {high:g} Hz, but {named} Hz is wanted; identify a model of a wider "
+            "band (hapteq identify --band)"
+        )
+
+
+def check_wanted(model: IdentifiedModel, wanted: Signal) -> None:
+    """Raises ValueError for a signal that this model cannot be asked for."""
+    if wanted.sample_rate_hz != model.sample_rate_hz:
+        raise ValueError(f"the model runs at {model.sample_rate_hz:g} Hz, not at {wanted.sample_rate_hz:g} Hz")
+    p = model.C.shape[0]
+    if wanted.samples.shape[1] != p:
+        raise ValueError(f"the model has {p} outputs, but {wanted.samples.shape[1]} are wanted")
+    units = set(wanted.units)
+    if units != set([model.output_unit] if isinstance(model.output_unit, str) else model.output_unit):
+        raise ValueError(f"the model answers in {model.output_unit}, but {', '.join(sorted(units))} is wanted")

@@ -1,0 +1,41 @@
+"""How the handle will move where an acceleration is delivered: integrated in the band, about its resting place."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.band_part import band_share, padded_length
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedMotion:
+    """(N, p) each: m, m/s, m/s²; or rad and its rates."""
+
+    position: FloatArray
+    """From the resting place; what moves slower than the band is not in it."""
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+def planned_motion(
+    wanted: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float], lead_s: float = 0.0
+) -> PlannedMotion:
+    """wanted: (N, p), begins and ends at rest. lead_s: how far ahead of the rows the motion is taken.
+
+    Raises ValueError for a band from zero on: a constant acceleration has no motion about a resting place.
+    """
+    if band_hz[0] <= 0:
+        raise ValueError(f"the band begins at {band_hz[0]:g} Hz; a motion about a resting place needs more than 0 Hz")
+    length = padded_length(len(wanted), sample_rate_hz)
+    lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64)
+    s = 2j * np.pi * lines_hz
+    share = band_share(lines_hz, band_hz) * np.exp(s * lead_s)
+    s[0] = 1.0  # of no consequence: nothing of it lies in the band
+    spectrum = np.fft.rfft(wanted, length, axis=0) * share[:, np.newaxis]
+
+    def integrated(times: int) -> FloatArray:
+        rows: FloatArray = np.fft.irfft(spectrum / s[:, np.newaxis] ** times, length, axis=0)[: len(wanted)]
+        return rows
+
+    return PlannedMotion(integrated(2), integrated(1), integrated(0))

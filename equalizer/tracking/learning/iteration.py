@@ -1,0 +1,240 @@
+"""Forces that are corrected from what was measured: play, compare, correct, until only noise is left.
+
+    u <- u + beta L(band(r - y)),  L the model's inverse
+
+What is taken of an error is its share that is not noise, 1 - (noise / residual)²: all of a large one, less and less
+near the noise floor, so that noise is not written into the forces (with a fixed gain it is, and a good first shot gets
+worse). The gain falls as 1, 1/2, 1/3 ... with every repeat that made things worse; the best forces are kept.
+
+At the ends of the record nothing is corrected: an inverse that cannot act before the first row answers what is missing
+there with an impulse, a handle at rest sticks and is not moved by it, and with every repeat it would grow.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.band_part import band_part
+
+Invert = Callable[[FloatArray], FloatArray]
+"""From wanted accelerations (N, p) to forces (N, m); linear, one row to one."""
+
+SURE = 3.0
+"""Standard deviations by which a residual must stand above the noise floor to be more than noise."""
+WORSE, DIVERGED = 1.1, 2.0
+"""Residual over the best one: beyond the first the next correction starts from the best forces again, beyond the
+second it is called diverging."""
+LOWEST_GAIN = 0.03
+"""Gains below it change nothing that could be measured."""
+EDGE_S = 0.03
+"""Over which corrections are faded at either end of the record."""
+
+
+class Verdict(Enum):
+    CONTINUE = "play the forces and measure"
+    AT_FLOOR = "what is left cannot be told from the measured noise"
+    DIVERGING = "each correction made it worse; the best forces so far are kept"
+    BEST_KEPT = "further corrections gain nothing; the best forces so far are kept"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Repetition:
+    """What stays the same from repeat to repeat."""
+
+    wanted: FloatArray
+    """(N, p): begins and ends at rest, with time for the forces to act before and after."""
+    invert: Invert
+    sample_rate_hz: float
+    band_hz: tuple[float, float]
+    first_gain: float = 1.0
+    """Below the `safe_beta` of `convergence`."""
+    noise_floor: float | None = None
+    """Of one play, rms in the band, in the unit of `wanted`; None = the first two plays are alike and tell it."""
+    cap: float | None = None
+    """Largest length of a force, N."""
+    slew: float | None = None
+    """Largest change of a force, N/s. The first forces are not held to it: it bounds what corrections add."""
+    judged: tuple[int, int] | None = None
+    """First row and the one behind the last that residuals are taken over; None = all. What lies outside is corrected
+    too, but where a handle sticks after the motion no force within reason is the right one."""
+
+    def residual(self, missing: FloatArray) -> float:
+        """rms over the judged rows."""
+        start, stop = self.judged or (0, len(missing))
+        return rms(missing[start:stop])
+
+    @property
+    def level(self) -> float:
+        """Of what is wanted, likewise."""
+        return self.residual(self.part(self.wanted))
+
+    def part(self, samples: FloatArray) -> FloatArray:
+        return band_part(samples, self.sample_rate_hz, self.band_hz)
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Independent numbers in the judged rows' part in the band."""
+        low, high = self.band_hz
+        start, stop = self.judged or (0, len(self.wanted))
+        return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
+
+    def fitting(self, forces: FloatArray, correction: FloatArray) -> float:
+        """The largest share of a correction, up to 1, that cap and slew allow. Both (N, m)."""
+        share = 1.0 if self.cap is None else fitting_share(forces, correction, self.cap)
+        if self.slew is None:
+            return share
+        steps, added = (np.diff(rows, axis=0, prepend=0.0, append=0.0) for rows in (forces, correction))
+        return min(share, fitting_share(steps, added, self.slew / self.sample_rate_hz))
+
+    @property
+    def limits(self) -> str:
+        cap = [] if self.cap is None else [f"the force within {self.cap:g} N"]
+        return " and ".join([*cap, *([] if self.slew is None else [f"its change within {self.slew:.4g} N/s"])])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IterationState:
+    repetition: Repetition
+    forces: FloatArray
+    """(N, m): to be played next; with a verdict other than CONTINUE the best ones."""
+    verdict: Verdict
+    best: FloatArray
+    """(N, m)"""
+    best_residual: float
+    best_missing: FloatArray
+    """(N, p): what was left to correct after the best forces, with its noise."""
+    noise_floor: float | None
+    residuals: tuple[float, ...] = ()
+    """Of each play, rms of wanted minus measured in the band, noise included. One for two plays that are averaged."""
+    gains: tuple[float, ...] = ()
+    fitted: tuple[float, ...] = ()
+    """Share of each correction that fitted under cap and slew limit; 1 = all."""
+    setbacks: int = 0
+    first_measured: FloatArray | None = None
+    """(N, p): of the first play, until the second has told the noise."""
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """Residuals over the wanted."""
+        return tuple(residual / self.repetition.level for residual in self.residuals)
+
+    @property
+    def remark(self) -> str:
+        """What cap and slew limit did, or nothing."""
+        lowest = min(self.fitted, default=1.0)
+        if lowest >= 1:
+            return ""
+        return (
+            f"{sum(share < 1 for share in self.fitted)} of {len(self.fitted)} corrections were scaled down, one to "
+            f"{lowest:.0%}, to keep {self.repetition.limits}"
+        )
+
+
+def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
+    """first: (N, m), forces to begin with; None = the model's inverse of what is wanted. Raises ValueError where the
+    first forces are above the cap, or what is wanted has nothing in the band."""
+    if repetition.level == 0:
+        low, high = repetition.band_hz
+        raise ValueError(f"what is wanted has nothing in the band of {low:g} to {high:g} Hz")
+    forces = repetition.invert(repetition.wanted) if first is None else np.asarray(first, dtype=np.float64)
+    peak = float(np.linalg.norm(forces, axis=1).max())
+    if repetition.cap is not None and peak > repetition.cap:
+        raise ValueError(f"the first forces reach {peak:.4g} N, but the cap is {repetition.cap:g} N")
+    missing = np.zeros_like(repetition.wanted)
+    return IterationState(repetition, forces, Verdict.CONTINUE, forces, np.inf, missing, repetition.noise_floor)
+
+
+def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
+    """measured: (N, p), the answer to `state.forces`. Raises ValueError on another shape, on values that are not
+    finite, and where the verdict was to stop."""
+    repetition = state.repetition
+    if state.verdict is not Verdict.CONTINUE:
+        raise ValueError(f"this iteration is over: {state.verdict.value}")
+    if np.shape(measured) != repetition.wanted.shape or not np.isfinite(measured).all():
+        raise ValueError(
+            f"what was measured has shape {np.shape(measured)} or values that are not finite numbers; it must be "
+            f"{repetition.wanted.shape}"
+        )
+    if state.noise_floor is not None:
+        return _judged(state, measured, state.noise_floor, plays=1)
+    if state.first_measured is None:
+        return replace(state, first_measured=measured)
+    floor = noise_of_repeats(np.stack([state.first_measured, measured]), repetition)
+    mean = (state.first_measured + measured) / 2
+    return _judged(replace(state, noise_floor=floor, first_measured=None), mean, floor, plays=2)
+
+
+def noise_of_repeats(measured: FloatArray, repetition: Repetition) -> float:
+    """rms in the band of what differs between plays of the same forces, for one play. measured: (plays, N, p)."""
+    off = measured - measured.mean(axis=0)
+    squares = sum(float(np.sum(repetition.part(one) ** 2)) for one in off)
+    return float(np.sqrt(squares / ((len(measured) - 1) * measured[0].size)))
+
+
+def noise_of_rest(rest: FloatArray, repetition: Repetition) -> float:
+    """rms in the band of a record (n, p) in which nothing was commanded."""
+    return rms(repetition.part(rest - rest.mean(axis=0)))
+
+
+def rms(samples: FloatArray) -> float:
+    return float(np.sqrt(np.mean(samples**2)))
+
+
+def _judged(state: IterationState, measured: FloatArray, floor: float, plays: int) -> IterationState:
+    repetition = state.repetition
+    missing = repetition.part(repetition.wanted - measured)
+    residual, noise = repetition.residual(missing), floor / np.sqrt(plays)
+    setbacks = state.setbacks + (residual > state.residuals[-1] if state.residuals else 0)
+    state = replace(state, residuals=(*state.residuals, residual), setbacks=setbacks)
+    diverged = residual > DIVERGED * state.best_residual
+    base, left = state.forces, missing
+    if residual < state.best_residual:
+        state = replace(state, best=state.forces, best_residual=residual, best_missing=missing)
+    elif residual > WORSE * state.best_residual:
+        base, left = state.best, state.best_missing
+    # Two measured powers are compared, each with its own scatter.
+    limit = noise * np.sqrt(1 + SURE * np.sqrt(4 / repetition.degrees_of_freedom))
+    if residual <= limit:
+        return _over(state, Verdict.AT_FLOOR)
+    if diverged:
+        return _over(state, Verdict.DIVERGING)
+    signal_share = max(0.0, 1 - (noise / repetition.residual(left)) ** 2)
+    gain = min(repetition.first_gain / (1 + setbacks), signal_share)
+    if gain < LOWEST_GAIN:
+        return _over(state, Verdict.BEST_KEPT)
+    return _corrected(state, base, left, gain)
+
+
+def _over(state: IterationState, verdict: Verdict) -> IterationState:
+    return replace(state, forces=state.best, verdict=verdict)
+
+
+def _corrected(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
+    repetition = state.repetition
+    correction = gain * ends_faded(repetition.invert(left), repetition.sample_rate_hz)
+    fitted = repetition.fitting(base, correction)
+    if fitted < LOWEST_GAIN:
+        return _over(state, Verdict.BEST_KEPT)
+    return replace(state, forces=base + fitted * correction, gains=(*state.gains, gain), fitted=(*state.fitted, fitted))
+
+
+def ends_faded(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
+    """(N, m), from zero at the first row to zero at the last."""
+    until_end = np.minimum(np.arange(len(rows)), np.arange(len(rows))[::-1])
+    inside = np.clip(until_end / (EDGE_S * sample_rate_hz), 0.0, 1.0)
+    return np.asarray(rows * (0.5 - 0.5 * np.cos(np.pi * inside))[:, np.newaxis])
+
+
+def fitting_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:
+    """The largest share of `correction`, up to 1, with which no force is longer than `cap`."""
+    a = np.sum(correction**2, axis=1)
+    b = np.sum(forces * correction, axis=1)
+    room = np.maximum(cap**2 - np.sum(forces**2, axis=1), 0.0)
+    moving = a > 0
+    # The positive root of a s² + 2 b s = room.
+    roots = (np.sqrt(b[moving] ** 2 + a[moving] * room[moving]) - b[moving]) / a[moving]
+    # A little less than all: rounding would else put the longest force above the cap.
+    return float(min(1.0, (1 - 1e-9) * roots.min(initial=2.0)))

@@ -1,0 +1,37 @@
+"""A model's inverse as one linear operator on records of a fixed length, as repeating needs it."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.planned_motion import planned_motion
+from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
+from equalizer.tracking.learning.iteration import Invert
+from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.tracking_problem import TrackingWeights, augmented
+
+InverseOfLength = Callable[[int], Invert]
+"""From the number of rows to the operator; what it prepares serves every record of that length."""
+
+
+def inverse_of(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
+    def of_length(rows: int) -> Invert:
+        gains = stored_gains(augmented(model, TrackingWeights(weight)), rows)
+        return lambda wanted: track(gains, wanted).forces
+
+    return of_length
+
+
+def under_spring(invert: Invert, spring: VirtualSpring, sample_rate_hz: float, band_hz: tuple[float, float]) -> Invert:
+    """For commands that a spring adds to: what it will do along the planned motion is left to it."""
+    if spring == VirtualSpring():
+        return invert
+
+    def commands(wanted: FloatArray) -> FloatArray:
+        motion = planned_motion(wanted, sample_rate_hz, band_hz)
+        held = spring.stiffness_n_per_m * motion.position + spring.damping_n_s_per_m * motion.velocity
+        return np.asarray(invert(wanted) + held)
+
+    return commands

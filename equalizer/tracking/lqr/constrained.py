@@ -1,0 +1,185 @@
+"""The best tracking that a cap on the force allows: no clipping, a problem of its own, with its loss stated.
+
+    least  sum (y - r)' Q (y - r) + u' R u    with    |u_k + already_k| <= cap  at every tick
+
+Alternating directions (Boyd et al., Distributed Optimization and Statistical Learning via ADMM, 2011): tracking with
+the gains of one Riccati recursion, then the nearest forces that are allowed, in turn. The multipliers bound from
+below what any allowed forces must cost, so that how far the answer is from the best is known and not guessed.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.limits import checked_cap, predicted_peaks, within_cap
+from equalizer.tracking.lqr.lqr import StoredGains, stored_gains, track
+from equalizer.tracking.lqr.lqr_kernel import simulate
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted
+
+OVER_RELAXATION = 1.7
+ROUNDS_BETWEEN_TUNING = 25
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingLoss:
+    """Tracking errors are rms of (predicted - wanted) over rms of wanted."""
+
+    error_free: float
+    """Of the best forces without a cap."""
+    error_capped: float
+    """Of the forces that are returned."""
+    error_clipped: float
+    """What clipping the free forces would have given, for comparison; it is never played."""
+    cost_free: float
+    cost_capped: float
+    gap: float
+    """How much lower the cost could be at most, relative to it; 0 = proved best."""
+    rounds: int
+
+    @property
+    def lost(self) -> float:
+        """How much the cap adds to the tracking error, in the same measure."""
+        return self.error_capped - self.error_free
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CappedForces:
+    forces: FloatArray
+    """(N, m); with what was already there, every row is within the cap."""
+    predicted: FloatArray
+    """(N, p): what the model answers to them"""
+    loss: TrackingLoss
+
+
+@dataclass(frozen=True, slots=True)
+class CapSettings:
+    gap: float = 1e-5
+    """Stop when the cost is proved to be so close to the best, relative to it."""
+    rounds: int = 5000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Capped:
+    problem: TrackingProblem
+    wanted: FloatArray
+    already: FloatArray
+    cap_n: float
+
+    def nearest(self, forces: FloatArray) -> FloatArray:
+        return within_cap(forces + self.already, self.cap_n) - self.already
+
+    def cost(self, forces: FloatArray) -> float:
+        outputs = _outputs(self.problem, forces)
+        outputs[:, : self.problem.outputs] -= self.wanted
+        weighed = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
+        return float(weighed)
+
+    def lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
+        """forces: the least of cost + multipliers · forces, without a cap."""
+        reach = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.already).sum()
+        return self.cost(forces) + float((multipliers * forces).sum() - reach)
+
+
+def constrained_track(
+    problem: TrackingProblem,
+    wanted: FloatArray,
+    cap_n: float,
+    already: FloatArray | None = None,
+    settings: CapSettings | None = None,
+) -> CappedForces:
+    """wanted: (N, p), from rest. already: (N, m), forces that are commanded besides and count against the cap.
+
+    Raises TrackingError where `already` alone is above the cap, or where the best is not found in so many rounds.
+    """
+    r = checked_wanted(problem, wanted)
+    there = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
+    if there.shape != (len(r), problem.inputs):
+        raise TrackingError(f"already has shape {there.shape}; these forces have ({len(r)}, {problem.inputs})")
+    alone = predicted_peaks(there, checked_cap(cap_n))
+    if not alone.fits:
+        raise TrackingError(
+            f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} N"
+        )
+    task = _Capped(problem, r, there, cap_n)
+    free = track(stored_gains(problem, len(r)), r)
+    if predicted_peaks(free.forces + there, cap_n).fits:
+        return _with_loss(task, free.forces, free.forces, 0.0, 0)
+    return _with_loss(task, free.forces, *_alternate(task, free.forces, settings or CapSettings()))
+
+
+def _alternate(task: _Capped, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
+    """Forces, gap and rounds."""
+    pull = _first_pull(task.problem)
+    gains = _pulled_gains(task.problem, len(task.wanted), pull)
+    z, scaled = task.nearest(start), np.zeros_like(start)
+    best, best_cost, bound = z, task.cost(z), -np.inf
+    for number in range(1, settings.rounds + 1):
+        u = track(gains, np.hstack((task.wanted, z - scaled))).forces
+        bound = max(bound, task.lower_bound(u, 2 * pull * (u - z + scaled)))
+        relaxed = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
+        before, z = z, task.nearest(relaxed + scaled)
+        scaled = scaled + relaxed - z
+        cost = task.cost(z)
+        if cost < best_cost:
+            best, best_cost = z, cost
+        gap = max(0.0, (best_cost - bound) / best_cost)
+        if gap <= settings.gap:
+            return best, gap, number
+        factor = _tuned(u - z, z - before) if number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
+        if factor != 1.0:
+            pull, scaled = pull * factor, scaled / factor
+            gains = _pulled_gains(task.problem, len(task.wanted), pull)
+    raise TrackingError(
+        f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
+        f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
+    )
+
+
+def _tuned(apart: FloatArray, moved: FloatArray) -> float:
+    """What the pull is multiplied by, so that both residuals fall alike (Boyd et al., 3.4.1)."""
+    ratio = float(np.linalg.norm(apart) / max(float(np.linalg.norm(moved)), np.finfo(np.float64).tiny))
+    return float(np.clip(np.sqrt(ratio), 0.2, 5.0)) if not 1 / 3 < ratio < 3 else 1.0
+
+
+def _first_pull(problem: TrackingProblem) -> float:
+    """Between the smallest curvature of the cost, the force weight, and that of the model's direct answer."""
+    curvature = problem.stage_cost[problem.order :, problem.order :]
+    return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
+
+
+def _pulled_gains(problem: TrackingProblem, samples: int, pull: float) -> StoredGains:
+    """Of the same problem with the forces as further outputs: pull |u - w|² is added, w wanted beside r."""
+    p, m = problem.outputs, problem.inputs
+    C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)
+    D = np.insert(problem.D, [p] * m, np.eye(m), axis=0)
+    Q = block_diag(problem.Q[:p, :p], pull * np.eye(m), problem.Q[p:, p:])
+    return stored_gains(replace(problem, C=C, D=D, Q=Q, outputs=p + m), samples)
+
+
+def _outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
+    """(N, q), with the penalised ones, from rest."""
+    outputs, played = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
+    every = replace(problem, outputs=problem.C.shape[0]).step
+    no_gain = np.zeros((len(forces), problem.inputs, problem.order))
+    simulate(every, no_gain, np.ascontiguousarray(forces), np.zeros(problem.order), played, outputs)
+    return outputs
+
+
+def _with_loss(task: _Capped, free: FloatArray, forces: FloatArray, gap: float, rounds: int) -> CappedForces:
+    p, size = task.problem.outputs, float(np.linalg.norm(task.wanted)) or 1.0
+
+    def error(played: FloatArray) -> float:
+        return float(np.linalg.norm(_outputs(task.problem, played)[:, :p] - task.wanted)) / size
+
+    loss = TrackingLoss(
+        error(free),
+        error(forces),
+        error(task.nearest(free)),
+        task.cost(free),
+        task.cost(forces),
+        gap,
+        rounds,
+    )
+    return CappedForces(forces, _outputs(task.problem, forces)[:, :p], loss)

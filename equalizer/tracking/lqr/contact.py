@@ -1,0 +1,81 @@
+"""A recorded transient that starts when a contact is felt: nothing can act before it, and that has a price."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.lqr import stored_gains
+from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_spectrum
+from equalizer.tracking.lqr.rotation import RotationBasis, every_normal, normal_basis
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem
+from equalizer.tracking.lqr.turning import TurningTransient, normal_transient
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CausalStart:
+    """Ready before any contact: the normal is all that is still missing. Made by `causal_start`."""
+
+    basis: RotationBasis
+    """The whole transient at once, for a normal (p,)."""
+    live: TurningTransient
+    """The same tick by tick, for a normal that still changes."""
+    deviation: FloatArray
+    """(p, p): n' deviation n is the squared relative error for the normal n."""
+    early_deviation: FloatArray
+    """Likewise, had the forces been allowed to begin early."""
+
+    def error(self, normal: FloatArray) -> float:
+        """Of the acceleration in the model's band, relative to what is wanted; by the model's own prediction."""
+        return _of_normal(self.deviation, normal)
+
+    def early_error(self, normal: FloatArray) -> float:
+        """What it would be, had the forces been allowed to begin before the contact."""
+        return _of_normal(self.early_deviation, normal)
+
+    @property
+    def worst_error(self) -> float:
+        """Over all normals."""
+        return float(np.sqrt(max(0.0, float(np.linalg.eigvalsh(self.deviation)[-1]))))
+
+
+def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None) -> CausalStart:
+    """recording: (N,), acceleration along the normal from the moment of contact on. padding: the room after it, to come
+    to rest, is played too; that before it serves the comparison only. None = 0.3 s each.
+
+    Raises TrackingError where the recording has nothing in the model's band.
+    """
+    room = padding or Padding()
+    causal = Padding(CAUSAL.before_s, room.after_s)
+    _, after = causal.samples(problem.sample_rate_hz)
+    played = np.pad(np.asarray(recording, dtype=np.float64), (0, after))
+    gains = stored_gains(problem, len(played))
+    basis = normal_basis(gains, played)
+    deviation = _deviation(problem, basis, played)
+    return CausalStart(basis, normal_transient(gains, played), deviation, _early(problem, played, room))
+
+
+def _early(problem: TrackingProblem, played: FloatArray, room: Padding) -> FloatArray:
+    before, _ = room.samples(problem.sample_rate_hz)
+    padded = np.pad(played, (before, 0))
+    return _deviation(problem, normal_basis(stored_gains(problem, len(padded)), padded), padded)
+
+
+def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:
+    p, rate_hz, band_hz = problem.outputs, problem.sample_rate_hz, problem.band_hz
+    level = float(np.linalg.norm(band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
+    if not level > 0:
+        raise TrackingError(f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band")
+    wanted = every_normal(recording, p)
+    along = [basis.predicted(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
+    lines = np.array([band_spectrum(each, rate_hz, band_hz).ravel() for each in along]) / level
+    return np.asarray(lines @ lines.T)
+
+
+def _of_normal(deviation: FloatArray, normal: FloatArray) -> float:
+    n = np.asarray(normal, dtype=np.float64)
+    length = float(np.linalg.norm(n))
+    if n.shape != deviation.shape[:1] or not (np.isfinite(length) and length > 0):
+        raise TrackingError(f"a normal must be {len(deviation)} finite numbers, not all zero; it is {n.tolist()}")
+    n = n / length
+    return float(np.sqrt(max(0.0, float(n @ deviation @ n))))

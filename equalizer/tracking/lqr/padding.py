@@ -1,0 +1,94 @@
+"""Room before and after a finite trajectory, and what it costs to play only the rows in between.
+
+An inverse acts before what is wanted and after it. Zeros wanted on both sides give it room. Where only the trajectory's
+own rows are played, from rest, what lies in the room before is lost, and the forces were made for a motion that is not
+there: then no room before is best (`CAUSAL`), for the forces are then the best of all that begin with the first row.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.lqr import StoredGains, Tracked, stored_gains, track
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted
+
+
+@dataclass(frozen=True, slots=True)
+class Padding:
+    before_s: float = 0.3
+    after_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name in ("before_s", "after_s"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise TrackingError(f"{name} is {value}; it must be a number that is not negative")
+
+    def samples(self, rate_hz: float) -> tuple[int, int]:
+        return round(self.before_s * rate_hz), round(self.after_s * rate_hz)
+
+
+CAUSAL = Padding(before_s=0.0)
+"""Nothing before the first row: for a start that nobody knew of, and where the rows alone are played."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PaddedTrack:
+    whole: Tracked
+    """With its room, as it should be played where there is time for it."""
+    rows: slice
+    """The trajectory's own rows in `whole`."""
+    whole_error: float
+    """Relative, in the model's band, over the trajectory's rows: the whole is played."""
+    cut_error: float
+    """Likewise: only the trajectory's rows are played, from rest."""
+
+    @property
+    def forces(self) -> FloatArray:
+        """(N, m): one to one with the rows of the trajectory."""
+        return self.whole.forces[self.rows]
+
+
+def track_padded(
+    problem: TrackingProblem, wanted: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
+) -> PaddedTrack:
+    """wanted: (N, p), from rest. padding: None = CAUSAL. gains: of the length with padding; None = computed."""
+    r = checked_wanted(problem, wanted)
+    before, after = (padding or CAUSAL).samples(problem.sample_rate_hz)
+    padded = np.pad(r, ((before, after), (0, 0)))
+    whole = track(gains or stored_gains(problem, len(padded)), padded)
+    rows = slice(before, before + len(r))
+    cut = answer(problem, whole.forces[rows])
+    rate_hz, band_hz = problem.sample_rate_hz, problem.band_hz
+    whole_error = band_error(r, whole.predicted[rows], rate_hz, band_hz)
+    return PaddedTrack(whole, rows, whole_error, band_error(r, cut, rate_hz, band_hz))
+
+
+def answer(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
+    """(N, p): what the model answers to forces (N, m) from rest."""
+    x, predicted = np.zeros(problem.order), np.empty((len(forces), problem.outputs))
+    for k, force in enumerate(forces):
+        s = np.concatenate((x, force)) @ problem.step
+        x, predicted[k] = s[: problem.order], s[problem.order :]
+    return predicted
+
+
+def band_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float:
+    """Root-mean-square of played - wanted over that of wanted, of what lies in the band. Both (N, p).
+
+    Raises TrackingError where nothing is wanted in the band.
+    """
+    off, level = band_spectrum(played - wanted, rate_hz, band_hz), band_spectrum(wanted, rate_hz, band_hz)
+    if not np.abs(level).max(initial=0.0) > 0:
+        raise TrackingError(f"nothing is wanted between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band")
+    return float(np.linalg.norm(off) / np.linalg.norm(level))
+
+
+def band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
+    """(2 lines, channels): real and imaginary parts of the lines in the band, with as much rest after the samples as
+    there are samples, so that end and start do not meet."""
+    length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
+    lines = np.fft.rfftfreq(length, 1 / rate_hz)
+    spectrum = np.fft.rfft(samples, length, axis=0)[(lines >= band_hz[0]) & (lines <= band_hz[1])]
+    return np.concatenate((spectrum.real, spectrum.imag))

@@ -1,0 +1,104 @@
+"""A transient that is played while its direction changes: the best forces from where the model is now, at every tick.
+
+What the trajectory ahead asks for is linear in the direction, and the gains know neither: so both are stored, and a new
+direction costs one combination of nine numbers per axis. Each tick solves the rest of the trajectory anew, exactly.
+Transients that overlap: one LiveState each, forces added. A transient that replaces another: `restarted`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.lqr.lqr import StoredGains, costate_feedforward, lqr_kernel
+from equalizer.tracking.lqr.rotation import every_normal, every_rotation
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TurningTransient:
+    """Made by `turning_transient` or `normal_transient`. `lqr_kernel.tick` takes its arrays in a compiled loop."""
+
+    problem: TrackingProblem
+    K: FloatArray
+    """(N, m, n)"""
+    g: FloatArray
+    """(N, m, directions)"""
+    direction_shape: tuple[int, ...]
+    """(p, p): a direction is a rotation; (p,): a normal."""
+
+    def __len__(self) -> int:
+        return int(self.K.shape[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveState:
+    tick: int
+    """The row that comes next."""
+    x: FloatArray
+    """(n,): the model's state"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Turned:
+    forces: FloatArray
+    """(T, m)"""
+    predicted: FloatArray
+    """(T, p): what the model answers"""
+    state: LiveState
+    """After the last of these rows."""
+
+
+def turning_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
+    """trajectory: (N, p), before it is rotated. The gains have a free end, or one that is drawn to rest."""
+    p = gains.problem.outputs
+    return _transient(gains, every_rotation(checked_wanted(gains.problem, trajectory)), (p, p))
+
+
+def normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
+    """recording: (N,), to be played along a normal."""
+    p = gains.problem.outputs
+    return _transient(gains, every_normal(recording, p), (p,))
+
+
+def at_rest(transient: TurningTransient) -> LiveState:
+    return LiveState(0, np.zeros(transient.problem.order))
+
+
+def restarted(state: LiveState) -> LiveState:
+    """The first row comes next, from the present motion: what still rings of the former transient is steered out."""
+    return LiveState(0, state.x)
+
+
+def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -> tuple[FloatArray, LiveState]:
+    """The force (m,) of this tick, and what comes next. After the last row the force is zero.
+
+    Raises TrackingError on another shape of the direction.
+    """
+    turned = play(transient, np.asarray(direction, dtype=np.float64)[np.newaxis], state)
+    return turned.forces[0], turned.state
+
+
+def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> Turned:
+    """Many ticks, compiled. directions: (T, p, p) or (T, p), one per tick; state: None = from rest, first row.
+
+    Raises TrackingError on another shape of the directions.
+    """
+    problem, live = transient.problem, at_rest(transient) if state is None else state
+    turns = np.asarray(directions, dtype=np.float64)
+    if turns.shape[1:] != transient.direction_shape:
+        raise TrackingError(
+            f"a direction has shape {turns.shape[1:]}; this transient takes {transient.direction_shape}"
+        )
+    n, m = problem.order, problem.inputs
+    numbers = np.zeros(2 * n + m + problem.outputs)
+    numbers[:n] = problem.state(live.x)
+    out = np.empty((len(turns), m + problem.outputs))
+    flat = np.ascontiguousarray(turns.reshape(len(turns), -1))
+    lqr_kernel.run(problem.step, transient.K[live.tick :], transient.g[live.tick :], flat, numbers, out)
+    return Turned(out[:, :m], out[:, m:], LiveState(live.tick + len(turns), numbers[:n]))
+
+
+def _transient(gains: StoredGains, wanted: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
+    g = np.stack([costate_feedforward(gains, each) for each in wanted], axis=2)
+    return TurningTransient(gains.problem, gains.gains.K, read_only(g), direction_shape)

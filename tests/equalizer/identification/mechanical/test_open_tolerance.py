@@ -1,0 +1,33 @@
+"""A model that was fitted to what it is then compared with may be re-tuned far, and never less than it says itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
+
+ONE = np.eye(2)
+
+
+def fitted() -> MechanicalModel:
+    tolerance = Tolerance(0.001, 0.01, 0.1, 0.2)
+    return MechanicalModel(
+        "fitted", "acceleration", 0.3 * ONE, 8 * ONE, 100 * ONE, 2 * ONE, ONE, tolerance=tolerance
+    )  # fmt: skip
+
+
+def test_damping_is_opened_by_half_so_that_friction_can_be_told_from_it():
+    tolerance = opened(fitted()).tolerance
+    assert tolerance is not None
+    assert tolerance.mass_kg == pytest.approx(0.03)
+    assert tolerance.damping_n_s_per_m == pytest.approx(4.0)
+    assert tolerance.stiffness_n_per_m == pytest.approx(20.0)
+    assert tolerance.modes == 0.2
+
+
+def test_a_tolerance_that_is_wider_already_stays():
+    wide = replace(fitted(), tolerance=Tolerance(damping_n_s_per_m=9.0))
+    tolerance = opened(wide).tolerance
+    assert tolerance is not None and tolerance.damping_n_s_per_m == 9.0 and tolerance.modes == 0.03

@@ -1,0 +1,81 @@
+"""The maximum-likelihood search."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from equalizer.identification.state_space.input_matrices import input_matrices
+from equalizer.identification.state_space.modal_form import ModalForm, modal_form
+from equalizer.identification.state_space.refinement import fitted, refine
+from equalizer.identification.state_space.stable_poles import largest_radius
+from equalizer.identification.state_space.weighted_lines import weighted_lines
+
+RADIUS = largest_radius(0.5, 1000.0)
+
+
+@pytest.fixture(scope="module")
+def plant(plants, measuring):
+    return measuring.small_plant(plants)
+
+
+@pytest.fixture(scope="module")
+def lines(measuring, plant):
+    return weighted_lines([measuring.noisy(plant, np.arange(5, 35, 0.2), 0.3, seed=7)], (5.0, 35.0))
+
+
+def disturbed(plant, seed, size):
+    form = modal_form(plant.A, plant.C)
+    random = np.random.default_rng(seed)
+    shaken = [part * (1 + size * random.standard_normal(part.shape)) for part in (form.b, form.C)]
+    return ModalForm(form.a, *shaken)
+
+
+def test_input_matrices_are_exact_where_poles_and_outputs_are(measuring, plant):
+    exact = weighted_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
+    form = modal_form(plant.A, plant.C)
+    B, D = input_matrices(form, exact)
+    assert np.abs(form.from_states(exact.z) @ B + D - exact.response).max() < 1e-9 * np.abs(exact.response).max()
+    assert np.abs(D).max() < 1e-8 * np.abs(exact.response).max()
+
+
+def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
+    """Oracle: all of a, b, C, B and D at once, by scipy, from where the search ended and from where it began."""
+    start = disturbed(plant, 1, 0.02)
+    found = refine(start, lines, RADIUS)
+
+    def residuals(numbers):
+        a, b, C, B, D = np.split(numbers, [3, 6, 24, 42])
+        form = ModalForm(a, b, C.reshape(3, 6))
+        errors = (form.from_states(lines.z) @ B.reshape(6, 3) + D.reshape(3, 3) - lines.response) * lines.weight
+        return np.concatenate([errors.real.ravel(), errors.imag.ravel()])
+
+    ours = lines.cost(found.response(lines.z))
+    for one in (found, fitted(start, lines)):
+        numbers = np.concatenate([part.ravel() for part in (one.form.a, one.form.b, one.form.C, one.B, one.D)])
+        theirs = 2 * least_squares(residuals, numbers, x_scale="jac", max_nfev=60).cost
+        assert ours <= theirs * (1 + 1e-5)
+
+
+def test_a_step_is_taken_only_if_it_lowers_the_cost(plant, lines):
+    start = disturbed(plant, 2, 0.05)
+    costs = [lines.cost(refine(start, lines, RADIUS, steps).response(lines.z)) for steps in (1, 2, 4, 8, 30)]
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < 0.5 * lines.cost(fitted(start, lines).response(lines.z))
+
+
+def test_the_bound_holds_where_the_data_ask_for_a_slower_pole(measuring, plant):
+    lines = weighted_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
+    radius = largest_radius(0.02, 1000.0)
+    assert np.abs(np.linalg.eigvals(plant.A)).max() > radius
+    found = refine(modal_form(0.9 * plant.A, plant.C), lines, radius)
+    assert np.abs(found.form.poles).max() <= radius * (1 + 1e-7)
+
+
+def test_states_that_nothing_shows_do_not_stop_the_search(plant, lines):
+    known = modal_form(plant.A, plant.C)
+    twice = ModalForm(
+        np.append(known.a, known.a[0]), np.append(known.b, known.b[0]), np.hstack([known.C, 0 * known.C[:, :2]])
+    )
+    found = refine(twice, lines, RADIUS)
+    assert np.isfinite(found.B).all()
+    assert lines.cost(found.response(lines.z)) / lines.response.size < 1.05

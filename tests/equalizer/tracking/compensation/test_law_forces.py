@@ -1,0 +1,107 @@
+"""Laws without a name in the feedforward: taken off where the catalogue's same law is, undone where a map can be."""
+
+import numpy as np
+import pytest
+
+from equalizer.laws.law import law_of
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from equalizer.tracking.compensation.known_physics import compensate
+from equalizer.tracking.compensation.law_forces import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
+from equalizer.tracking.compensation.without_effects import without_effects
+
+RATE_HZ, BAND_HZ, N = 1000.0, (5.0, 35.0), 1000
+FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")
+MODEL = IdentifiedModel(
+    np.zeros((1, 1)), np.zeros((1, 3)), np.zeros((3, 1)), 4 * np.eye(3), RATE_HZ, BAND_HZ, "N", "m/s^2", FORCES,
+    ACCELERATIONS,
+)  # fmt: skip
+TIME_S = np.arange(N) / RATE_HZ
+WANTED = np.hanning(N)[:, None] * np.column_stack([np.sin(2 * np.pi * hz * TIME_S) for hz in (11, 17, 23)])
+PUSHED = WANTED / 4
+
+
+def physics(*effects: ModelEffect) -> MechanicalModel:
+    one = np.eye(3)
+    return MechanicalModel("device", "acceleration", 0.25 * one, one, one, one, one, effects=effects)
+
+
+def found(text: str, acts_on: str = "force") -> ModelEffect:
+    return ModelEffect("discovered_law", "y", {}, law_of(text, acts_on, "y"))
+
+
+SAME = [
+    ("-5.0*vy*abs(vy)", ModelEffect("quadratic_damping", "y", {"coefficient": 5.0})),
+    ("-3e7*y**3", ModelEffect("hardening_stiffness", "y", {"k3": 3e7})),
+    ("-0.1*sign(vy)", ModelEffect("coulomb_friction", "y", {"level": 0.1})),
+]
+
+
+@pytest.mark.parametrize("identified_with_n", [None, 0.3])
+@pytest.mark.parametrize(("text", "named"), SAME, ids=[named.kind for _, named in SAME])
+def test_a_force_law_is_compensated_as_the_catalogues_same_law(text, named, identified_with_n):
+    one, other = (
+        compensate(PUSHED, WANTED, MODEL, physics(effect), identified_with_n) for effect in (found(text), named)
+    )
+    changed = np.std(other.forces - PUSHED)
+    assert changed > 0
+    assert np.std(one.forces - other.forces) < 1e-6 * changed
+    assert [effect.kind for effect in one.used] == ["discovered_law"]
+
+
+@pytest.mark.parametrize(("text", "named"), SAME, ids=[named.kind for _, named in SAME])
+def test_a_recording_is_freed_of_a_law_as_of_the_catalogues_same_law(text, named):
+    recording = Recording(
+        "device",
+        Signal(PUSHED, RATE_HZ, "force", "N", FORCES),
+        Signal(WANTED, RATE_HZ, "acceleration", "m/s^2", ACCELERATIONS),
+    )
+    one, other = (
+        without_effects(recording, physics(effect), (5.0, 35.0)).command.samples for effect in (found(text), named)
+    )
+    assert np.std(other - PUSHED) > 0
+    assert one == pytest.approx(other, abs=1e-9)
+
+
+def test_a_force_between_axes_is_taken_off_along_the_motion_of_the_other():
+    done = compensate(PUSHED, WANTED, MODEL, physics(found("-30.0*vx*x")), None)
+    added = done.forces - PUSHED
+    assert np.std(added[:, 1]) > 0
+    assert not added[:, [0, 2]].any()
+    # At twice the other axis's frequency.
+    lines = np.abs(np.fft.rfft(added[:, 1]))
+    assert np.argmax(lines[5:]) + 5 == 22
+
+
+def test_a_command_map_is_undone():
+    law = "0.8*fy + 0.6*fy**3"
+    done = compensate(PUSHED, WANTED, MODEL, physics(found(law, "command")), None)
+    played = done.forces[:, 1]
+    assert 0.8 * played + 0.6 * played**3 == pytest.approx(PUSHED[:, 1], abs=1e-5)
+    assert done.forces[:, [0, 2]] == pytest.approx(PUSHED[:, [0, 2]])
+    small = compensate(PUSHED, WANTED, MODEL, physics(found(law, "command")), 0.001).forces[:, 1]
+    assert small[np.abs(PUSHED[:, 1]) < 0.02] == pytest.approx(PUSHED[np.abs(PUSHED[:, 1]) < 0.02, 1], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "acts_on", "why"),
+    [
+        ("0.1*fy*sin(y/0.01)", "force", COMMANDS),
+        ("lag(fy, 0.01)", "command", REMEMBERS),
+        ("fy + 0.1*fx", "command", SEVERAL),
+        ("-1.0*abs(fy)", "command", ""),
+        ("2.0*ay", "response", SENSED),
+        ("0*fy", "command", FOLDED),
+    ],
+)
+def test_what_cannot_be_compensated_says_why(text, acts_on, why):
+    known = physics(found(text, acts_on))
+    if not why:
+        with pytest.raises(ValueError, match="goes up and down, so it cannot be undone"):
+            compensate(PUSHED, WANTED, MODEL, known, None)
+        return
+    done = compensate(PUSHED, WANTED, MODEL, known, None)
+    assert done.not_used == ((known.effects[0], why),)
+    assert done.forces == pytest.approx(PUSHED)

@@ -1,0 +1,77 @@
+"""A table of wanted accelerations through one model, played on the device it was made of."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import Signal
+from equalizer.tracking.feedforward.feedforward import FeedforwardSettings, feedforward
+from equalizer.tracking.lqr.limits import ForceLimitError
+from equalizer.tracking.lqr.padding import band_error
+from equalizer.tracking.lqr.tracking_problem import TrackingError
+
+RATE_HZ, BAND_HZ = 1000.0, (5.0, 35.0)
+
+
+@pytest.fixture(scope="module")
+def plant(plants):
+    return plants.omega_like()
+
+
+@pytest.fixture(scope="module")
+def model(plant):
+    channels = ("fx", "fy", "fz"), ("ax", "ay", "az")
+    return IdentifiedModel(plant.A, plant.B, plant.C, np.zeros((3, 3)), RATE_HZ, BAND_HZ, "N", "m/s^2", *channels)
+
+
+@pytest.fixture(scope="module")
+def noise(plants):
+    """2 s of 5 to 35 Hz on all axes, from rest to rest."""
+    samples = plants.multisine(5.0, 35.0, seconds=2.0, rms=1.0)
+    return acceleration(samples * np.sin(np.pi * np.arange(2000) / 2000)[:, None] ** 2)
+
+
+def acceleration(samples) -> Signal:
+    return Signal(samples, RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))
+
+
+def test_what_is_wanted_in_the_band_is_what_the_device_does(model, plant, noise):
+    found = feedforward(model, noise)
+    assert found.forces.samples.shape == (2000, 3)
+    played = plant.play(found.forces.samples)
+    assert band_error(noise.samples, played, RATE_HZ, BAND_HZ) < 0.01
+    assert found.error < 0.01
+    assert found.left_out < 0.03
+
+
+def test_what_lies_outside_the_band_is_left_out_and_said(model, plant, noise):
+    """A whistle at 84 Hz, where the device is loudest, changes nothing within the band and is not played."""
+    t = np.arange(2000) / RATE_HZ
+    whistle = replace(noise, samples=noise.samples + 0.5 * np.sin(2 * np.pi * 84.0 * t)[:, None])
+    found, without = feedforward(model, whistle), feedforward(model, noise)
+    assert found.left_out > 0.3
+    assert np.abs(found.forces.samples - without.forces.samples).max() < 0.02
+    assert band_error(noise.samples, plant.play(found.forces.samples), RATE_HZ, BAND_HZ) < 0.02
+
+
+def test_forces_above_the_cap_are_refused_with_the_factor_that_fits(model, noise):
+    loud = replace(noise, samples=8.0 * noise.samples)
+    with pytest.raises(ForceLimitError, match="above the cap of 3 N") as refusal:
+        feedforward(model, loud)
+    factor = refusal.value.peaks.largest_scale
+    assert feedforward(model, replace(loud, samples=0.999 * factor * loud.samples)).peaks.fits
+
+
+def test_or_solved_anew_under_it_with_the_loss_stated(model, noise):
+    loud = replace(noise, samples=2.0 * noise.samples[600:1400])
+    peak_n = feedforward(model, loud, FeedforwardSettings(cap_n=50.0)).peaks.peak_n
+    capped = feedforward(model, loud, FeedforwardSettings(cap_n=0.8 * peak_n, constrain=True))
+    assert np.linalg.norm(capped.forces.samples, axis=1).max() <= 0.8 * peak_n
+    assert 0 < capped.loss.lost < capped.loss.error_clipped
+
+
+def test_a_table_with_nothing_in_the_band_is_refused(model):
+    with pytest.raises(TrackingError, match="nothing is wanted between 5 and 35 Hz"):
+        feedforward(model, acceleration(np.zeros((500, 3))))
