@@ -10,7 +10,7 @@ from analysis.diagnosis.result.findings import BlackBox, Findings
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tolerance
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal

@@ -10,7 +10,7 @@ from analysis.diagnosis.search.explain import Explanation, retuned_alone
 from analysis.diagnosis.search.rivalry import Arena
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import Law
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment

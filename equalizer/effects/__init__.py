@@ -1,1 +1,6 @@
-"""Physical effects that a simulation may leave out, one per file, and the simulator that plays them."""
+"""Physical effects that a model may leave out: one file each, all alike, collected in `catalogue`.
+
+`effect` says what an effect is (equation, numbers, place); `starts` guess its numbers from what a model fails to
+explain; `simulation` plays commands through a model with its effects; `placing` translates effects of a model file.
+`discovered_law` and `law_entry` are effects that have no name. Begin at `effect.py` and `coulomb_friction.py`.
+"""

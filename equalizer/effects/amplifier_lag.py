@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from equalizer.effects.command_path import lagged, lagged_at_end
-from equalizer.effects.command_starts import likeliest_value
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.response_starts import starts_for_lateness
+from equalizer.effects.simulation.command_path import lagged, lagged_at_end
+from equalizer.effects.starts.command_starts import likeliest_value
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import welch
 
-from equalizer.effects.bodies import bodies_of, moved
-from equalizer.effects.command_path import Driven
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import F_END, STEP_S, X_FREE, X_PER_N, X
-from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import own
+from equalizer.effects.simulation.bodies import bodies_of, moved
+from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.instant import F_END, STEP_S, X_FREE, X_PER_N, X
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import own
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from equalizer.effects.attached_oscillator import hung, missing_mass, with_oscillator
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.attached_oscillator import hung, missing_mass, with_oscillator
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 

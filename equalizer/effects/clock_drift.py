@@ -3,9 +3,9 @@
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.other_times import read_other_times
-from equalizer.effects.response_starts import lateness
+from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4

@@ -3,9 +3,9 @@
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import Beside, linear_part, moving
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import Beside, linear_part, moving
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.effects.effect import Acts, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
-from equalizer.effects.law_kernel import PER_AXIS, law_force
+from equalizer.effects.simulation.law_kernel import PER_AXIS, law_force
 from equalizer.laws.evaluate import evaluate, evaluate_held
 from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import Law
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -54,7 +54,7 @@ class AxisForce:
     """A force along a driven axis, from its motion."""
 
     law: Any
-    """Compiled: law(of, memory, at) gives newtons; see `equalizer.effects.instant` for what `at` holds."""
+    """Compiled: law(of, memory, at) gives newtons; see `equalizer.effects.simulation.instant` for what `at` holds."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
     """What the law finds in `of`."""
     memory: int = 0

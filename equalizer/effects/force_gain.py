@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Values
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST = 1e-4

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from equalizer.effects.command_starts import grid_of_peaks, likeliest_value
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.command_starts import grid_of_peaks, likeliest_value
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 

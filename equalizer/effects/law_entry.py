@@ -7,8 +7,8 @@ import numpy as np
 
 from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, LETTERS, Channels, axis_names, law_effect, law_values
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.starting_values import beside_linear, moving
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import beside_linear, moving
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles

@@ -4,15 +4,15 @@ from itertools import product
 
 import numpy as np
 
-from equalizer.effects.bodies import bodies_of, moved
-from equalizer.effects.command_path import Driven
-from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import F_END, V_FREE, V_PER_N, X_FREE, X_PER_N, X
-from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.sensor_path import low_passed
-from equalizer.effects.starting_values import own
+from equalizer.effects.simulation.bodies import bodies_of, moved
+from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.dry_friction_kernel import rubbing
+from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, X_FREE, X_PER_N, X
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.sensor_path import low_passed
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import own
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray

@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.reading_kernel import Flags, repeat_as_measured, repeat_where
+from equalizer.effects.simulation.reading_kernel import Flags, repeat_as_measured, repeat_where
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 CLEAR = 4.0

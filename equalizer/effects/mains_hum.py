@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.response_starts import shares_of
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 MAINS_HZ = (45.0, 65.0)

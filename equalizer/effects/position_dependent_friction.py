@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import X_FREE, X
-from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import beside_linear, sliding
+from equalizer.effects.simulation.dry_friction_kernel import rubbing
+from equalizer.effects.simulation.instant import X_FREE, X
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import beside_linear, sliding
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

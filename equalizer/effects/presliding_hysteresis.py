@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from equalizer.effects.bristle_kernel import bent
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import F_END, X_FREE, X_PER_N, X
-from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import beside_linear, best_of, moving
+from equalizer.effects.simulation.bristle_kernel import bent
+from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import beside_linear, best_of, moving
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import norm
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.lattice import lattice_offset, lattice_step, staircase_step
-from equalizer.effects.response_starts import channels_of
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.lattice import lattice_offset, lattice_step, staircase_step
+from equalizer.effects.starts.response_starts import channels_of
 from equalizer.signals.signal import FloatArray
 
 FAR = 1e-12

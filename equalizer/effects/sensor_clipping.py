@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.response_starts import channels_of, likeliest_reading
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.response_starts import channels_of, likeliest_reading
 from equalizer.signals.signal import FloatArray
 
 

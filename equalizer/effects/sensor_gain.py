@@ -3,8 +3,8 @@
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.response_starts import channels_of
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.response_starts import channels_of
 from equalizer.signals.signal import FloatArray
 
 LEAST = 1e-4

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.response_starts import likeliest_reading
-from equalizer.effects.sensor_path import before_low_pass, low_passed
+from equalizer.effects.simulation.sensor_path import before_low_pass, low_passed
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.response_starts import likeliest_reading
 from equalizer.signals.signal import FloatArray
 
 SLOWEST, FASTEST = 0.002, 1.5

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 ABOUT = ("about_x", "about_y", "about_z")

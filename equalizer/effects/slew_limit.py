@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from equalizer.effects.command_starts import likeliest_value
 from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.slew_kernel import follow
+from equalizer.effects.simulation.slew_kernel import follow
+from equalizer.effects.starts.command_starts import likeliest_value
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 SELDOM = (0.3, 0.5, 0.75)

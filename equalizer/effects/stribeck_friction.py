@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from equalizer.effects.dry_friction_kernel import rubbing
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.instant import V_FREE, V_PER_N, V
-from equalizer.effects.mechanism_kernel import compiled_law
-from equalizer.effects.starting_values import beside_linear, best_of, sliding
+from equalizer.effects.simulation.dry_friction_kernel import rubbing
+from equalizer.effects.simulation.instant import V_FREE, V_PER_N, V
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import beside_linear, best_of, sliding
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

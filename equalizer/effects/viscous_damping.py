@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.starting_values import Beside, moving, own
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.effects.starts.starting_values import Beside, moving, own
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 

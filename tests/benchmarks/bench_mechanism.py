@@ -13,7 +13,7 @@ import effect_bench
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulator import simulate_mechanism, simulate_response
+from equalizer.effects.simulation.simulator import simulate_mechanism, simulate_response
 from equalizer.plant.linear_simulation import linear_steps
 
 SAMPLES, RATE_HZ, REPEATS = 105_000, 1000.0, 7

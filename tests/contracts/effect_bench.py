@@ -7,8 +7,8 @@ import numpy as np
 from analysis.diagnosis.errors.missing_force import missing_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.simulator import Played, simulate_mechanism
+from equalizer.effects.simulation.simulator import Played, simulate_mechanism
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 
 RATE_HZ, PERIOD_S = 1000.0, 2.0

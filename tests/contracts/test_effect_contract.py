@@ -8,7 +8,7 @@ import pytest
 
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import JointForce, OnResponse, Structure
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import ModelEffect, effect_problems
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import ALL_SITES
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 

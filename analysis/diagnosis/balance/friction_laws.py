@@ -16,7 +16,7 @@ from analysis.diagnosis.balance.law import (
     through_lines,
 )
 from analysis.diagnosis.balance.motion import Motion
-from equalizer.effects.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bent
 from equalizer.signals.signal import FloatArray
 
 SHARP = 0.01

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.fault import Fault, Told, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
-from equalizer.effects.slew_kernel import follow
+from equalizer.effects.simulation.slew_kernel import follow
 from equalizer.signals.band_limited import odd_continued, straight
 from equalizer.signals.signal import FloatArray
 

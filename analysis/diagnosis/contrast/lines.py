@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.settings import STEP_FACTOR
-from equalizer.effects.lattice import lattice_step
+from equalizer.effects.starts.lattice import lattice_step
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 

@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.law import sliding
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
-from equalizer.effects.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bent
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]

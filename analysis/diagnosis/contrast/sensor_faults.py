@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.contrast.actuator_faults import AROUND, GRID, at_times, late_times, later, middle_hz
 from analysis.diagnosis.contrast.fault import Fault, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
-from equalizer.effects.bristle_kernel import bent
+from equalizer.effects.simulation.bristle_kernel import bent
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, types
 
 from analysis.diagnosis.data.observed import Observed
-from equalizer.effects.sensor_path import before_low_pass
+from equalizer.effects.simulation.sensor_path import before_low_pass
 from equalizer.plant.linear_simulation import LinearSteps, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray

@@ -20,7 +20,7 @@ from analysis.diagnosis.errors.predicted_force import PredictedForce
 from analysis.diagnosis.errors.transfer import axis_transfer
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.band_limited import low_pass

@@ -10,7 +10,7 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.residual_colour import Colour
 from equalizer.effects.effect import Effect, PlacedEffect
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

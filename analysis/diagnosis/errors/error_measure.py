@@ -9,7 +9,7 @@ from typing import Protocol, Self
 
 from analysis.diagnosis.data.observed import Observed
 from equalizer.effects.effect import Effect, PlacedEffect
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

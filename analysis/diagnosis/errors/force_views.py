@@ -11,7 +11,7 @@ from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.needed_force import band_motion, inverse_lines
 from analysis.diagnosis.errors.predicted_force import PredictedForce, edge_samples
-from equalizer.effects.along_motion import entered_force
+from equalizer.effects.simulation.along_motion import entered_force
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import band_limited, low_pass
 from equalizer.signals.signal import FloatArray, Signal

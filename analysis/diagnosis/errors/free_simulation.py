@@ -10,8 +10,8 @@ from analysis.diagnosis.data.carried_weight import carrying
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.unexplained_motion import evidence_of
 from equalizer.effects.effect import Effect, PlacedEffect
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.simulator import Played, Seen, simulate_mechanism, simulate_response
+from equalizer.effects.simulation.simulator import Played, Seen, simulate_mechanism, simulate_response
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

@@ -14,7 +14,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import RETUNING_BOUND
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
 

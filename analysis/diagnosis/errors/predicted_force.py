@@ -9,10 +9,10 @@ import numpy as np
 from analysis.diagnosis.data.carried_weight import carrying
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.needed_force import BandMotion, NeededForce, band_motion, needed_force
-from equalizer.effects.along_motion import entered_force, force_along
-from equalizer.effects.bodies import bodies_of
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.simulation.along_motion import entered_force, force_along
+from equalizer.effects.simulation.bodies import bodies_of
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import band_limited
 from equalizer.signals.signal import FloatArray

@@ -4,8 +4,8 @@ import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.missing_force import missing_force
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.simulator import Played
+from equalizer.effects.simulation.simulator import Played
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

@@ -14,12 +14,12 @@ from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smoothed_mot
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.free_simulation import channels
 from analysis.diagnosis.errors.unexplained_motion import without_gaps
-from equalizer.effects.along_motion import entered_force
-from equalizer.effects.bodies import Restarts, bodies_of
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.sensor_path import low_passed
-from equalizer.effects.simulator import Played, Seen, simulate_windows
+from equalizer.effects.simulation.along_motion import entered_force
+from equalizer.effects.simulation.bodies import Restarts, bodies_of
+from equalizer.effects.simulation.sensor_path import low_passed
+from equalizer.effects.simulation.simulator import Played, Seen, simulate_windows
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray

@@ -12,8 +12,8 @@ from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import Disturbance, State, StateRegion, state_regions
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, STATE_CROWDED, STATES_NAMED
 from analysis.diagnosis.types import Mask
-from equalizer.effects.evidence import Evidence
 from equalizer.effects.placing import axis_letter
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

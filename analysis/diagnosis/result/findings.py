@@ -12,7 +12,7 @@ from analysis.diagnosis.result.proposed_experiment import Proposal
 from analysis.diagnosis.result.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

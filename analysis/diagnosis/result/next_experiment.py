@@ -16,7 +16,7 @@ from analysis.diagnosis.errors.output_error import MOVED, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.result.experiment_menu import Experiment
 from analysis.diagnosis.settings import TELLING_GAIN
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray

@@ -13,8 +13,8 @@ from analysis.diagnosis.errors.unexplained_motion import EXPECTED
 from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.result.signature_bins import binned, binned_law, running_rms
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.simulator import Played, simulate_mechanism
+from equalizer.effects.simulation.simulator import Played, simulate_mechanism
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 

@@ -12,8 +12,8 @@ from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.result.signature_bins import binned
 from analysis.diagnosis.types import Mask
-from equalizer.effects.evidence import Evidence
 from equalizer.effects.placing import axis_letter
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

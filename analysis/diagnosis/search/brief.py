@@ -21,7 +21,7 @@ from analysis.diagnosis.errors.output_error import Sensitivity
 from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.settings import BRIEF_CONSTANTS, BRIEF_SHARE
 from analysis.diagnosis.types import Mask
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 Places = npt.NDArray[np.int64]

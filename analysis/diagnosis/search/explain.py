@@ -21,7 +21,7 @@ from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.settings import ADDED_GAIN, ADDED_SHARE, MOST_EFFECTS, NOISE_ALONE, SEALED_SURPRISE, SEARCH_ON
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.effects.effect import Effect
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 

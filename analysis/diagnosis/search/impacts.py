@@ -30,7 +30,7 @@ from analysis.diagnosis.settings import (
     VARIES_ERROR,
 )
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"

@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, clai
 from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.lattice import lattice_step
+from equalizer.effects.starts.lattice import lattice_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 

@@ -11,7 +11,7 @@ from analysis.diagnosis.errors.standing import rms_over
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.candidates import candidates
 from analysis.diagnosis.types import Mapper
-from equalizer.effects.evidence import Evidence
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 ROUNDS = 4

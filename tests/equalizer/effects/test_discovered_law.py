@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 
-from equalizer.effects.along_motion import force_along
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.mechanism_kernel import LAWS
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.along_motion import force_along
+from equalizer.effects.simulation.mechanism_kernel import LAWS
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law, law_of
 from equalizer.laws.parse import LawError

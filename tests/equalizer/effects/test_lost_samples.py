@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.reading_kernel import repeat_where
-from equalizer.effects.simulator import Seen, simulate_mechanism
+from equalizer.effects.simulation.reading_kernel import repeat_where
+from equalizer.effects.simulation.simulator import Seen, simulate_mechanism
 
 EFFECT = EFFECTS["lost_samples"]
 ALL = (0, 1, 2)

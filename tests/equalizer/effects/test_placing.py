@@ -7,7 +7,7 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.discovered_law import law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import PlacingError, axis_letter, model_effects, placed_effects
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import law_of
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import ModelEffect

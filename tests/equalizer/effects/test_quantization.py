@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.lattice import lattice_offset, lattice_step, staircase_step
+from equalizer.effects.starts.lattice import lattice_offset, lattice_step, staircase_step
 
 EFFECT = EFFECTS["quantization"]
 NOISE = 0.042

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulator import Seen, simulate_mechanism
+from equalizer.effects.simulation.simulator import Seen, simulate_mechanism
 from equalizer.plant.mechanical_model import SensorLimits
 
 ALL = (0, 1, 2)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lsim, lti
 
-from equalizer.effects.command_path import delayed, lagged
+from equalizer.effects.simulation.command_path import delayed, lagged
 from equalizer.laws.evaluate import evaluate, evaluate_held
 from equalizer.laws.law import law_of
 

@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of
 from analysis.diagnosis.data.carried_weight import carrying, heavier, weighted
 from analysis.diagnosis.errors.choose_measure import measure_of
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 
 ADDED_KG = 0.03
 

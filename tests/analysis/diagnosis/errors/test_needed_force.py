@@ -4,10 +4,10 @@ import pytest
 from analysis.diagnosis.data.motion_smoother import smoothed_motion
 from analysis.diagnosis.data.observed import observed
 from analysis.diagnosis.errors.needed_force import band_motion, needed_force
-from equalizer.effects.along_motion import force_along
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.along_motion import force_along
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import band_limited
 from equalizer.signals.recording import Recording

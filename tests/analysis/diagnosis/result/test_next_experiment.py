@@ -13,7 +13,7 @@ from analysis.diagnosis.result.experiment_menu import experiment_menu
 from analysis.diagnosis.result.next_experiment import Bench, as_document, foresee
 from analysis.diagnosis.settings import TELLING_GAIN
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tolerance
 from equalizer.signals.recording import Hold

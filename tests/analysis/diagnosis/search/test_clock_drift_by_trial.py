@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.search.candidates import clock_drift_by_trial
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.other_times import read_other_times
+from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 
 RATE_HZ, SAMPLES = 4000.0, 3000

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.played_errors import played_error
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal

@@ -9,7 +9,7 @@ from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.law_entry import effects_of
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import law_of
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, Tolerance
 from equalizer.signals.recording import Recording, Segment

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.choose_structure import first_structure
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal

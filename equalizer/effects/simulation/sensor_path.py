@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from equalizer.effects.low_pass_kernel import one_pole
+from equalizer.effects.simulation.low_pass_kernel import one_pole
 from equalizer.signals.signal import FloatArray
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from equalizer.effects.linear_step_kernel import coast
-from equalizer.effects.mechanism_kernel import PORT_ROWS, Integers, play
-from equalizer.effects.modal_form import step_form
+from equalizer.effects.simulation.linear_step_kernel import coast
+from equalizer.effects.simulation.mechanism_kernel import PORT_ROWS, Integers, play
+from equalizer.effects.simulation.modal_form import step_form
 from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
 
@@ -19,7 +19,7 @@ BLOCK, BLOCK_UNDER_FORCES = 4096, 32768
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forces:
-    """What the compiled kernel is told of the forces; see `equalizer.effects.mechanism_kernel.play`."""
+    """What the compiled kernel is told of the forces; see `equalizer.effects.simulation.mechanism_kernel.play`."""
 
     ports: tuple[int, ...]
     """Where they act."""

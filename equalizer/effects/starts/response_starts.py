@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.signal import correlate, correlation_lags
 
-from equalizer.effects.command_starts import best_on_grid
 from equalizer.effects.effect import ALL_SITES
-from equalizer.effects.evidence import Evidence
-from equalizer.effects.other_times import read_other_times
+from equalizer.effects.simulation.other_times import read_other_times
+from equalizer.effects.starts.command_starts import best_on_grid
+from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SHARE = 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from equalizer.effects.instant import (
+from equalizer.effects.simulation.instant import (
     A_FREE,
     A_PER_N,
     F_END,
@@ -31,7 +31,7 @@ from equalizer.effects.instant import (
     V,
     X,
 )
-from equalizer.effects.mechanism_kernel import LAW, LAWS, READ_ONLY, Integers
+from equalizer.effects.simulation.mechanism_kernel import LAW, LAWS, READ_ONLY, Integers
 from equalizer.signals.signal import FloatArray
 
 _VECTOR = types.float64[::1]

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from equalizer.effects.along_motion_kernel import follow
-from equalizer.effects.bodies import bodies_of, forces_of
-from equalizer.effects.command_path import driven_by, finer, moves_between_samples
 from equalizer.effects.effect import STEPS, AxisForce, PlacedEffect
+from equalizer.effects.simulation.along_motion_kernel import follow
+from equalizer.effects.simulation.bodies import bodies_of, forces_of
+from equalizer.effects.simulation.command_path import driven_by, finer, moves_between_samples
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.bodies import Restarts, bodies_of, moved
-from equalizer.effects.command_path import driven_by, finer, moves_between_samples
 from equalizer.effects.effect import STEPS, OnResponse, PlacedEffect
-from equalizer.effects.sensor_path import low_passed, within_range
+from equalizer.effects.simulation.bodies import Restarts, bodies_of, moved
+from equalizer.effects.simulation.command_path import driven_by, finer, moves_between_samples
+from equalizer.effects.simulation.sensor_path import low_passed, within_range
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray

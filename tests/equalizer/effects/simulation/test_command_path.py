@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from equalizer.effects.command_path import delayed, delayed_at_end, finer, lagged, lagged_at_end
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.force_saturation import EFFECT as SATURATION
-from equalizer.effects.simulator import simulate_mechanism
+from equalizer.effects.simulation.command_path import delayed, delayed_at_end, finer, lagged, lagged_at_end
+from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.effects.slew_limit import EFFECT as SLEW
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel
 from equalizer.signals.recording import Hold

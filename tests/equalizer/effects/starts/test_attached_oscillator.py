@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from equalizer.effects.attached_oscillator import MissingMass, hung
+from equalizer.effects.starts.attached_oscillator import MissingMass, hung
 
 
 def test_where_no_frequency_is_driven_nothing_hangs():

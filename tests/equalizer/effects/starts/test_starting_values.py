@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equalizer.effects.starting_values import Beside
+from equalizer.effects.starts.starting_values import Beside
 
 
 def test_a_law_is_found_beside_what_comes_with_it():

@@ -7,7 +7,7 @@ any position sensor sees, but an accelerometer sees the blow with which the forc
 import numpy as np
 from numba import njit, types
 
-from equalizer.effects.instant import F_END, STEP_S, V_FREE, V_PER_N, V
+from equalizer.effects.simulation.instant import F_END, STEP_S, V_FREE, V_PER_N, V
 from equalizer.signals.signal import FloatArray
 
 LONGEST_M = 50e-9

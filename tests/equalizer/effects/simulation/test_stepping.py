@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.effects.bodies import bodies_of, moved
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.command_path import Driven
 from equalizer.effects.effect import AxisForce, PlacedEffect
-from equalizer.effects.instant import (
+from equalizer.effects.simulation.bodies import bodies_of, moved
+from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.instant import (
     A_FREE,
     A_PER_N,
     F_END,
@@ -23,10 +23,10 @@ from equalizer.effects.instant import (
     V,
     X,
 )
-from equalizer.effects.mechanism_kernel import SWEEPS, compiled_law
-from equalizer.effects.modal_form import step_form
-from equalizer.effects.simulator import simulate_mechanism, simulate_response
-from equalizer.effects.stepping import BLOCK
+from equalizer.effects.simulation.mechanism_kernel import SWEEPS, compiled_law
+from equalizer.effects.simulation.modal_form import step_form
+from equalizer.effects.simulation.simulator import simulate_mechanism, simulate_response
+from equalizer.effects.simulation.stepping import BLOCK
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 

@@ -7,7 +7,7 @@ steeply to the motion that a mean of both would swing (dry friction, stops), onl
 
 from numba import njit
 
-from equalizer.effects.instant import (
+from equalizer.effects.simulation.instant import (
     F_END,
     LENGTH,
     SEEN,
@@ -23,7 +23,7 @@ from equalizer.effects.instant import (
     STEP_S,
     TIME_S,
 )
-from equalizer.effects.mechanism_kernel import compiled_law
+from equalizer.effects.simulation.mechanism_kernel import compiled_law
 from equalizer.laws.kernel import BEGUN, END, START, keep, run
 from equalizer.laws.program import DEEPEST
 from equalizer.signals.signal import FloatArray

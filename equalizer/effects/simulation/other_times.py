@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from equalizer.effects.reading_kernel import read_at
+from equalizer.effects.simulation.reading_kernel import read_at
 from equalizer.signals.signal import FloatArray
 
 TAPS, PHASES = 32, 256

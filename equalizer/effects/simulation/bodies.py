@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.command_path import Driven
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
-from equalizer.effects.mechanism_kernel import LAWS, no_force
-from equalizer.effects.stepping import Forces, coasting, pushed
+from equalizer.effects.simulation.command_path import Driven
+from equalizer.effects.simulation.mechanism_kernel import LAWS, no_force
+from equalizer.effects.simulation.stepping import Forces, coasting, pushed
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from numba import njit, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 
-from equalizer.effects.instant import (
+from equalizer.effects.simulation.instant import (
     A_FREE,
     A_PER_N,
     F_END,
@@ -36,7 +36,7 @@ from equalizer.effects.instant import (
     V,
     X,
 )
-from equalizer.effects.linear_step_kernel import FAST, go
+from equalizer.effects.simulation.linear_step_kernel import FAST, go
 from equalizer.signals.signal import FloatArray
 
 LAWS = 6
