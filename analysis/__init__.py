@@ -1,8 +1,8 @@
 """What the data say. Pure: trials and recordings in, results, figures and pages out; knows no files and no screens.
 
-Read in this order: `runs` (staircases recomputed from the answers, never trusted), `thresholds`, `threshold_table`,
-`anova` and `comparisons` (as published), `repeated_measures` and `friedman` (as the design asks for), `ellipsoid`,
-`study_analysis` (all of it in one call), then `figures` and `reports`.
+Rooms: `psychophysics` (trials -> thresholds and statistics), `look` (recordings before any model), `diagnosis`
+(recordings and a model -> the physics that the model lacks), `evaluation` (how good the answers are); `figures` and
+`reports` show what they found. Begin at `psychophysics/study_analysis.py` or `diagnosis/diagnose.py`.
 
 Decisions:
 
@@ -10,5 +10,6 @@ Decisions:
 with the difference in words: readers need both, the first to compare, the second to believe.
 2026-11-22. A threshold with a peak at the cap is called cut by the cap, and no lower bound: it lies above the true
 threshold in some runs. The mark is set by peaks at the cap; comparing the mean with the cap would miss
-every guesser (they end near 2.7 N of 3 N). `thresholds.is_censored` has the measured operating characteristics.
+every guesser (they end near 2.7 N of 3 N). `psychophysics.thresholds.is_censored` has the measured operating
+characteristics.
 """

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from analysis.ellipsoid import EllipsoidResult
 from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, say_nothing_to_draw
+from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import number
 
 _COLUMNS = 6

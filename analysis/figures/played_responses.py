@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from analysis.evaluation.reproduction.played_response import PlayedResponse
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, new_figure, plain_axes, say_nothing_to_draw
-from analysis.reproduction.played_response import PlayedResponse
 
 _AXES = "xyz"
 _COLOURS = (BLUE, VERMILLION, GREEN)

@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from analysis.evaluation.proof.calibration import Calibration
+from analysis.evaluation.proof.detection import Strip, detection_strips, shares_by_size
+from analysis.evaluation.proof.outcome import Outcome
 from analysis.figures.diagnosis_style import ratio_ticks
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
-from analysis.proof.calibration import Calibration
-from analysis.proof.detection import Strip, detection_strips, shares_by_size
-from analysis.proof.outcome import Outcome
 
 MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
 NOTHING_SAID = "no name"

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.ellipsoid import EllipsoidResult
+from analysis.evaluation.reproduction.equalized_findings import EqualizedRows
+from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.figures.frequency_bands import frequency_bands_picture
 from analysis.figures.picture import Picture
 from analysis.figures.played_responses import friction_picture, played_responses_picture
 from analysis.figures.study_pictures import ellipsoid_picture, study_pictures
 from analysis.figures.transfer_functions import transfer_functions_picture
-from analysis.reproduction.equalized_findings import EqualizedRows
-from analysis.reproduction.measured_device import MeasuredDevice
-from analysis.study_analysis import StudyAnalysis
+from analysis.psychophysics.ellipsoid import EllipsoidResult
+from analysis.psychophysics.study_analysis import StudyAnalysis
 from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
 
 

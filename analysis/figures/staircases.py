@@ -17,8 +17,8 @@ from analysis.figures.style import (
     plain_axes,
     say_nothing_to_draw,
 )
-from analysis.runs import Run
-from analysis.thresholds import RunEnd, Threshold, threshold_of
+from analysis.psychophysics.runs import Run
+from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
 from protocols.staircase_rule import StaircaseRule
 
 _COLUMNS = 3

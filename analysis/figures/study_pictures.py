@@ -3,13 +3,13 @@
 import re
 from collections.abc import Sequence
 
-from analysis.ellipsoid import EllipsoidResult
 from analysis.figures.delivered import draw_delivered
 from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.picture import Picture
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
-from analysis.study_analysis import StudyAnalysis
+from analysis.psychophysics.ellipsoid import EllipsoidResult
+from analysis.psychophysics.study_analysis import StudyAnalysis
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:

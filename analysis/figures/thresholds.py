@@ -5,7 +5,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.comparisons import Comparisons
 from analysis.figures.style import (
     BLACK,
     COLOURS,
@@ -16,7 +15,8 @@ from analysis.figures.style import (
     plain_axes,
     say_nothing_to_draw,
 )
-from analysis.threshold_table import ThresholdTable
+from analysis.psychophysics.comparisons import Comparisons
+from analysis.psychophysics.threshold_table import ThresholdTable
 
 _SPREAD = 0.5
 """Width taken by the participants of one frequency, in steps between frequencies."""

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from analysis.proof.injected import DETECTABLE, JUDGED, InjectedOutcome, Tally, injected_figures, tallies
-from analysis.proof.share import Figure
+from analysis.evaluation.proof.injected import DETECTABLE, JUDGED, InjectedOutcome, Tally, injected_figures, tallies
+from analysis.evaluation.proof.share import Figure
 from analysis.reports.page import Section, Table
 
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from analysis.evaluation.proof.controlled import Controlled
+from analysis.evaluation.proof.follow_up import FollowUp
+from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.proof.score import Score
+from analysis.evaluation.proof.share import Figure
+from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text, strength_text
 from analysis.figures.picture import Picture
-from analysis.proof.controlled import Controlled
-from analysis.proof.follow_up import FollowUp
-from analysis.proof.outcome import Outcome
-from analysis.proof.score import Score
-from analysis.proof.share import Figure
-from analysis.proof.wording import concealed_text, figure_text, said_text, strength_text
 from analysis.reports.page import Page, Section, Table, render_page
 
 HOW = (

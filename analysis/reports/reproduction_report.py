@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
+from analysis.evaluation.reproduction.document import FigureFindings, Finding, PlayedRow, Reproduction
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
-from analysis.reproduction.document import FigureFindings, Finding, PlayedRow, Reproduction
 from analysis.wording import NONE, number
 
 BANNER = (

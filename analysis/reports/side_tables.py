@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from analysis.bias import CRITERION_WORDS
-from analysis.equalized_delivery import deliveries
+from analysis.psychophysics.bias import CRITERION_WORDS
+from analysis.psychophysics.equalized_delivery import deliveries
+from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
-from analysis.study_analysis import StudyAnalysis
 from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number, signed
 from protocols.staircase import to_db
 

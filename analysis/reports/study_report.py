@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.ellipsoid import EllipsoidResult
 from analysis.figures.picture import Picture
-from analysis.population import Population
+from analysis.psychophysics.ellipsoid import EllipsoidResult
+from analysis.psychophysics.population import Population
+from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.side_tables import (
@@ -23,7 +24,6 @@ from analysis.reports.study_tables import (
     threshold_table_text,
     within_table,
 )
-from analysis.study_analysis import StudyAnalysis
 
 _BANNERS = {
     Population.PEOPLE: "",

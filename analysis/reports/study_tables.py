@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 
-from analysis.bias import CRITERION_WORDS
-from analysis.ellipsoid import EllipsoidResult
-from analysis.repeated_trials import OFTEN_WORDS
+from analysis.psychophysics.bias import CRITERION_WORDS
+from analysis.psychophysics.ellipsoid import EllipsoidResult
+from analysis.psychophysics.repeated_trials import OFTEN_WORDS
+from analysis.psychophysics.study_analysis import StudyAnalysis
+from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.reports.page import Table
-from analysis.study_analysis import StudyAnalysis
-from analysis.thresholds import RunEnd, Threshold
 from analysis.wording import CUT_NOTE, NONE, count, marked_if_cut, number, p_value, signed
 
 

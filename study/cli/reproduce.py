@@ -26,7 +26,7 @@ def reproduce(
     """
     import json
 
-    from analysis.reproduction.document import reproduction_to_json
+    from analysis.evaluation.reproduction.document import reproduction_to_json
     from study.cli.progress import bar
     from study.evaluation.reproduction.reproduce_paper import reproduce_paper
     from study.evaluation.reproduction.reproduction_plan import ReproductionPlan

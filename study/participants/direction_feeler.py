@@ -33,7 +33,7 @@ class DirectionFeeler:
     lapse: float = 0.0
     """Share of wrong answers that is left at the strongest level; such answers are a coin's, for twice this share."""
     criterion: float = 0.0
-    """c of Macmillan and Creelman, as in `analysis.bias`: positive, a tendency to answer 2; negative, to answer 1."""
+    """c of Macmillan and Creelman, as in `psychophysics.bias`: positive, a tendency to answer 2; negative, to 1."""
     drift_db_per_100_trials: float = 0.0
     """By how much the thresholds rise as the session goes on."""
     numb_above_hz: float = math.inf

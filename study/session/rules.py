@@ -13,7 +13,7 @@ Version 2:
 * Only the repeat key is limited (`trial.repeats_per_run`): a pause and leaving are rights, and are never refused. They
   leave a second look at the same stimulus, and as many more as are wanted: a participant who pauses whenever unsure
   lowers the thresholds (by 1.9 to 4.8 dB in simulations without a limit). Nothing here prevents that. Every cause is
-  logged, and the analysis flags participants with many (`analysis.repeated_trials`): leave such runs out or repeat
+  logged, and the analysis flags participants with many (`psychophysics.repeated_trials`): leave such runs out or repeat
   them.
 * Refused consent and an exclusion, once confirmed, are final, and close the session.
 * A person's place in the balanced order (the participant number) is taken when consent, exclusion questions and

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from analysis.reproduction.document import (
+from analysis.evaluation.reproduction.document import (
     FORMAT,
     VERSION,
     Reproduction,

@@ -1,10 +1,10 @@
 """`thresholds.csv`, and `detection.csv` for detection runs: one row per run, columns as the fields of
-`analysis.thresholds.Threshold`."""
+`analysis.psychophysics.thresholds.Threshold`."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
-from analysis.thresholds import Threshold
+from analysis.psychophysics.thresholds import Threshold
 from study.store.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
 from study.store.file_errors import UnusableFileError
 from study.store.text_file import read_text, write_text

@@ -22,7 +22,7 @@ def _go_together(advance: FloatArray, added: FloatArray, state: FloatArray) -> N
 
 @njit(inline="always")
 def go(advance: FloatArray, added: FloatArray, state: FloatArray) -> None:
-    """One step. advance: (4, s / 2) or (s, s), see `equalizer.effects.simulation.modal_form`. added: (s, ...), by commands."""
+    """One step. advance: (4, s / 2) or (s, s), see `simulation.modal_form`. added: (s, ...), by commands."""
     half = state.shape[0] // 2
     if advance.shape[1] != half:
         _go_together(advance, added, state)

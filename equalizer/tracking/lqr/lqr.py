@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.lqr import lqr_kernel, riccati_kernel
+from equalizer.tracking.lqr import lqr_kernel, riccati_kernel
 from equalizer.tracking.lqr.riccati import NO_CURVATURE, Gains, checked_terminal_weight
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
 

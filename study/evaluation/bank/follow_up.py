@@ -14,8 +14,8 @@ import numpy as np
 
 from analysis.diagnosis.document import diagnosis_from_json
 from analysis.diagnosis.result.experiment_menu import Experiment, experiment_menu
-from analysis.proof.follow_up import FollowUp
-from analysis.proof.outcome import Outcome
+from analysis.evaluation.proof.follow_up import FollowUp
+from analysis.evaluation.proof.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, opened

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from analysis.proof.wording import concealed_text, figure_text, said_text, strength_text
+from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text, strength_text
 from study.evaluation.bank.prove import Proof
 
 

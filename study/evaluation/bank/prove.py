@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.proof.controlled import Controlled
-from analysis.proof.follow_up import FollowUp
-from analysis.proof.outcome import Outcome
-from analysis.proof.score import Score, score
+from analysis.evaluation.proof.controlled import Controlled
+from analysis.evaluation.proof.follow_up import FollowUp
+from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.proof.score import Score, score
 from study.errors import LeftError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.follow_up import NEXT, follow_up

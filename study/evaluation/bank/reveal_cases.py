@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.proof.outcome import Concealed, Outcome
+from analysis.evaluation.proof.outcome import Concealed, Outcome
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
 from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seals_of
 from study.store.provenance import sha256_of

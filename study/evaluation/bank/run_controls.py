@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
-from analysis.proof.controlled import Controlled, controlled
+from analysis.evaluation.proof.controlled import Controlled, controlled
 from study.errors import StudyError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder

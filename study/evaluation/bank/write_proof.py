@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import analysis.diagnosis
+from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.proof.score import main_error
 from analysis.figures.proof_pictures import proof_pictures
-from analysis.proof.outcome import Outcome
-from analysis.proof.score import main_error
 from analysis.reports.proof_report import ProofFacts, render_proof_report
 from study.evaluation.bank.answer_cases import engine_digest
 from study.evaluation.bank.proof_summary import remarks

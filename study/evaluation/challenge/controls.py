@@ -30,8 +30,8 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """claim: how the answers are judged, in `analysis.proof.controlled`. draw: from a seed and a rig what is asked, one
-    after another."""
+    """claim: how the answers are judged, in `proof.controlled`. draw: from a seed and a rig what is asked, one after
+    another."""
 
     name: str
     claim: str

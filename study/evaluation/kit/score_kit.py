@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.proof.lab_kit import MISSING, Label, Scored, kit_figures, not_answered, scored
-from analysis.proof.share import Figure
+from analysis.evaluation.proof.lab_kit import MISSING, Label, Scored, kit_figures, not_answered, scored
+from analysis.evaluation.proof.share import Figure
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, seal_of, sealed_hash
 from study.store.csv_rows import rows_to_csv

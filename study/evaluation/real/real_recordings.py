@@ -9,7 +9,7 @@ from pathlib import Path
 from time import process_time
 
 from analysis.diagnosis.result.real_answer import RealAnswer
-from analysis.proof.injected import InjectedOutcome
+from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, retuned_model

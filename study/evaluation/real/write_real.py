@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.evaluation.proof.injected import InjectedOutcome
 from analysis.figures.real_held_out import real_picture
-from analysis.proof.injected import InjectedOutcome
 from analysis.reports.real_report import Trouble, render_real_report
 from study.store.csv_rows import rows_to_csv
 from study.store.provenance import gather_provenance

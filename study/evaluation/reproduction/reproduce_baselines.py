@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.reproduction.played_response import PlayedResponse, lines_of_band
+from analysis.evaluation.reproduction.played_response import PlayedResponse, lines_of_band
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.baselines import Inverse

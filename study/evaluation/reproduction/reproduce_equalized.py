@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from analysis.reproduction.equalized_findings import EqualizedRows
-from analysis.reproduction.played_response import PlayedResponse, scaled
+from analysis.evaluation.reproduction.equalized_findings import EqualizedRows
+from analysis.evaluation.reproduction.played_response import PlayedResponse, scaled
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.periodic_inverse import periodic_command

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from analysis.reproduction.document import UsedModel
+from analysis.evaluation.reproduction.document import UsedModel
 from equalizer.identification.state_space.held_out import HeldOut, held_out
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping
 
-from analysis.ellipsoid import EllipsoidResult, ellipsoids
-from analysis.reproduction.measured_device import MeasuredDevice
-from analysis.study_analysis import analyse_study
+from analysis.evaluation.reproduction.measured_device import MeasuredDevice
+from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.psychophysics.study_analysis import analyse_study
 from equalizer.identification.frequency_response.coupling_onset import coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, transfer_estimate

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.reproduction.played_response import PlayedResponse, SignalKind, delivered_over_wanted, wanted_wave
+from analysis.evaluation.reproduction.played_response import (
+    PlayedResponse,
+    SignalKind,
+    delivered_over_wanted,
+    wanted_wave,
+)
 from equalizer.signals.excitation import faded
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.clock import VirtualClock

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.ellipsoid import EllipsoidResult
-from analysis.reproduction.document import UsedModel
-from analysis.reproduction.measured_device import MeasuredDevice
-from analysis.reproduction.played_response import PlayedResponse
-from analysis.study_analysis import StudyAnalysis
+from analysis.evaluation.reproduction.document import UsedModel
+from analysis.evaluation.reproduction.measured_device import MeasuredDevice
+from analysis.evaluation.reproduction.played_response import PlayedResponse
+from analysis.psychophysics.ellipsoid import EllipsoidResult
+from analysis.psychophysics.study_analysis import StudyAnalysis
 from equalizer.identification.state_space.held_out import HeldOut
 from study.evaluation.reproduction.reproduce_equalized import Played
 

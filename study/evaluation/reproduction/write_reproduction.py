@@ -4,14 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.evaluation.reproduction.document import FigureFindings, Reproduction
+from analysis.evaluation.reproduction.ellipsoid_findings import ellipsoid_findings
+from analysis.evaluation.reproduction.equalized_findings import equalized_findings
+from analysis.evaluation.reproduction.played_response import played_row
+from analysis.evaluation.reproduction.response_findings import band_findings, response_findings
+from analysis.evaluation.reproduction.study_findings import direction_limit_hz, study_findings
 from analysis.figures.reproduction_pictures import reproduction_pictures
 from analysis.reports.reproduction_report import overview_lines, render_reproduction_report
-from analysis.reproduction.document import FigureFindings, Reproduction
-from analysis.reproduction.ellipsoid_findings import ellipsoid_findings
-from analysis.reproduction.equalized_findings import equalized_findings
-from analysis.reproduction.played_response import played_row
-from analysis.reproduction.response_findings import band_findings, response_findings
-from analysis.reproduction.study_findings import direction_limit_hz, study_findings
 from equalizer.identification.frequency_response.frequency_bands import (
     PUBLISHED_DIRECTION_LIMIT_HZ,
     FrequencyBand,

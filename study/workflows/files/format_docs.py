@@ -14,8 +14,8 @@ from pydantic import TypeAdapter
 
 from analysis.diagnosis import document
 from analysis.diagnosis.result import real_answer
-from analysis.reproduction import document as reproduction_document
-from analysis.thresholds import Threshold
+from analysis.evaluation.reproduction import document as reproduction_document
+from analysis.psychophysics.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
 from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE, TABLE_KINDS

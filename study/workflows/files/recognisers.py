@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
 from analysis.diagnosis.result.real_answer import FORMAT as REAL_ANSWER_FORMAT
+from analysis.evaluation.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from analysis.look.driven_band import silent_segments
-from analysis.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from equalizer.plant.model_quality import quality_brief
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY

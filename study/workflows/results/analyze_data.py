@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
+from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
+from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.study_report import render_study_report
-from analysis.study_analysis import StudyAnalysis, analyse_study, anova_document
-from analysis.threshold_table import ThresholdTable
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.errors import StudyError

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.population import Population, split_by_population
+from analysis.psychophysics.population import Population, split_by_population
 from analysis.wording import listed
 from equalizer.plant.model_quality import NOT_STORED
 from protocols.study_protocol import StudyProtocol

@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from analysis.detection import detection_thresholds
-from analysis.thresholds import Threshold, thresholds
+from analysis.psychophysics.detection import detection_thresholds
+from analysis.psychophysics.thresholds import Threshold, thresholds
 from protocols.trial import Trial
 from study.session.state import SessionState
 from study.store.archive import SessionFolder

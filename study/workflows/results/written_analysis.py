@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.thresholds import Threshold
+    from analysis.psychophysics.thresholds import Threshold
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from analysis.thresholds import RunEnd, Threshold
+from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.wording import NONE, number
 from protocols.schedule import Run
 from protocols.trial import Phase
@@ -22,7 +22,7 @@ from study.workflows.views.session_facts import session_facts
 from study.workflows.views.session_line import line_of, session_line, with_writer
 
 if TYPE_CHECKING:
-    from analysis.study_analysis import StudyAnalysis
+    from analysis.psychophysics.study_analysis import StudyAnalysis
 
 THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark")
 
@@ -91,7 +91,7 @@ def _bare(
 
 def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
     # Statistics load slowly, and the engine, which looks at sessions too, begins at once.
-    from analysis.study_analysis import analyse_study
+    from analysis.psychophysics.study_analysis import analyse_study
 
     try:
         return analyse_study(state.trials, state.protocol), ()

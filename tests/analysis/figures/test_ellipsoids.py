@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.figures.ellipsoids import draw_ellipsoids
+from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 
 RATE = 1000.0
 

@@ -1,12 +1,12 @@
 import pytest
 
-from analysis.anova import one_way
-from analysis.comparisons import compare_all
 from analysis.figures.delivered import draw_delivered
 from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
-from analysis.threshold_table import threshold_table
+from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.comparisons import compare_all
+from analysis.psychophysics.threshold_table import threshold_table
 
 
 @pytest.mark.parametrize(

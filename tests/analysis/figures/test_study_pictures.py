@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
 from analysis.figures.style import MARKERS
-from analysis.study_analysis import analyse_study
+from analysis.psychophysics.study_analysis import analyse_study
 
 
 @pytest.fixture(scope="module")

@@ -10,14 +10,14 @@ import pytest
 from analysis.diagnosis.localisation.state_regions import region_in_words
 from analysis.diagnosis.result.real_answer import OwnNumber
 from analysis.diagnosis.result.wording import summary_lines
-from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
 from analysis.figures.study_pictures import study_pictures
+from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.real_report import number_sentence
 from analysis.reports.reproduction_report import render_reproduction_report
 from analysis.reports.study_report import render_study_report
-from analysis.reproduction.document import FigureFindings, PlayedRow, Reproduction
-from analysis.study_analysis import analyse_study
 from analysis.wording import number, signed, typeset
 
 HYPHEN_BEFORE_NUMBER = re.compile(r"(?<![\w-])-\.?\d\S*")

@@ -6,11 +6,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from analysis.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.figures.study_pictures import study_pictures
+from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.side_tables import detection_table, practice_table
 from analysis.reports.study_report import render_study_report
-from analysis.study_analysis import analyse_study
 from protocols.trial import Phase
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}

@@ -10,9 +10,9 @@ from statistics import NormalDist, fmean
 import numpy as np
 import pytest
 
-from analysis.repeated_trials import repeat_warning
-from analysis.runs import recompute_runs
-from analysis.thresholds import threshold_of
+from analysis.psychophysics.repeated_trials import repeat_warning
+from analysis.psychophysics.runs import recompute_runs
+from analysis.psychophysics.thresholds import threshold_of
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.psychometric_curve import WeibullCurve
 from study.session.draw_check import LogContradiction

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.thresholds import Threshold
+from analysis.psychophysics.thresholds import Threshold
 from protocols.trial import Phase, Trial, TrialStatus
 from study.store.csv_rows import CsvError, as_written_in, in_words, rows_from_csv, rows_to_csv
 from study.store.file_errors import UnusableFileError

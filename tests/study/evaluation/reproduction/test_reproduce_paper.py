@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.reproduction.document import ReproductionError, reproduction_from_json
+from analysis.evaluation.reproduction.document import ReproductionError, reproduction_from_json
 from study.errors import LeftError, StudyError
 from study.evaluation.reproduction.reproduce_models import modelled
 from study.evaluation.reproduction.reproduce_paper import reproduce_paper

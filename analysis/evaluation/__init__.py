@@ -1,0 +1,5 @@
+"""How well the product does its work, as findings judged by stated rules.
+
+`proof` scores blind answers of the diagnosis; `reproduction` puts the published figures beside what came out here.
+Begin at `proof/score.py`.
+"""

@@ -1,0 +1,43 @@
+"""What became of answers that held several effects alike, once one more recording was made."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.evaluation.proof.share import Figure, share
+
+
+@dataclass(frozen=True, slots=True)
+class FollowUp:
+    """Of one device with one effect, whose first recording left several names."""
+
+    number: int
+    effect: str
+    """The concealed one."""
+    returned: tuple[str, ...]
+    """At first."""
+    proposed: str
+    """What to record, in the diagnosis's words; empty where it foresaw that nothing of its menu would tell."""
+    after_proposed: tuple[str, ...]
+    """The returned set with that recording beside the first; empty where none was proposed."""
+    drawn: str
+    """Another of the menu, whichever it was; it may be the same."""
+    after_drawn: tuple[str, ...]
+
+    @property
+    def resolved(self) -> bool:
+        """The one right name is left."""
+        return self.after_proposed == (self.effect,)
+
+    @property
+    def resolved_by_chance(self) -> bool:
+        return self.after_drawn == (self.effect,)
+
+
+def follow_up_figures(found: Sequence[FollowUp]) -> tuple[Figure, ...]:
+    asked = [one for one in found if one.proposed]
+    return (
+        share("several names, the right one left by the proposed recording", found, lambda one: one.resolved),
+        share("several names, the right one left by a random recording", found, lambda one: one.resolved_by_chance),
+        share("the same where one is proposed, by the proposed", asked, lambda one: one.resolved),
+        share("the same where one is proposed, by a random one", asked, lambda one: one.resolved_by_chance),
+    )

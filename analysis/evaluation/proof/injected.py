@@ -1,0 +1,136 @@
+"""Faults that were injected into real recordings: what was said of each, and how often that was right."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from analysis.evaluation.proof.share import Figure, share
+
+DETECTABLE = 1.25
+"""Times that the held-out error of the device's base model changes, up or down, from which on a fault ought to be
+seen."""
+Judged = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
+JUDGED: tuple[Judged, ...] = get_args(Judged)
+
+
+@dataclass(frozen=True, slots=True)
+class InjectedOutcome:
+    recording: str
+    effects: tuple[str, ...]
+    """None where nothing was injected; two where two faults came at once."""
+    places: tuple[str, ...]
+    """Of each."""
+    strength: float
+    values: Mapping[str, float]
+    change: float | None
+    """Held-out error with the fault over that without it, of a base model that is fitted to the clean half; None where
+    there was no such model."""
+    verdict: str
+    named: tuple[str, ...]
+    named_places: tuple[str, ...]
+    returned: tuple[str, ...]
+    seconds: float
+    failed: str = ""
+
+    @property
+    def injected(self) -> str:
+        return " + ".join(self.effects)
+
+    @property
+    def detectable(self) -> bool:
+        if not self.effects or self.change is None:
+            return False
+        return self.change >= DETECTABLE or self.change <= 1 / DETECTABLE
+
+    @property
+    def judged(self) -> Judged:
+        """By the worst of the names. Of two faults at once, one that is named is right, and the other left open."""
+        if not self.effects:
+            return "wrong" if self.named or self.failed else "nothing named"
+        if not self.named:
+            return "unnamed"
+        strange = [place for name, place in zip(self.named, self.named_places, strict=True) if name not in self.effects]
+        if not strange:
+            return "named"
+        if set(self.effects) & set(self.returned) and len(self.named) <= len(self.effects):
+            return "in class"
+        return "other name, right place" if set(strange) <= set(self.places) else "wrong"
+
+    @property
+    def right(self) -> bool:
+        return self.judged in ("named", "in class", "nothing named")
+
+
+def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedOutcome:
+    """From a sealed label and what the diagnosis wrote."""
+    diagnosis = answer.get("diagnosis", {})
+    effects = diagnosis.get("effects", [])
+    named = [one["effect"] for one in effects]
+    rivals = [rival["effect"] for one in effects for rival in one["rivals"] if rival["inseparable"]]
+    return InjectedOutcome(
+        recording=str(label["recording"]),
+        effects=tuple(label["effects"]),
+        places=tuple(label["places"]),
+        strength=float(label["strength"]),
+        values=dict(label["values"]),
+        change=label["change"],
+        verdict=str(diagnosis.get("verdict", "failed")),
+        named=tuple(named),
+        named_places=tuple(one["place"] for one in effects),
+        returned=tuple(dict.fromkeys([*named, *rivals])),
+        seconds=float(answer.get("seconds", 0.0)),
+        failed=str(answer.get("failed", "")),
+    )
+
+
+def injected_figures(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
+    """With Wilson's 95 % intervals."""
+    faults = [one for one in outcomes if one.detectable]
+    weak = [one for one in outcomes if one.effects and not one.detectable]
+    nothing = [one for one in outcomes if not one.effects]
+    return (
+        share("nothing injected, nothing named", nothing, lambda one: one.right),
+        share("detectable faults named, or in the class", faults, lambda one: one.right),
+        share("detectable faults, another name at the right place", faults, _is("other name, right place")),
+        share("detectable faults, a wrong story", faults, _is("wrong")),
+        share("too weak to ask for, named all the same", weak, lambda one: one.right),
+        share("too weak to ask for, a wrong story", weak, _is("wrong")),
+    )
+
+
+def _is(judged: Judged) -> Callable[[InjectedOutcome], bool]:
+    return lambda one: one.judged == judged
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """One row of a table: a kind of fault, or a recording."""
+
+    what: str
+    drawn: int
+    counts: tuple[int, ...]
+    """Of the detectable ones, by JUDGED without its last."""
+    right: Figure
+    nothing: Figure
+    """Where nothing was injected: nothing named."""
+
+
+def tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
+    """By key, in order of its names; outcomes with an empty key are left out."""
+    return tuple(
+        _tally(name, [one for one in outcomes if key(one) == name]) for name in sorted({*map(key, outcomes)} - {""})
+    )
+
+
+def _tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
+    faults = [one for one in outcomes if one.effects]
+    asked = [one for one in faults if one.detectable]
+    nothing = [one for one in outcomes if not one.effects]
+    counts = tuple(sum(one.judged == judged for one in asked) for judged in JUDGED[:-1])
+    return Tally(
+        name,
+        len(faults),
+        counts,
+        share(name, asked, lambda one: one.right),
+        share(name, nothing, lambda one: one.right),
+    )

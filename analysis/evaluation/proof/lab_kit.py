@@ -1,0 +1,133 @@
+"""A blind test on a device that somebody changes on purpose: what is changed, what ought to be said, how it counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Diagnosis
+from analysis.evaluation.proof.share import Figure, share
+
+NOTHING, MISSING = "nothing", "missing"
+"""A change that is none; a verdict that nobody gave."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Something that is done to the device."""
+
+    name: str
+    how: str
+    effects: tuple[str, ...]
+    """Any of these is right; none for nothing."""
+    unit: str
+    """Of the number that the one who changes it writes down; empty where there is none."""
+
+
+CHANGES: tuple[Change, ...] = (
+    Change(NOTHING, "Take everything off and put it back, as if something were changed.", (), ""),
+    Change(
+        "added_mass",
+        "Screw 20 to 100 g to the handle, close to its middle, and weigh them beforehand.",
+        ("added_mass",),
+        "kg",
+    ),
+    Change(
+        "tilted_sensor",
+        "Put a wedge of 3 to 15 degrees under the accelerometer and fasten it again.",
+        ("sensor_misalignment",),
+        "deg",
+    ),
+    Change(
+        "loosened_cable",
+        "Loosen the cable of one drive until its pulley has play that can be felt.",
+        ("backlash", "loose_joint"),
+        "m",
+    ),
+    Change(
+        "magnet_brake",
+        "Fix a strong magnet 2 to 5 mm from a sheet of copper or aluminium that moves with the handle.",
+        ("viscous_damping",),
+        "N s/m",
+    ),
+    Change(
+        "held_handle",
+        "One hand holds the handle lightly, as a pen, for the whole recording.",
+        ("hand_impedance", "time_varying_grip"),
+        "",
+    ),
+)
+CHANGES_BY_NAME = {one.name: one for one in CHANGES}
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """One row of the sealed table. `salt` keeps its hash from being guessed."""
+
+    recording: str
+    change: str
+    value: float | None
+    note: str
+    salt: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scored:
+    recording: str
+    change: str
+    value: float | None
+    verdict: str
+    named: str
+    returned: str
+    right: bool
+    inside: bool | None
+    """Whether the written number lies in the interval of what was named; None where it cannot be asked."""
+
+
+def scored(label: Label, diagnosis: Diagnosis) -> Scored:
+    """Right: one of the change's effects is in the returned set; of nothing, no effect is named."""
+    wanted = CHANGES_BY_NAME[label.change].effects
+    named = tuple(one.effect for one in diagnosis.effects)
+    right = any(one in diagnosis.returned_set for one in wanted) if wanted else not named
+    return Scored(
+        label.recording,
+        label.change,
+        label.value,
+        diagnosis.verdict,
+        " ".join(named),
+        " ".join(diagnosis.returned_set),
+        right,
+        _inside(label, diagnosis, wanted),
+    )
+
+
+def not_answered(label: Label) -> Scored:
+    """Without a diagnosis nothing is right, and a number lies in no interval: leaving one out must raise no rate."""
+    written = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
+    return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if written else None)
+
+
+def _inside(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool | None:
+    for effect in diagnosis.effects:
+        ends = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
+        if effect.effect == next(iter(wanted), "") and ends is not None and label.value is not None:
+            return ends[0] <= label.value <= ends[1]
+    return None
+
+
+def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
+    """With Wilson's 95 % intervals."""
+    changed = [one for one in rows if one.change != NOTHING]
+    kinds = [one.name for one in CHANGES if any(row.change == one.name for row in changed)]
+    return (
+        share("changes named", changed, lambda one: one.right),
+        share("nothing changed, nothing named", _of(rows, NOTHING), lambda one: one.right),
+        share("written numbers inside their interval", _asked(rows), lambda one: bool(one.inside)),
+        *(share(kind, _of(rows, kind), lambda one: one.right) for kind in kinds),
+    )
+
+
+def _of(rows: Sequence[Scored], change: str) -> list[Scored]:
+    return [one for one in rows if one.change == change]
+
+
+def _asked(rows: Sequence[Scored]) -> list[Scored]:
+    return [one for one in rows if one.inside is not None]

@@ -1,0 +1,122 @@
+"""What a bank's outcomes amount to, one figure with its interval each."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.document import NamedEffect
+from analysis.evaluation.proof.calibration import Calibration, calibration
+from analysis.evaluation.proof.follow_up import FollowUp, follow_up_figures
+from analysis.evaluation.proof.miss import NOT_EXPLAINED, has_wrong_name, is_miss, on_another_axis
+from analysis.evaluation.proof.outcome import Concealed, Outcome
+from analysis.evaluation.proof.same_number import as_said
+from analysis.evaluation.proof.share import Figure, pooled, share, statistic
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+
+BANKS = ("main", "dirty", "engine")
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    figures: tuple[Figure, ...]
+    calibration: Calibration
+    misses: tuple[Outcome, ...]
+    """Everything that is not as it should be; what cannot be detected is none."""
+
+
+def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:
+    figures = (
+        *_singles(outcomes), *_nothing(outcomes), *_open_set(outcomes), *_pairs(outcomes),
+        *follow_up_figures(followed), *_numbers(outcomes),
+    )  # fmt: skip
+    return Score(figures, calibration(outcomes), tuple(one for one in outcomes if is_miss(one)))
+
+
+def _of(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
+    return [one for one in outcomes if one.kind == kind and (not bank or one.bank == bank)]
+
+
+def _detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    return [one for one in outcomes if one.detectable]
+
+
+def _singles(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
+    for bank in BANKS:
+        seen = _detectable(_of(outcomes, "single", bank))
+        yield share(f"named right{words[bank]}", seen, lambda one: one.right)
+    whole = _detectable(_of(outcomes, "single"))
+    yield share("named first, all banks", whole, lambda one: one.named_names[:1] == one.names)
+    yield share("in the returned set", whole, lambda one: one.names[0] in one.returned)
+    named = [one for one in whole if one.named]
+    yield statistic("names in the returned set, mean", [float(len(one.returned)) for one in named], np.mean)
+    alone = [one for one in whole if len(one.returned) == 1]
+    yield share("right where one name is returned", alone, lambda one: one.right)
+    yield share("place", named, lambda one: one.named[0].place == one.concealed[0].place)
+    sided = [one for one in named if one.right and one.concealed[0].axis is not None and len(one.axes) > 1]
+    yield share("axis, of two or three", sided, lambda one: not on_another_axis(one))
+    singles = _of(outcomes, "single")
+    seen = [one for one in singles if one.seen_by_oracle]
+    yield share("single effects that count as detectable", singles, lambda one: one.detectable)
+    yield share("named right, of those that an oracle sees", seen, lambda one: one.right)
+    hidden = [one for one in outcomes if one.kind != "nothing" and not one.detectable]
+    yield share("not detectable, yet a wrong name", hidden, has_wrong_name)
+
+
+def _nothing(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    yield share("nothing missing, yet named", _of(outcomes, "nothing"), lambda one: bool(one.named))
+    clean = _of(outcomes, "nothing")
+    yield share("nothing missing, and said so", clean, lambda one: one.verdict in ("no_mismatch", "parameters"))
+
+
+def _open_set(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    outside = _detectable(_of(outcomes, "outside"))
+    yield share("outside the catalogue, not explained", outside, lambda one: one.verdict in NOT_EXPLAINED)
+    yield share("outside the catalogue, no name at all", outside, lambda one: not one.named)
+    without = _detectable(_of(outcomes, "without"))
+    yield share("without the true effect, any name", without, lambda one: bool(one.named))
+    yield share("without the true effect, yet explained", without, lambda one: one.verdict == "explained")
+
+
+def _pairs(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    pairs = _detectable(_of(outcomes, "pair"))
+    yield share("pairs, both and no other", pairs, lambda one: one.right)
+    yield share("pairs, at least one", pairs, lambda one: bool(set(one.names) & set(one.named_names)))
+
+
+def _numbers(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    right = [one for one in _detectable(_of(outcomes, "single")) if one.right]
+    errors = [main_error(one.concealed[0], one.named[0]) for one in right]
+    yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
+    covered = [list(within(one.concealed[0], one.named[0]).values()) for one in right]
+    yield pooled("true value in the 95 % interval", covered)
+    mains = [one for one in right if EFFECTS_BY_NAME[one.names[0]].main.name in within(one.concealed[0], one.named[0])]
+    yield share("the same, main parameters", mains, lambda one: main_within(one.concealed[0], one.named[0]))
+    after = [one.left("after") for one in right]
+    yield statistic("held-out error over noise, worst channel, median", after, np.median)
+    yield statistic("seconds per diagnosis, median", [one.seconds for one in outcomes], np.median)
+
+
+def main_error(true: Concealed, said: NamedEffect) -> float | None:
+    """Relative; None where the label holds no such number."""
+    name = EFFECTS_BY_NAME[true.effect].main.name
+    if not true.values.get(name):
+        return None
+    estimate = said.parameters[name].value
+    value = as_said(name, estimate, true.values)
+    return abs(estimate - value) / abs(value)
+
+
+def within(true: Concealed, said: NamedEffect) -> dict[str, bool]:
+    """Whether the interval holds the true value, of every parameter that has both."""
+    found = {}
+    for name, estimate in said.parameters.items():
+        if estimate.ci95 is not None and name in true.values:
+            value = as_said(name, estimate.value, true.values)
+            found[name] = estimate.ci95[0] <= value <= estimate.ci95[1]
+    return found
+
+
+def main_within(true: Concealed, said: NamedEffect) -> bool:
+    return within(true, said)[EFFECTS_BY_NAME[true.effect].main.name]

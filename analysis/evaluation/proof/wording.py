@@ -1,0 +1,26 @@
+"""Figures and misses of a proof as sentences."""
+
+from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.proof.share import Figure
+
+
+def figure_text(figure: Figure) -> str:
+    if figure.value is None or figure.low is None or figure.high is None:
+        return "none drawn"
+    if figure.hits is None:
+        return f"{figure.value:.3g} [{figure.low:.3g}, {figure.high:.3g}], of {figure.of}"
+    low, high = 100 * figure.low, 100 * figure.high
+    return f"{100 * figure.value:.1f} % [{low:.0f}, {high:.0f}], {figure.hits} of {figure.of}"
+
+
+def concealed_text(one: Outcome) -> str:
+    return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in one.concealed) or "nothing"
+
+
+def said_text(one: Outcome) -> str:
+    said = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in one.named)
+    return f"{one.verdict.replace('_', ' ')}{f': {said}' if said else ''}"
+
+
+def strength_text(one: Outcome) -> str:
+    return ", ".join(f"{value:.2f}" for value in one.strengths)

@@ -1,0 +1,112 @@
+"""One-way analysis of variance between groups, as the study was published.
+
+It treats all values as coming from different people. Where the same people gave all groups (here: every participant
+takes every frequency) their differences stay in the error term, and the test is weaker than the data allow; see
+`analysis.psychophysics.repeated_measures` for the analysis that takes them out.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class GroupSummary:
+    name: str
+    n: int
+    mean: float | None
+    sd: float | None
+    """Sample standard deviation; None below two values."""
+
+
+@dataclass(frozen=True, slots=True)
+class OneWayAnova:
+    """Numbers that the data do not give are None; `notes` say why, in sentences."""
+
+    groups: tuple[GroupSummary, ...]
+    df_between: int | None
+    df_within: int | None
+    ss_between: float | None
+    ss_within: float | None
+    mean_square_within: float | None
+    f: float | None
+    p: float | None
+    eta_squared: float | None
+    omega_squared: float | None
+    """Less biased than eta squared; 0 where the estimate would be negative."""
+    notes: tuple[str, ...]
+
+
+def one_way(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
+    """One-way ANOVA over named groups. None and NaN are gaps; groups may differ in size."""
+    samples = {name: _present(values) for name, values in groups.items()}
+    summaries = tuple(_summary(name, sample) for name, sample in samples.items())
+    gaps = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
+    notes = [f"{gaps} missing value{'s' if gaps != 1 else ''} left out."] if gaps else []
+    notes += [f"There is no value at {group.name}." for group in summaries if group.n == 0]
+    filled = [sample for sample in samples.values() if len(sample)]
+    if len(filled) < 2:
+        notes.append(f"A comparison needs values in at least two groups; there are {len(filled)}.")
+        return _empty(summaries, notes)
+    df_between, df_within = len(filled) - 1, sum(map(len, filled)) - len(filled)
+    if df_within < 1:
+        notes.append("Every group holds a single value, so there is no spread within groups to compare with.")
+        return _empty(summaries, notes, df_between, df_within)
+    return _computed(filled, summaries, notes)
+
+
+def _computed(filled: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]) -> OneWayAnova:
+    everything = np.concatenate(filled)
+    grand = everything.mean()
+    ss_between = float(sum(len(sample) * (sample.mean() - grand) ** 2 for sample in filled))
+    ss_within = float(sum(((sample - sample.mean()) ** 2).sum() for sample in filled))
+    df_between, df_within = len(filled) - 1, len(everything) - len(filled)
+    if no_spread(ss_within, everything):
+        notes.append("All values within each group are equal, so there is no spread to compare with: no F, no p.")
+        return _empty(summaries, notes, df_between, df_within)
+    mean_square = ss_within / df_within
+    ss_total = ss_between + ss_within
+    f = ss_between / df_between / mean_square
+    return OneWayAnova(
+        groups=summaries,
+        df_between=df_between,
+        df_within=df_within,
+        ss_between=ss_between,
+        ss_within=ss_within,
+        mean_square_within=mean_square,
+        f=f,
+        p=float(f_distribution.sf(f, df_between, df_within)),
+        eta_squared=ss_between / ss_total,
+        omega_squared=max(0.0, (ss_between - df_between * mean_square) / (ss_total + mean_square)),
+        notes=tuple(notes),
+    )
+
+
+def no_spread(sum_of_squares: float, values: FloatArray) -> bool:
+    """Whether a sum of squares is nothing but rounding of the values it came from."""
+    scale = float(np.abs(values).max())
+    return bool(sum_of_squares <= values.size * (64 * np.finfo(float).eps * scale) ** 2)
+
+
+def _present(values: Sequence[float | None]) -> FloatArray:
+    return np.array([value for value in values if value is not None and math.isfinite(value)], dtype=np.float64)
+
+
+def _summary(name: str, sample: FloatArray) -> GroupSummary:
+    return GroupSummary(
+        name=name,
+        n=len(sample),
+        mean=float(sample.mean()) if len(sample) else None,
+        sd=float(sample.std(ddof=1)) if len(sample) > 1 else None,
+    )
+
+
+def _empty(
+    groups: tuple[GroupSummary, ...], notes: list[str], df_between: int | None = None, df_within: int | None = None
+) -> OneWayAnova:
+    return OneWayAnova(groups, df_between, df_within, None, None, None, None, None, None, None, tuple(notes))

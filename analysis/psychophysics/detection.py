@@ -1,0 +1,55 @@
+"""Is the vibration felt at all? Thresholds of detection runs: two intervals, one holds a stimulus.
+
+Chance is 50 %, as for directions, so the same staircase converges at the same proportion of right answers.
+
+Source of the two-interval sensitivity: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed.
+(2005), chapter 7.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from analysis.psychophysics.runs import recompute_runs
+from analysis.psychophysics.threshold_table import ThresholdTable
+from analysis.psychophysics.thresholds import Threshold, threshold_of
+from protocols.run_rules import staircase_rule
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase, Trial
+
+
+@dataclass(frozen=True, slots=True)
+class Below:
+    """A direction threshold below the detection threshold of the same participant and frequency."""
+
+    subject: str
+    frequency_hz: float
+    direction_n: float
+    detection_n: float
+
+
+def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[Threshold, ...]:
+    """One row per detection run. `d_prime` is that of two intervals; the criterion as in `analysis.psychophysics.bias`.
+
+    Raises InconsistentTrialsError where the rows contradict the rule.
+    """
+    rule = staircase_rule(protocol, Phase.DETECTION)
+    rows = (threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
+    # Two looks at the same thing: the difference of the intervals has twice the variance.
+    return tuple(row if row.d_prime is None else replace(row, d_prime=row.d_prime / math.sqrt(2)) for row in rows)
+
+
+def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[Below, ...]:
+    """Both tables in newtons. Thresholds of direction that the cap cut are left out."""
+    felt = {
+        (subject, frequency_hz): value
+        for subject, row in zip(detection.subjects, detection.values, strict=True)
+        for frequency_hz, value in zip(detection.frequencies_hz, row, strict=True)
+        if value is not None
+    }
+    return tuple(
+        Below(subject, frequency_hz, value, felt[subject, frequency_hz])
+        for subject, row, bounds in zip(direction.subjects, direction.values, direction.censored, strict=True)
+        for frequency_hz, value, bound in zip(direction.frequencies_hz, row, bounds, strict=True)
+        if value is not None and not bound and value < felt.get((subject, frequency_hz), 0.0)
+    )

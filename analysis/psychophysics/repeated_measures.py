@@ -1,0 +1,131 @@
+"""Analysis of variance within participants, with Greenhouse and Geisser's correction.
+
+Every participant takes every frequency, so each is compared with themselves: differences between people leave the
+error term. Participants with a gap cannot take part in this analysis.
+
+Source: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
+Psychol. Methods 8 (2003), 434-447 (generalized eta squared).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from analysis.psychophysics.anova import no_spread
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class RepeatedMeasures:
+    """Numbers that the data do not give are None; `notes` say why, in sentences."""
+
+    participants: int
+    """Those without a gap."""
+    left_out: tuple[str, ...]
+    """Those with one."""
+    conditions: int
+    df_conditions: int | None
+    df_error: int | None
+    ss_conditions: float | None
+    ss_participants: float | None
+    ss_error: float | None
+    f: float | None
+    p_uncorrected: float | None
+    """Only right where all differences between conditions vary equally (sphericity)."""
+    epsilon: float | None
+    """Greenhouse-Geisser: 1 under sphericity, at least 1 / (conditions - 1)."""
+    p: float | None
+    """With both degrees of freedom times epsilon: the one to report."""
+    p_lower_bound: float | None
+    """With the smallest epsilon there can be."""
+    partial_eta_squared: float | None
+    generalized_eta_squared: float | None
+    notes: tuple[str, ...]
+
+
+def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
+    """values[subject][condition]; None and NaN are gaps."""
+    full = [all(value is not None and math.isfinite(value) for value in row) for row in values]
+    left_out = tuple(subject for subject, whole in zip(subjects, full, strict=True) if not whole)
+    conditions = len(values[0]) if values else 0
+    rows = np.array([row for row, whole in zip(values, full, strict=True) if whole], dtype=np.float64)
+    notes = [f"Left out because a value is missing: {', '.join(left_out)}."] if left_out else []
+    if len(rows) < 2:
+        notes.append(f"The analysis within participants needs two who have every condition; there are {len(rows)}.")
+        return _empty(len(rows), left_out, conditions, notes)
+    if conditions < 2:
+        notes.append(f"The analysis within participants needs two conditions; there are {conditions}.")
+        return _empty(len(rows), left_out, conditions, notes)
+    ss_conditions, ss_participants, ss_error = _sums_of_squares(rows)
+    if no_spread(ss_error, rows):
+        notes.append("All participants change alike over the conditions, so there is no error to compare with.")
+        return _empty(len(rows), left_out, conditions, notes)
+    return _computed(rows, left_out, (ss_conditions, ss_participants, ss_error), notes)
+
+
+def greenhouse_geisser(rows: FloatArray) -> float:
+    """Epsilon from the double-centred covariance of the conditions. rows: (participants, conditions)."""
+    k = int(rows.shape[1])
+    covariance = np.cov(rows, rowvar=False)
+    centred = covariance - covariance.mean(axis=0) - covariance.mean(axis=1)[:, None] + covariance.mean()
+    epsilon = float(np.trace(centred) ** 2 / ((k - 1) * np.sum(centred**2)))
+    return min(1.0, max(1.0 / (k - 1), epsilon))
+
+
+def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
+    n, k = rows.shape
+    by_condition = rows.mean(axis=0) - rows.mean()
+    by_participant = rows.mean(axis=1) - rows.mean()
+    residual = rows - rows.mean() - by_condition - by_participant[:, None]
+    return float(n * np.sum(by_condition**2)), float(k * np.sum(by_participant**2)), float(np.sum(residual**2))
+
+
+def _computed(
+    rows: FloatArray, left_out: tuple[str, ...], sums: tuple[float, float, float], notes: list[str]
+) -> RepeatedMeasures:
+    (n, k), (ss_conditions, ss_participants, ss_error) = rows.shape, sums
+    df_conditions, df_error = k - 1, (n - 1) * (k - 1)
+    f = (ss_conditions / df_conditions) / (ss_error / df_error)
+    epsilon = greenhouse_geisser(rows)
+    return RepeatedMeasures(
+        participants=n,
+        left_out=left_out,
+        conditions=k,
+        df_conditions=df_conditions,
+        df_error=df_error,
+        ss_conditions=ss_conditions,
+        ss_participants=ss_participants,
+        ss_error=ss_error,
+        f=f,
+        p_uncorrected=float(f_distribution.sf(f, df_conditions, df_error)),
+        epsilon=epsilon,
+        p=float(f_distribution.sf(f, epsilon * df_conditions, epsilon * df_error)),
+        p_lower_bound=float(f_distribution.sf(f, 1, n - 1)),
+        partial_eta_squared=ss_conditions / (ss_conditions + ss_error),
+        generalized_eta_squared=ss_conditions / (ss_conditions + ss_participants + ss_error),
+        notes=tuple(notes),
+    )
+
+
+def _empty(participants: int, left_out: tuple[str, ...], conditions: int, notes: list[str]) -> RepeatedMeasures:
+    return RepeatedMeasures(
+        participants=participants,
+        left_out=left_out,
+        conditions=conditions,
+        df_conditions=None,
+        df_error=None,
+        ss_conditions=None,
+        ss_participants=None,
+        ss_error=None,
+        f=None,
+        p_uncorrected=None,
+        epsilon=None,
+        p=None,
+        p_lower_bound=None,
+        partial_eta_squared=None,
+        generalized_eta_squared=None,
+        notes=tuple(notes),
+    )

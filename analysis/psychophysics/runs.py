@@ -1,0 +1,127 @@
+"""Runs recomputed from the raw answers: the levels in the rows are checked, never trusted."""
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from protocols.staircase import StaircaseState, begin, finished, level_n, step
+from protocols.staircase_rule import StaircaseRule
+from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
+
+LEVEL_TOLERANCE = 1e-4
+"""Relative: a thousandth of a dB. Covers rounding in a table, and is far below any step."""
+
+
+class InconsistentTrialsError(ValueError):
+    """Rows that cannot have come from the stated rule."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One staircase of one participant at one frequency."""
+
+    subject: str
+    session: str
+    run: int
+    frequency_hz: float
+    answered: tuple[Trial, ...]
+    """The trials that moved the staircase, in order; catch trials among them are not here."""
+    spoiled_trials: int
+    state: StaircaseState
+    """Where the staircase stands after the last of them."""
+    complete: bool
+    """Whether the run has all reversals of its rule; one that ran out of trials has not."""
+    presentations: int = 0
+    """Void ones and catch trials included."""
+    repeats_at_will: int = 0
+    """Presentations that the participant made void: asked for again, paused, left, answered too late or too early."""
+
+
+def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST) -> tuple[Run, ...]:
+    """All runs of one phase, in the order in which they first occur.
+
+    Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
+    staircase: whoever asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.practice`).
+
+    Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
+    answers before it lead to, or where a row is missing, doubled or too many.
+    """
+    phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
+    grouped: dict[tuple[str, str, int], list[Trial]] = {}
+    for trial in trials:
+        if trial.phase in phases:
+            grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
+    return tuple(_recompute(rows, rule) for rows in grouped.values())
+
+
+def _recompute(rows: list[Trial], rule: StaircaseRule) -> Run:
+    first = rows[0]
+    counted = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
+    _refuse_strange_rows(rows, counted)
+    state = _fold(counted, rule)
+    steering = [trial for trial in rows if trial.phase is not Phase.CATCH]
+    return Run(
+        subject=first.subject,
+        session=first.session,
+        run=first.run,
+        frequency_hz=first.frequency_hz,
+        answered=tuple(trial for trial in counted if trial.phase is not Phase.CATCH),
+        spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in steering),
+        state=state,
+        complete=state.reversals >= rule.reversals,
+        presentations=len(rows),
+        repeats_at_will=sum(trial.void_cause in AT_WILL for trial in rows),
+    )
+
+
+def _fold(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
+    state = begin(rule)
+    for trial in counted:
+        if finished(rule, state):
+            raise InconsistentTrialsError(
+                f"{_place(trial)}: an answer follows although the run was over after {state.trials} trials "
+                f"with {state.reversals} reversals"
+            )
+        if trial.correct is None:
+            raise InconsistentTrialsError(f"{_place(trial)}: there is an answer, but correct is empty")
+        if trial.phase is Phase.CATCH:
+            _refuse_weak_catch_trial(trial, rule)
+            continue
+        expected_n = level_n(rule, state)
+        if not math.isclose(trial.level_n, expected_n, rel_tol=LEVEL_TOLERANCE):
+            raise InconsistentTrialsError(
+                f"{_place(trial)}: level_n is {trial.level_n:.6g} N, but the answers before it lead to "
+                f"{expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
+            )
+        state = step(rule, state, trial.correct)
+    return state
+
+
+def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
+    """A test trial that was renamed would be missed by nobody: below the cap it shows."""
+    if not math.isclose(trial.level_n, rule.cap_n, rel_tol=LEVEL_TOLERANCE):
+        raise InconsistentTrialsError(
+            f"{_place(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the cap "
+            f"of {rule.cap_n:g} N"
+        )
+
+
+def _refuse_strange_rows(rows: list[Trial], counted: tuple[Trial, ...]) -> None:
+    first = rows[0]
+    for trial in rows:
+        if trial.frequency_hz != first.frequency_hz:
+            raise InconsistentTrialsError(
+                f"{_place(trial)}: {trial.frequency_hz:g} Hz in a run that began at {first.frequency_hz:g} Hz"
+            )
+    for before, after in itertools.pairwise(counted):
+        if after.trial == before.trial:
+            raise InconsistentTrialsError(f"{_place(after)}: two attempts of this trial have an answer that counts")
+        if after.trial != before.trial + 1:
+            raise InconsistentTrialsError(
+                f"{_place(after)}: the trial before it with an answer is {before.trial}; those between are missing"
+            )
+
+
+def _place(trial: Trial) -> str:
+    return f"subject {trial.subject}, session {trial.session}, run {trial.run}, trial {trial.trial}"

@@ -1,0 +1,144 @@
+"""Everything that the trials of one study say, in one call."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from analysis.psychophysics.anova import OneWayAnova, one_way
+from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
+from analysis.psychophysics.comparisons import Comparisons, compare_all
+from analysis.psychophysics.detection import detection_thresholds
+from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
+from analysis.psychophysics.friedman import Friedman, friedman
+from analysis.psychophysics.population import Population, split_by_population
+from analysis.psychophysics.practice import PracticeRun, practice_runs
+from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
+from analysis.psychophysics.repeated_trials import repeat_warning
+from analysis.psychophysics.runs import Run, recompute_runs
+from analysis.psychophysics.study_warnings import side_warnings, study_warnings
+from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
+from analysis.psychophysics.thresholds import Threshold, threshold_of
+from analysis.wording import f_text, p_text
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase, Trial
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class StudyAnalysis:
+    protocol: StudyProtocol
+    population: Population | None
+    """None when there is no trial at all."""
+    trials: tuple[Trial, ...]
+    """Those of the test phase."""
+    runs: tuple[Run, ...]
+    thresholds: tuple[Threshold, ...]
+    """One per run, in the same order."""
+    table: ThresholdTable
+    anova: OneWayAnova
+    comparisons: Comparisons
+    within: RepeatedMeasures
+    ranks: Friedman
+    difference: str
+    """What separates the published one-way analysis from the one within participants, here."""
+    warnings: tuple[str, ...]
+    detection: tuple[Threshold, ...]
+    """One per detection run."""
+    detection_table: ThresholdTable
+    catches: tuple[CatchTally, ...]
+    practice: tuple[PracticeRun, ...]
+
+
+def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnalysis:
+    """Thresholds and statistics of trials of one population that followed one protocol.
+
+    Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
+    with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
+    """
+    parts = split_by_population(trials)
+    if len(parts) > 1:
+        raise ValueError(
+            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; "
+            "analyse each kind by itself"
+        )
+    rule = protocol.staircase
+    runs = recompute_runs(trials, rule)
+    rows = tuple(threshold_of(run, rule) for run in runs)
+    tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
+    table = threshold_table(rows, protocol.stimulus.frequencies_hz)
+    detection = detection_thresholds(trials, protocol)
+    detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
+    catches = catch_tallies(trials)
+    anova = one_way(table.groups())
+    within = repeated_measures(table.subjects, table.values)
+    return StudyAnalysis(
+        protocol=protocol,
+        population=next(iter(parts), None),
+        trials=tested,
+        runs=runs,
+        thresholds=rows,
+        table=table,
+        anova=anova,
+        comparisons=compare_all(anova, CONFIDENCE),
+        within=within,
+        ranks=friedman(table.values),
+        difference=design_difference(anova, within),
+        warnings=(
+            *study_warnings(tested, rows, table, protocol),
+            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested))]),
+            *side_warnings(catches, detection, table, detection_table),
+        ),
+        detection=detection,
+        detection_table=detection_table,
+        catches=catches,
+        practice=practice_runs(trials, protocol),
+    )
+
+
+def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
+    """The statistics as JSON values: None where the data give no number, with the reason in the notes beside it."""
+    return {
+        "format": "hapteq-anova",
+        "version": 1,
+        "population": analysis.population.value if analysis.population else None,
+        "unit": "N",
+        "participants": list(analysis.table.subjects),
+        "frequencies_hz": list(analysis.table.frequencies_hz),
+        "cut_by_cap": analysis.table.cut,
+        "lower_bounds": analysis.table.cut,  # older name of cut_by_cap, kept for programs that read it
+        "stopped_by_trial_limit": sum(map(sum, analysis.table.stopped)),
+        "coverage": analysis.table.coverage or None,
+        "one_way": asdict(analysis.anova),
+        "comparisons": asdict(analysis.comparisons),
+        "within_participants": asdict(analysis.within),
+        "friedman": asdict(analysis.ranks),
+        "difference": analysis.difference,
+        "warnings": list(analysis.warnings),
+    }
+
+
+def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
+    """The published analysis beside the one within participants, in words and numbers."""
+    if anova.p is None or within.p is None:
+        said = "neither" if anova.p is None and within.p is None else "only one"
+        return (
+            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {said} "
+            "can be computed from these data, so they cannot be compared."
+        )
+    agree = (anova.p < 0.05) == (within.p < 0.05)
+    return (
+        "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
+        f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
+        "Every participant took every frequency; the analysis within participants takes those differences out "
+        f"({_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
+        f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
+        f"{within.epsilon:.2f}, {p_text(within.p)}. "
+        + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
+        + "The second one fits the design; the first is here to compare with the published result."
+    )
+
+
+def _removed_percent(within: RepeatedMeasures) -> str:
+    between, error = within.ss_participants or 0.0, within.ss_error or 0.0
+    return f"{100 * between / (between + error):.0f} %"

@@ -1,0 +1,101 @@
+"""One threshold per participant and frequency, with the gaps left as gaps."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from analysis.psychophysics.thresholds import RunEnd, Threshold
+
+Quantity = Literal["threshold_n", "threshold_db", "threshold_mps2", "threshold_mm"]
+
+
+@dataclass(frozen=True, slots=True)
+class ThresholdTable:
+    quantity: Quantity
+    subjects: tuple[str, ...]
+    frequencies_hz: tuple[float, ...]
+    values: tuple[tuple[float | None, ...], ...]
+    """values[subject][frequency]; None where there is no completed run."""
+    censored: tuple[tuple[bool, ...], ...]
+    """Same shape: True where the value is cut by the cap."""
+    stopped: tuple[tuple[bool, ...], ...]
+    """Same shape: True where there is no value because the trial limit ended every run."""
+    notes: tuple[str, ...]
+    """What was left out, in sentences."""
+
+    def groups(self) -> dict[str, tuple[float | None, ...]]:
+        """The values of each frequency, named like "35 Hz", one entry per participant."""
+        columns = zip(*self.values, strict=True) if self.values else ((),) * len(self.frequencies_hz)
+        return {frequency_name(f): column for f, column in zip(self.frequencies_hz, columns, strict=True)}
+
+    @property
+    def cut(self) -> int:
+        """How many values are cut by the cap."""
+        return sum(map(sum, self.censored))
+
+    @property
+    def coverage(self) -> str:
+        """Why intervals and effect sizes of this table have no stated coverage; empty where nothing is cut."""
+        lost = sum(map(sum, self.stopped))
+        causes = [f"{self.cut} of the values {'is' if self.cut == 1 else 'are'} cut by the cap"] if self.cut else []
+        causes += [f"{lost} {'is' if lost == 1 else 'are'} missing because of the trial limit"] if lost else []
+        if not causes:
+            return ""
+        return (
+            f"Without coverage: {' and '.join(causes)}. Means near the cap come out too low, and the stated confidence "
+            "of intervals and effect sizes does not hold."
+        )
+
+    def missing(self) -> tuple[tuple[str, float], ...]:
+        """Participant and frequency of every gap."""
+        return tuple(
+            (subject, frequency)
+            for subject, row in zip(self.subjects, self.values, strict=True)
+            for frequency, value in zip(self.frequencies_hz, row, strict=True)
+            if value is None
+        )
+
+
+def threshold_table(
+    rows: Sequence[Threshold], frequencies_hz: Sequence[float], quantity: Quantity = "threshold_n"
+) -> ThresholdTable:
+    """The first completed run of each participant at each of the frequencies.
+
+    The first, because a run repeated after its result was seen must not replace it; later ones are named in the
+    notes. Participants in the order of their first row; those without any completed run have a row of gaps.
+    """
+    subjects = tuple(dict.fromkeys(row.subject for row in rows))
+    first: dict[tuple[str, float], Threshold] = {}
+    limited = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
+    notes = []
+    for row in rows:
+        key = (row.subject, row.frequency_hz)
+        if row.frequency_hz not in frequencies_hz:
+            notes.append(f"{row.subject} has a run at {row.frequency_hz:g} Hz, which the protocol does not name.")
+        elif row.complete and key in first:
+            notes.append(
+                f"{row.subject} completed more than one run at {row.frequency_hz:g} Hz; the first one counts "
+                f"(session {first[key].session}), not run {row.run} of session {row.session}."
+            )
+        elif row.complete:
+            first[key] = row
+    ordered = tuple(sorted(frequencies_hz))
+    return ThresholdTable(
+        quantity=quantity,
+        subjects=subjects,
+        frequencies_hz=ordered,
+        values=tuple(tuple(_value(first.get((s, f)), quantity) for f in ordered) for s in subjects),
+        censored=tuple(tuple((s, f) in first and first[s, f].censored for f in ordered) for s in subjects),
+        stopped=tuple(tuple((s, f) in limited and (s, f) not in first for f in ordered) for s in subjects),
+        notes=tuple(notes),
+    )
+
+
+def frequency_name(frequency_hz: float) -> str:
+    return f"{frequency_hz:g} Hz"
+
+
+def _value(row: Threshold | None, quantity: Quantity) -> float | None:
+    value: float | None = None if row is None else getattr(row, quantity)
+    return None if value is None or math.isnan(value) else value

@@ -1,0 +1,59 @@
+"""Claims about the answers of controls."""
+
+import pytest
+
+from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
+from analysis.evaluation.proof.controlled import CLAIMS, controlled
+
+CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
+ERRORS = Errors(0.5, 0.3, 0.1, 0.1)
+
+
+def pushed(force, axis="x", probability=0.9):
+    effect = NamedEffect("constant_force", "mechanism", axis, 0.9, probability, {"force": Estimate(force, "N")})
+    return Diagnosis("explained", (CELL,), (effect,), {}, (), Fit(ERRORS, ERRORS), "free simulation", None)
+
+
+def unnamed(verdict):
+    return Diagnosis(verdict, (CELL,), (), {}, (), Fit(ERRORS, ERRORS), "free simulation", None)
+
+
+@pytest.mark.parametrize(
+    ("claim", "answers", "held"),
+    [
+        ("no name", [unnamed("unexplained")], True),
+        ("no name", [None], True),
+        ("no name", [pushed(1.0)], False),
+        ("no name", [pushed(1.0, probability=0.3)], True),
+        ("not explained", [unnamed("unexplained")], True),
+        ("not explained", [pushed(1.0)], False),
+        ("nothing", [unnamed("parameters")], True),
+        ("nothing", [unnamed("unexplained")], False),
+        ("nothing", [None], False),
+        ("same", [pushed(1.0), pushed(1.1)], True),
+        ("same", [pushed(1.0), pushed(1.0, "y")], False),
+        ("same", [unnamed("unexplained"), unnamed("unexplained")], False),
+        ("same", [pushed(1.0), None], False),
+        ("same but axes", [pushed(1.0), pushed(1.0, "q0")], True),
+        ("axis exchanged", [pushed(1.0), pushed(1.0, "y")], True),
+        ("axis exchanged", [pushed(1.0), pushed(1.0)], False),
+        ("axis exchanged", [pushed(1.0, None), pushed(1.0, "y")], False),
+        ("axis exchanged", [pushed(1.0), unnamed("unexplained")], False),
+        ("opposite", [pushed(1.0), pushed(-1.001)], True),
+        ("opposite", [pushed(1.0), pushed(1.0)], False),
+        ("opposite", [pushed(1.0), unnamed("unexplained")], False),
+    ],
+)
+def test_a_claim_holds_or_does_not(claim, answers, held):
+    assert controlled("a control", claim, answers).held is held
+
+
+def test_answers_are_said_in_words():
+    said = controlled("a control", "same", [pushed(1.0), None]).said
+    assert said == ("explained: constant_force of x", "no answer")
+
+
+def test_every_claim_of_a_control_is_known():
+    from study.evaluation.challenge.controls import CONTROLS
+
+    assert {one.claim for one in CONTROLS} == set(CLAIMS)

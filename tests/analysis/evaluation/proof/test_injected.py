@@ -1,0 +1,86 @@
+"""What counts as right for a fault that was injected."""
+
+import pytest
+
+from analysis.evaluation.proof.injected import DETECTABLE, injected_figures, outcome_of, tallies
+from analysis.reports.injected_section import figure_text, injected_section, kind_of
+
+PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
+
+
+def outcome(effects=("sensor_lag",), named=("sensor_lag",), rivals=(), change=3.0):
+    label = {
+        "recording": "rig",
+        "effects": list(effects),
+        "places": [PLACES[one] for one in effects],
+        "strength": 0.5,
+        "values": {"bandwidth": 80.0},
+        "change": change,
+    }
+    said = [
+        {"effect": one, "place": PLACES[one], "rivals": [{"effect": other, "inseparable": True} for other in rivals]}
+        for one in named
+    ]
+    return outcome_of(label, {"seconds": 2.0, "diagnosis": {"verdict": "partly_explained", "effects": said}})
+
+
+def by_name(outcomes):
+    return {one.name: one for one in injected_figures(outcomes)}
+
+
+@pytest.mark.parametrize(
+    ("named", "rivals", "judged"),
+    [
+        (("sensor_lag",), (), "named"),
+        (("amplifier_lag",), ("sensor_lag",), "in class"),
+        (("sensor_gain",), (), "other name, right place"),
+        (("added_mass",), (), "wrong"),
+        (("sensor_lag", "added_mass"), (), "wrong"),
+        ((), (), "unnamed"),
+    ],
+)
+def test_what_is_said_of_a_fault_is_judged_by_its_worst_name(named, rivals, judged):
+    assert outcome(named=named, rivals=rivals).judged == judged
+
+
+def test_of_two_faults_one_may_be_left_open():
+    both = ("added_mass", "sensor_gain")
+    assert outcome(both, ("added_mass",)).judged == "named"
+    assert outcome(both, ("amplifier_lag",)).judged == "wrong"
+    assert kind_of(outcome(both)) == "two at once"
+
+
+def test_nothing_injected_is_right_where_nothing_is_named():
+    assert outcome(effects=(), named=()).right
+    assert outcome(effects=()).judged == "wrong"
+
+
+def test_an_answer_that_failed_is_no_right_answer():
+    label = {"recording": "rig", "effects": [], "places": [], "strength": 0.0, "values": {}, "change": 1.0}
+    failed = outcome_of(label, {"failed": "it broke"})
+    assert failed.verdict == "failed"
+    assert not failed.right
+
+
+def test_only_detectable_faults_are_asked_for():
+    outcomes = [
+        outcome(),
+        outcome(named=()),
+        outcome(change=0.5 / DETECTABLE),
+        outcome(named=(), change=0.99 * DETECTABLE),
+        outcome(change=None),
+        outcome((), ()),
+    ]
+    figures = by_name(outcomes)
+    asked = figures["detectable faults named, or in the class"]
+    assert (asked.hits, asked.of) == (2, 3)
+    assert figures["nothing injected, nothing named"].hits == 1
+    assert figure_text(by_name([])["nothing injected, nothing named"]) == "none was drawn"
+    (row,) = tallies(outcomes, kind_of)
+    assert (row.what, row.drawn, row.counts) == ("sensor_lag", 5, (2, 0, 0, 0, 1))
+
+
+def test_every_miss_and_every_wrong_story_is_listed():
+    said = [outcome(), outcome(named=("sensor_gain",)), outcome((), ("added_mass",)), outcome(named=(), change=1.0)]
+    listed = injected_section(said).tables[-1]
+    assert [row[1] for row in listed.rows] == ["sensor_lag", "nothing"]

@@ -1,0 +1,194 @@
+"""Figures of a proof from outcomes that are written by hand."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
+from analysis.evaluation.proof.calibration import calibration
+from analysis.evaluation.proof.detection import detection_strips, seen_from, shares_by_size, what_became_of
+from analysis.evaluation.proof.follow_up import FollowUp
+from analysis.evaluation.proof.miss import is_miss
+from analysis.evaluation.proof.outcome import Concealed, Outcome
+from analysis.evaluation.proof.score import score
+from analysis.evaluation.proof.share import pooled, share, statistic
+from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text
+from analysis.figures.proof_pictures import proof_pictures
+from analysis.reports.proof_report import ProofFacts, render_proof_report
+from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+
+CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
+ERRORS = Errors(0.5, 0.3, 0.1, 0.1)
+
+
+def named(effect, value=1.0, ci95=(0.9, 1.1), probability=0.9, inseparable=(), axis="x"):
+    known = EFFECTS_BY_NAME[effect]
+    rivals = tuple(Rival(name, 0.05, True, "as good") for name in inseparable)
+    return NamedEffect(
+        effect, known.place, axis, 0.9, probability, {known.main.name: Estimate(value, "1", ci95)}, rivals
+    )
+
+
+def said(verdict, *effects):
+    remainder = (CELL,) if verdict == "partly_explained" else ()
+    return Diagnosis(verdict, (CELL,), effects, {}, remainder, Fit(ERRORS, ERRORS), "free simulation", None)
+
+
+def outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="main", retuned=5.0, **more):
+    hidden = tuple(
+        Concealed(name, getattr(EFFECTS_BY_NAME.get(name), "place", "mechanism"), "x", {"level": 1.0, "damping": 1.0})
+        for name in concealed
+    )
+    found = {"before": {"ax": 9.0}, "retuned": {"ax": retuned, "x": 1.0}, "after": {"ax": 1.05}}
+    fixed = {
+        "number": 0,
+        "seed": 1,
+        "axes": ("x", "y"),
+        "model": "retuned",
+        "strengths": (0.5,),
+        "adds": 3.0,
+        "seconds": 4.0,
+    }
+    return Outcome(kind=kind, bank=bank, concealed=hidden, said=answer, channel_errors=found, **(fixed | more))
+
+
+RIGHT = outcome(answer=said("explained", named("coulomb_friction")))
+WRONG = outcome(answer=said("explained", named("viscous_damping", probability=0.6)))
+IN_SET = outcome(answer=said("explained", named("viscous_damping", inseparable=("coulomb_friction",))))
+UNSEEN = outcome(answer=said("parameters"), retuned=1.1, adds=1.0)
+ALARM = outcome("nothing", (), said("explained", named("cogging")), strengths=())
+CLEAN = outcome("nothing", (), said("parameters"), strengths=())
+OUTSIDE = outcome("outside", ("creep",), said("unexplained"))
+TAKEN_IN = outcome("outside", ("creep",), said("explained", named("cogging")))
+WITHOUT = outcome("without", answer=said("unexplained"))
+PAIR = outcome(
+    "pair",
+    ("coulomb_friction", "viscous_damping"),
+    said("partly_explained", named("coulomb_friction")),
+    strengths=(1, 1),
+)
+BROKEN = outcome()
+GUESSED = outcome(answer=said("explained", named("cogging")), retuned=1.1, adds=0.4)
+PARTLY = outcome("without", answer=said("partly_explained", named("stribeck_friction")))
+ALL = (RIGHT, WRONG, IN_SET, UNSEEN, GUESSED, ALARM, CLEAN, OUTSIDE, TAKEN_IN, WITHOUT, PARTLY, PAIR, BROKEN)
+
+
+def figure(outcomes, name):
+    return next(one for one in score(outcomes).figures if one.name == name)
+
+
+@pytest.mark.parametrize(
+    ("name", "hits", "of"),
+    [
+        ("named right", 1, 4),
+        ("in the returned set", 2, 4),
+        ("right where one name is returned", 1, 2),
+        ("nothing missing, yet named", 1, 2),
+        ("outside the catalogue, not explained", 1, 2),
+        ("without the true effect, yet explained", 0, 2),
+        ("pairs, both and no other", 0, 1),
+        ("pairs, at least one", 1, 1),
+        ("true value in the 95 % interval", 1, 1),
+        ("without the true effect, any name", 1, 2),
+        ("single effects that count as detectable", 4, 6),
+        ("named right, of those that an oracle sees", 1, 5),
+        ("not detectable, yet a wrong name", 1, 2),
+    ],
+)
+def test_shares_count_what_their_names_say(name, hits, of):
+    found = figure(ALL, name)
+    assert (found.hits, found.of) == (hits, of)
+
+
+def test_every_answer_that_is_not_as_it_should_be_is_listed():
+    assert {id(one) for one in score(ALL).misses} == {
+        id(o) for o in (WRONG, IN_SET, GUESSED, ALARM, TAKEN_IN, PARTLY, PAIR, BROKEN)
+    }
+
+
+def test_what_cannot_be_seen_is_no_miss_and_what_broke_down_is_one():
+    assert not is_miss(UNSEEN)
+    assert is_miss(BROKEN)
+
+
+def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
+    there = said("explained", named("coulomb_friction", axis="y"))
+    assert is_miss(outcome(answer=there))
+    assert not is_miss(outcome(answer=there, axes=("x",)))
+    assert not is_miss(outcome(answer=said("explained", named("coulomb_friction", axis=None))))
+
+
+def test_what_hangs_together_is_resampled_together():
+    whole = [[True] * 10, [False] * 10] * 10
+    found, alone = pooled("together", whole), share("alone", [one for group in whole for one in group], bool)
+    assert found.value == alone.value == 0.5
+    assert found.high - found.low > 2 * (alone.high - alone.low)
+    assert pooled("none", [[], []]).value is None
+
+
+def test_shares_of_nothing_have_no_value():
+    assert share("none", [], bool).value is None
+    assert figure_text(share("none", [], bool)) == "none drawn"
+    assert statistic("none", [], np.median).value is None
+
+
+def test_an_interval_holds_its_share():
+    found = share("half", [True, False] * 50, bool)
+    assert found.low < 0.5 < found.high
+    assert figure_text(found).startswith("50.0 % [40, 60]")
+
+
+def test_probabilities_that_mean_what_they_say_have_no_error():
+    honest = [outcome(answer=said("explained", named("coulomb_friction", probability=0.75)))] * 30
+    honest += [outcome(answer=said("explained", named("cogging", probability=0.75)))] * 10
+    mixed = [honest[k] for k in np.random.default_rng(1).permutation(40)]
+    assert calibration(mixed).error == pytest.approx(0.0, abs=1e-12)  # whatever order they tie in
+    boasting = calibration([WRONG] * 20)
+    assert boasting.error == pytest.approx(0.6)
+    assert len(boasting.bins) == 10
+
+
+def test_each_draw_becomes_a_mark_of_its_effect():
+    strips = detection_strips([RIGHT, WRONG, IN_SET, UNSEEN])
+    assert [strip.effect for strip in strips] == ["coulomb_friction"]
+    assert sorted(how for _, how in strips[0].draws) == ["in the set", "invisible", "missed", "right"]
+    assert what_became_of(BROKEN) == "missed"
+
+
+def test_an_oracle_sees_an_effect_from_where_it_adds_three_quarters_of_the_noise():
+    drawn = [outcome(adds=0.075 * 100**strength, strengths=(strength,)) for strength in (0.0, 0.2, 0.7, 1.0)]
+    assert seen_from(drawn) == pytest.approx(0.5)
+    assert seen_from([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
+    assert seen_from(drawn[:2]) is None
+    assert detection_strips(drawn)[0].oracle == pytest.approx(0.5)
+
+
+def test_larger_effects_come_later():
+    drawn = [outcome(answer=said("parameters"), adds=float(k), retuned=1.0) for k in range(40)]
+    sizes = [part.adds for part in shares_by_size(drawn)]
+    assert sizes == sorted(sizes) and len(sizes) == 10
+
+
+def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
+    whole = score(ALL)
+    pictures = proof_pictures(ALL, whole.calibration)
+    assert [one.name for one in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
+    both = ("sensor_lag", "logger_offset")
+    followed = (
+        FollowUp(5, "sensor_lag", both, "a sweep from 1 to 450 Hz", ("sensor_lag",), "a slow sinusoid", both),
+        FollowUp(6, "sensor_lag", both, "", (), "a slow sinusoid", ()),
+    )
+    facts = ProofFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
+    page = render_proof_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
+    assert page.index("Misses: 8") < page.index("Figures")
+    assert "One remark." in page and "ab" * 32 in page
+    assert "sensor_lag, logger_offset" in page and "nothing would tell" in page and "no name" in page
+
+
+def test_a_bank_of_nothing_has_no_pictures():
+    assert proof_pictures([CLEAN], calibration([CLEAN])) == ()
+
+
+def test_sentences_say_truth_and_answer():
+    assert concealed_text(PAIR) == "coulomb_friction of x + viscous_damping of x"
+    assert said_text(WRONG) == "explained: viscous_damping of x (0.60)"
+    assert concealed_text(CLEAN) == "nothing"

@@ -1,0 +1,92 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.psychophysics.detection import Below, detection_thresholds, directions_below_detection
+from analysis.psychophysics.runs import InconsistentTrialsError
+from analysis.psychophysics.threshold_table import threshold_table
+from analysis.psychophysics.thresholds import thresholds
+from protocols.exposure import DetectionSettings
+from protocols.run_rules import staircase_rule
+from protocols.trial import Phase
+
+
+@pytest.fixture
+def asking(protocol):
+    """The protocol with two detection runs."""
+    return replace(protocol, detection=DetectionSettings(frequencies_hz=(35.0, 45.0), start_n=0.5))
+
+
+@pytest.fixture
+def felt(simulate, asking):
+    """One detection run of somebody who feels true_n in 79.4 % of the trials."""
+
+    def run(true_n, generator, **columns):
+        rule = staircase_rule(asking, Phase.DETECTION)
+        return simulate(true_n, generator, rule=rule, **({"phase": Phase.DETECTION, "frequency_hz": 35.0} | columns))
+
+    return run
+
+
+def test_the_threshold_of_somebody_who_feels_is_recovered(felt, asking):
+    generator = np.random.default_rng(5)
+    trials = [trial for run in range(60) for trial in felt(0.2, generator, run=run)]
+    rows = detection_thresholds(trials, asking)
+    assert len(rows) == 60
+    assert all(row.complete for row in rows)
+    mean_db = np.mean([row.threshold_db for row in rows])
+    # One run spreads by 1.7 dB, so the mean of 60 by 0.22 dB.
+    assert mean_db == pytest.approx(20 * np.log10(0.2), abs=0.8)
+
+
+def test_somebody_who_feels_nothing_is_cut_by_the_cap(felt, asking):
+    generator = np.random.default_rng(5)
+    rows = detection_thresholds([t for run in range(20) for t in felt(float("inf"), generator, run=run)], asking)
+    assert sum(row.censored for row in rows) >= 19
+    assert np.mean([row.percent_correct for row in rows]) < 65
+
+
+def test_a_run_begins_at_its_own_level_and_not_at_that_of_the_study(felt, asking, simulate):
+    trials = felt(0.2, np.random.default_rng(1))
+    assert trials[0].level_n == pytest.approx(0.5)
+    of_directions = [replace(t, phase=Phase.DETECTION) for t in simulate(0.2, np.random.default_rng(1))]
+    with pytest.raises(InconsistentTrialsError, match="lead to 0.5 N"):
+        detection_thresholds(of_directions, asking)
+
+
+def test_detection_runs_enter_no_threshold_of_direction(felt, asking):
+    assert thresholds(felt(0.2, np.random.default_rng(1)), asking.staircase) == ()
+
+
+def test_a_limit_of_trials_ends_a_run_without_a_threshold(felt, asking):
+    short = replace(asking, detection=replace(asking.detection, trial_limit=12))
+    (row,) = detection_thresholds(felt(0.2, np.random.default_rng(1))[:12], short)
+    assert (row.complete, row.threshold_n, row.trials) == (False, None, 12)
+
+
+def test_two_looks_give_a_smaller_sensitivity_for_the_same_answers(felt, asking):
+    trials = felt(0.2, np.random.default_rng(1))
+    (row,) = detection_thresholds(trials, asking)
+    one_interval = replace(asking.staircase, start_n=0.5)
+    (same,) = thresholds([replace(trial, phase=Phase.TEST) for trial in trials], one_interval)
+    assert row.d_prime == pytest.approx(same.d_prime / np.sqrt(2))
+    assert row.criterion == same.criterion
+
+
+def tables(asking, direction_n, detection_n, felt, simulate):
+    generator = np.random.default_rng(3)
+    direction = thresholds(simulate(direction_n, generator, frequency_hz=35.0), asking.staircase)
+    detection = detection_thresholds(felt(detection_n, generator), asking)
+    return threshold_table(direction, (35.0,)), threshold_table(detection, (35.0, 45.0))
+
+
+def test_a_direction_told_before_it_is_felt_is_found(asking, felt, simulate):
+    direction, detection = tables(asking, 0.2, 1.0, felt, simulate)
+    (below,) = directions_below_detection(direction, detection)
+    assert below == Below("s01", 35.0, direction.values[0][0], detection.values[0][0])
+
+
+@pytest.mark.parametrize(("direction_n", "detection_n"), [(1.0, 0.1), (float("inf"), float("inf"))])
+def test_a_direction_felt_later_or_never_is_no_contradiction(asking, felt, simulate, direction_n, detection_n):
+    assert directions_below_detection(*tables(asking, direction_n, detection_n, felt, simulate)) == ()

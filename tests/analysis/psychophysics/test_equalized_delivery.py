@@ -1,0 +1,45 @@
+"""What arrived of what was wanted."""
+
+from dataclasses import replace
+
+import pytest
+
+from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
+from protocols.trial import Phase, Trial, TrialStatus
+
+TRIAL = Trial(
+    "P01", "P01_001", 1, 0, 0, Phase.TEST, 25.0, 1.0, 1, 1, True, False, 1.0, 3.0, 0.06, 0.1, 0, True,
+    TrialStatus.OK, 135.0, 3.0,
+)  # fmt: skip
+
+
+def test_what_arrives_as_wanted_is_no_warning():
+    found = deliveries([TRIAL, replace(TRIAL, direction_shown=2, answer=2, delivered_mps2=2.9)])
+    assert [(one.frequency_hz, one.trials) for one in found] == [(25.0, 2)]
+    assert found[0].along == pytest.approx((1.0, 2.9 / 3.0))
+    assert delivery_warning(found) == ""
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"delivered_mps2": 1.8}, "5 Hz (60 % of what was wanted, 3 % off the direction)"),
+        ({"off_axis_mps2": 0.9}, "5 Hz (100 % of what was wanted, 30 % off the direction)"),
+    ],
+)
+def test_what_does_not_is_named_with_its_frequency(changes, said):
+    found = deliveries([TRIAL, replace(TRIAL, frequency_hz=5.0, **changes)])
+    assert said in delivery_warning(found)
+    assert "25 Hz" not in delivery_warning(found)
+
+
+def test_the_median_counts_and_void_trials_do_not():
+    odd = replace(TRIAL, delivered_mps2=0.1)
+    void = replace(TRIAL, delivered_mps2=0.2, status=TrialStatus.SPOILED)
+    (one,) = deliveries([TRIAL, TRIAL, odd, void, void, void])
+    assert one.trials == 3 and one.along == (1.0, None)
+
+
+def test_commanded_forces_have_nothing_to_compare():
+    assert deliveries([replace(TRIAL, wanted_mps2=None)]) == ()
+    assert delivery_warning(()) == ""

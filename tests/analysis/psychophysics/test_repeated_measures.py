@@ -1,0 +1,94 @@
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+import pytest
+from statsmodels.stats.anova import AnovaRM
+
+from analysis.psychophysics.repeated_measures import greenhouse_geisser, repeated_measures
+
+DRUGS = ((30, 28, 16, 34), (14, 18, 10, 22), (24, 20, 18, 30), (38, 34, 20, 44), (26, 28, 14, 30))
+REACTIONS = ((1, 3, 4), (2, 2, 3), (2, 5, 6), (3, 4, 4), (3, 5, 6))
+
+
+def analysed(values):
+    return repeated_measures([f"s{i}" for i in range(len(values))], values)
+
+
+def test_four_drugs_give_the_published_table():
+    result = analysed(DRUGS)
+    assert (result.df_conditions, result.df_error) == (3, 12)
+    assert (result.ss_conditions, result.ss_error, result.ss_participants) == pytest.approx((698.2, 112.8, 680.8))
+    assert result.f == pytest.approx(24.7589, abs=5e-5)
+    assert result.p_uncorrected == pytest.approx(1.99e-5, rel=5e-3)
+    assert result.epsilon == pytest.approx(0.604874, abs=5e-7)
+    assert result.p == pytest.approx(0.000649, abs=5e-7)
+    assert result.p_lower_bound == pytest.approx(0.00762, abs=5e-6)
+
+
+def test_three_conditions_give_the_published_table():
+    result = analysed(REACTIONS)
+    assert result.f == pytest.approx(13.5758, abs=5e-5)
+    assert result.p_uncorrected == pytest.approx(0.002683, abs=5e-7)
+    assert result.epsilon == pytest.approx(0.575277, abs=5e-7)
+    assert result.p == pytest.approx(0.015371, abs=5e-7)
+
+
+def test_effect_sizes_follow_from_the_sums_of_squares():
+    result = analysed(DRUGS)
+    assert result.partial_eta_squared == pytest.approx(698.2 / (698.2 + 112.8))
+    assert result.generalized_eta_squared == pytest.approx(698.2 / (698.2 + 112.8 + 680.8))
+
+
+def test_any_table_agrees_with_statsmodels_before_correction():
+    values = np.random.default_rng(6).normal(size=(9, 5)) + np.arange(9)[:, None]
+    long = pd.DataFrame({"y": values.ravel(), "who": np.repeat(np.arange(9), 5), "what": np.tile(np.arange(5), 9)})
+    oracle = AnovaRM(long, "y", "who", within=["what"]).fit().anova_table
+    result = analysed(values.tolist())
+    assert result.f == pytest.approx(oracle["F Value"].iloc[0])
+    assert result.p_uncorrected == pytest.approx(oracle["Pr > F"].iloc[0])
+
+
+def test_differences_between_people_change_nothing():
+    shifted = [[value + 100.0 * i for value in row] for i, row in enumerate(DRUGS)]
+    assert analysed(shifted).p == pytest.approx(analysed(DRUGS).p)
+
+
+def test_the_correction_keeps_its_promise_where_the_conditions_vary_unequally():
+    generator = np.random.default_rng(10)
+    tables = generator.normal(size=(1500, 10, 5)) * np.array([1.0, 1.0, 1.0, 3.0, 6.0])
+    results = [analysed(table.tolist()) for table in tables]
+    assert 0.03 < np.mean([result.p < 0.05 for result in results]) < 0.07
+    assert np.mean([result.p_uncorrected < 0.05 for result in results]) > 0.075
+
+
+def test_two_conditions_need_no_correction():
+    assert greenhouse_geisser(np.random.default_rng(1).normal(size=(8, 2))) == pytest.approx(1.0)
+
+
+def test_a_participant_with_a_gap_is_left_out_by_name():
+    result = analysed([*DRUGS, (1.0, None, 2.0, 3.0), (1.0, 2.0, float("nan"), 3.0)])
+    assert result.p == analysed(DRUGS).p
+    assert result.left_out == ("s5", "s6")
+    assert result.notes == ("Left out because a value is missing: s5, s6.",)
+
+
+@pytest.mark.parametrize(
+    ("values", "note"),
+    [
+        ([], "needs two who have every condition; there are 0"),
+        ([(1.0, 2.0)], "needs two who have every condition; there are 1"),
+        ([(1.0,), (2.0,)], "needs two conditions; there are 1"),
+        ([(1.0, 2.0), (3.0, 4.0)], "All participants change alike"),
+        ([(0.1, 0.1), (0.1, 0.1)], "All participants change alike"),
+    ],
+)
+def test_too_little_data_is_said_in_a_sentence(values, note):
+    result = analysed(values)
+    assert (result.f, result.p, result.epsilon) == (None, None, None)
+    assert note in result.notes[-1]
+
+
+def test_a_result_is_json():
+    assert json.loads(json.dumps(asdict(analysed(DRUGS)), allow_nan=False))["participants"] == 5

@@ -1,0 +1,183 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.repeated_measures import repeated_measures
+from analysis.psychophysics.study_analysis import analyse_study, design_difference
+from protocols.run_rules import staircase_rule
+from protocols.trial import Phase, TrialStatus
+
+
+@pytest.fixture
+def able(simulate_study):
+    """Five able participants: nothing to warn of."""
+    return simulate_study(subjects=5, true_n=(0.4, 0.4, 0.4, 0.4, 0.4), seed=2)
+
+
+def warnings(trials, protocol):
+    return analyse_study(trials, protocol).warnings
+
+
+def test_a_clean_study_has_no_warning(able, protocol):
+    assert warnings(able, protocol) == ()
+
+
+def test_no_trial_is_said(protocol):
+    assert warnings([], protocol) == ("No test trial is there, so there is no threshold of direction.",)
+
+
+def test_a_run_that_was_broken_off_is_named(able, protocol):
+    cut = [trial for trial in able if not (trial.subject == "s02" and trial.run == 5 and trial.trial > 20)]
+    frequency = next(trial.frequency_hz for trial in able if trial.subject == "s02" and trial.run == 5)
+    incomplete, missing, unequal = warnings(cut, protocol)
+    assert incomplete.startswith(f"1 run is not complete and without a threshold: s02 at {frequency:g} Hz (")
+    assert incomplete.endswith(" of 13 reversals).")
+    assert missing == f"No threshold for s02 at {frequency:g} Hz."
+    assert unequal == "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
+
+
+def test_thresholds_that_the_cap_cut_are_named(simulate_study, protocol):
+    trials = simulate_study(subjects=5, true_n=(0.3, 0.3, 0.3, 0.3, float("inf")), seed=2)
+    bounds, guessed = warnings(trials, protocol)
+    assert guessed.startswith(
+        "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far"
+    )
+    assert bounds.startswith("5 thresholds are cut by the cap of 3 N, which cut off peaks")
+    assert "s05 at 45 Hz" in bounds
+
+
+@pytest.mark.parametrize(
+    ("subjects", "sentence"),
+    [
+        (1, "There is one participant: individual thresholds can be shown, nothing can be tested."),
+        (3, "There are only 3 participants: means and tests say little about people in general."),
+    ],
+)
+def test_few_participants_are_said(simulate_study, protocol, subjects, sentence):
+    assert sentence in warnings(simulate_study(subjects=subjects, true_n=(0.4,) * 5), protocol)
+
+
+def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate_study, protocol):
+    limited = replace(protocol, staircase=replace(protocol.staircase, trial_limit=90))
+    trials = simulate_study(subjects=5, true_n=(0.4, 0.4, 0.4, 0.4, float("inf")), seed=2, rule=limited.staircase)
+    analysis = analyse_study(trials, limited)
+    (stopped,) = [sentence for sentence in analysis.warnings if "limit of 90 trials" in sentence]
+    assert stopped.startswith("4 runs are stopped by the limit of 90 trials, without a threshold: s01 at 45 Hz (")
+    assert "the means that are left are too low" in stopped
+    assert not any("not complete" in sentence for sentence in analysis.warnings)
+    assert "4 are missing because of the trial limit" in analysis.table.coverage
+
+
+def test_a_liking_for_one_answer_is_named(able, protocol):
+    # The same answers, right whenever direction 1 was shown: somebody who nearly always says 1.
+    leaning = [
+        replace(trial, direction_shown=1 if trial.correct else 2, answer=1) if trial.run == 1 else trial
+        for trial in able
+    ]
+    (liking,) = warnings(leaning, protocol)
+    assert liking.startswith("A liking for one of the two answers, which raises a threshold, shows in s01 at ")
+    assert "(criterion −" in liking
+
+
+def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):
+    spoiled = replace(able[3], attempt=2, answer=None, correct=None, status=TrialStatus.SPOILED)
+    able[4] = replace(able[4], status=TrialStatus.FLAGGED)
+    able[5] = replace(able[5], status=TrialStatus.UNMEASURED, delivered_mps2=None)
+    assert warnings([*able, spoiled], protocol) == (
+        "1 spoiled presentation, played again; the answers do not count.",
+        "1 trial flagged: counted, but the stimulus is worth a look.",
+        "1 counted trial without a measured acceleration: answered before a full period of the steady stimulus was "
+        "recorded, or the recording was lost. The answers count.",
+    )
+
+
+def test_a_second_run_at_a_frequency_is_named(able, protocol):
+    again = [replace(trial, session="2") for trial in able if trial.subject == "s01" and trial.run == 1]
+    (second,) = warnings([*able, *again], protocol)
+    assert "completed more than one run" in second
+
+
+def test_detection_practice_and_catch_trials_of_able_people_are_no_warning(everything, full_protocol, protocol):
+    plain = warnings([trial for trial in everything if trial.phase is Phase.TEST], protocol)
+    assert warnings(everything, full_protocol) == plain
+
+
+def lapses(able, frequency, wrong):
+    """One catch trial before every run at this frequency; wrong: whether its answer is."""
+    runs = {(t.subject, t.run): t for t in able if t.frequency_hz == frequency}
+    return [
+        replace(t, phase=Phase.CATCH, trial=0, level_n=3.0, correct=not wrong, answer=1, direction_shown=1 + wrong)
+        for t in runs.values()
+    ]
+
+
+def test_lapses_at_low_frequencies_are_named_with_their_interval(able, protocol):
+    (sentence,) = warnings([*able, *lapses(able, 5.0, wrong=True)], protocol)
+    assert sentence.startswith("More than 10 % wrong in catch trials at full level, up to 15 Hz,")
+    assert "s01 (1 of 1; 95 % interval 21 to 100 %)" in sentence
+
+
+def test_an_error_at_full_level_and_high_frequency_is_no_lapse(able, protocol):
+    assert warnings([*able, *lapses(able, 45.0, wrong=True)], protocol) == ()
+    assert warnings([*able, *lapses(able, 5.0, wrong=False)], protocol) == ()
+
+
+@pytest.fixture
+def with_detection(full_protocol, simulate):
+    """One detection run of s01 at 35 Hz after the runs of the able, who tell the direction from 0.4 N."""
+
+    def rows(able, true_n):
+        rule = staircase_rule(full_protocol, Phase.DETECTION)
+        generator = np.random.default_rng(3)
+        return [*able, *simulate(true_n, generator, rule=rule, run=9, phase=Phase.DETECTION, frequency_hz=35.0)]
+
+    return rows
+
+
+def test_a_direction_below_the_detection_threshold_is_named(able, full_protocol, with_detection):
+    (sentence,) = warnings(with_detection(able, 2.0), full_protocol)
+    assert sentence.startswith(
+        "The direction was told at a level below that at which the vibration was felt: s01 at 35"
+    )
+    assert "differ by 2.4 dB" in sentence
+
+
+def test_a_vibration_that_is_felt_before_its_direction_is_as_it_should_be(able, full_protocol, with_detection):
+    assert warnings(with_detection(able, 0.05), full_protocol) == ()
+
+
+def test_somebody_who_feels_nothing_is_named(able, full_protocol, with_detection):
+    bound, chance, _ = warnings(with_detection(able, float("inf")), full_protocol)
+    assert bound == "1 detection threshold is cut by the cap: s01 at 35 Hz."
+    assert chance.startswith("Detection not shown to be better than chance: s01 at 35 Hz (")
+
+
+def test_a_detection_run_that_was_broken_off_is_named(able, full_protocol, with_detection):
+    (sentence,) = warnings(with_detection(able, 0.05)[:-5], full_protocol)
+    assert sentence == "1 detection run is not complete and without a threshold: s01 at 35 Hz."
+
+
+DRUGS = ((30.0, 28.0, 16.0, 34.0), (14.0, 18.0, 10.0, 22.0), (24.0, 20.0, 18.0, 30.0), (38.0, 34.0, 20.0, 44.0))
+
+
+def both(values):
+    columns = {str(i): column for i, column in enumerate(zip(*values, strict=True))}
+    return one_way(columns), repeated_measures([str(i) for i in range(len(values))], values)
+
+
+def test_the_two_analyses_are_told_apart_in_numbers():
+    anova, within = both(DRUGS)
+    text = design_difference(anova, within)
+    assert f"F(3, 12) = {anova.f:.2f}" in text
+    assert f"F(3, 9) = {within.f:.2f}" in text
+    assert "They disagree at the 5 % level." in text
+    assert "(87 % of the spread within frequencies, 4 participants)" in text
+
+
+@pytest.mark.parametrize(
+    ("values", "word"), [(DRUGS[:1], "neither"), ((*DRUGS[:1], (1.0, None, 2.0, 3.0)), "only one")]
+)
+def test_what_cannot_be_compared_is_said(values, word):
+    assert f"Of the two, {word} can be computed" in design_difference(*both(values))

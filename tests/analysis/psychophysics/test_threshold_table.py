@@ -1,0 +1,59 @@
+from dataclasses import replace
+
+import pytest
+
+from analysis.psychophysics.threshold_table import threshold_table
+from analysis.psychophysics.thresholds import thresholds
+
+
+@pytest.fixture
+def rows(simulate_study, rule):
+    return thresholds(simulate_study(subjects=3), rule)
+
+
+FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)
+
+
+def test_each_participant_has_one_value_per_frequency(rows):
+    table = threshold_table(rows, FREQUENCIES)
+    assert table.subjects == ("s01", "s02", "s03")
+    assert list(table.groups()) == ["5 Hz", "15 Hz", "25 Hz", "35 Hz", "45 Hz"]
+    for row in rows:
+        at = table.subjects.index(row.subject), table.frequencies_hz.index(row.frequency_hz)
+        assert table.values[at[0]][at[1]] == row.threshold_n
+        assert table.censored[at[0]][at[1]] is row.censored
+    assert table.missing() == ()
+
+
+def test_an_incomplete_run_leaves_a_gap(rows):
+    unfinished = [replace(row, complete=False) if row.subject == "s02" else row for row in rows]
+    table = threshold_table(unfinished, FREQUENCIES)
+    assert table.missing() == tuple(("s02", frequency) for frequency in FREQUENCIES)
+    assert table.groups()["5 Hz"][1] is None
+
+
+def test_the_first_completed_run_counts_and_the_second_is_named(rows):
+    again = replace(rows[0], session="2", run=1, threshold_n=0.1)
+    table = threshold_table([*rows, again], FREQUENCIES)
+    assert table.values == threshold_table(rows, FREQUENCIES).values
+    assert table.notes == (
+        f"s01 completed more than one run at {rows[0].frequency_hz:g} Hz; the first one counts (session 1), "
+        "not run 1 of session 2.",
+    )
+
+
+def test_a_frequency_of_another_protocol_is_named(rows):
+    table = threshold_table([replace(rows[0], frequency_hz=80.0)], FREQUENCIES)
+    assert table.notes == ("s01 has a run at 80 Hz, which the protocol does not name.",)
+
+
+def test_the_same_table_in_decibel_or_as_delivered(rows):
+    for quantity in ("threshold_db", "threshold_mps2", "threshold_mm"):
+        table = threshold_table(rows, FREQUENCIES, quantity)
+        assert table.values[0][table.frequencies_hz.index(rows[0].frequency_hz)] == getattr(rows[0], quantity)
+
+
+def test_no_run_at_all_is_a_table_without_rows():
+    table = threshold_table((), FREQUENCIES)
+    assert table.subjects == ()
+    assert table.groups() == {f"{f:g} Hz": () for f in FREQUENCIES}
