@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.lqr.lqr import lqr_kernel, stored_gains, track
+from equalizer.tracking.lqr import lqr_kernel
+from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import normal_basis, rotation_basis
 from equalizer.tracking.lqr.toeplitz import least_squares_forces

@@ -12,7 +12,8 @@ import numpy as np
 
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.lqr import Tracked, lqr_kernel
+from equalizer.tracking.lqr import lqr_kernel
+from equalizer.tracking.lqr.lqr import Tracked
 from equalizer.tracking.lqr.riccati import stationary_gains
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.lqr import StoredGains, costate_feedforward, lqr_kernel
+from equalizer.tracking.lqr import lqr_kernel
+from equalizer.tracking.lqr.lqr import StoredGains, costate_feedforward
 from equalizer.tracking.lqr.rotation import every_normal, every_rotation
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, checked_wanted, read_only
 
