@@ -73,8 +73,8 @@ def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: 
     side, sign = (int(word) >> 63 for word in keyed_words(seed, (run, trial, attempt), 2))
     direction = 1 + side
     if settings.directions == "balanced" and attempt == 0:
-        # First rules only (`study.session.rules`): a trial drawn again leaves the block's plan, or its first attempt
-        # would tell the second.
+        # First rules only (`study.session.state.rules`): a trial drawn again leaves the block's plan, or its first
+        # attempt would tell the second.
         block, place = divmod(trial, BLOCK)
         direction = 1 + _permutation(seed, (run, block), BLOCK)[place] % 2
     return Draw(direction, 1 if onset_polarity == "positive" else 1 - 2 * sign)

@@ -2,11 +2,11 @@
 
 from datetime import UTC, datetime
 
-from study.session.local_time import local_time
+from study.session.views.local_time import local_time
 
 
 def machine_zone(time: datetime) -> datetime:
-    """A `study.session.local_time.Zone`: of this computer, summer time included.
+    """A `study.session.views.local_time.Zone`: of this computer, summer time included.
 
     Raises ValueError, OverflowError or OSError for moments that it cannot convert.
     """

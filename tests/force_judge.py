@@ -8,7 +8,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceSettings
-from study.session.held_stimulus import HeldStimulus
+from study.session.stimulus.held_stimulus import HeldStimulus
 
 NEVER = 10**9
 ROUNDING_N = 1e-9

@@ -15,7 +15,7 @@ from study.devices.device import DeviceSettings, Fault
 from study.devices.govern import ROWS, VECTOR
 from study.devices.governor import Governor
 from study.devices.rig import READING_SIZE
-from study.session.held_stimulus import HeldStimulus
+from study.session.stimulus.held_stimulus import HeldStimulus
 
 LIES = (
     "none", "jump", "oscillation", "freeze", "drift", "swapped axes", "sign", "noise", "quantisation", "delay", "nan",

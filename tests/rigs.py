@@ -9,8 +9,8 @@ from numba import njit
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.rig import READING_SIZE, CompiledRig
-from study.session.held_stimulus import HeldStimulus
-from study.session.limits import Limits
+from study.session.stimulus.held_stimulus import HeldStimulus
+from study.session.stimulus.limits import Limits
 
 RATE_HZ = 1000.0
 MASS_KG = 0.3

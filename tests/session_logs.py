@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from study.session.log_chain import Chain, read_chained, write_chained
+from study.session.facts.log_chain import Chain, read_chained, write_chained
 
 RESULTS = ("trials.csv", "thresholds.csv", "detection.csv", "session.json")
 

@@ -13,8 +13,8 @@ from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import needs_real_time
 from study.errors import WrongUseError
-from study.store.archive import check_subject, find_session
-from study.store.privacy import left_open
+from study.store.disk.privacy import left_open
+from study.store.sessions.archive import check_subject, find_session
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay

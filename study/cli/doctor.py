@@ -11,7 +11,7 @@ from study.cli.results import JsonOption
 from study.cli.study import DataOption, DeviceOption
 
 if TYPE_CHECKING:
-    from study.session.views import DeviceFinding
+    from study.session.views.views import DeviceFinding
     from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17

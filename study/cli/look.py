@@ -93,7 +93,7 @@ MOST_SEGMENTS = 20
 
 def say(lines: Iterable[str]) -> None:
     """Names in a file must not move the cursor."""
-    from study.session.printable import printable_text
+    from study.session.views.printable import printable_text
 
     for line in lines:
         typer.echo(printable_text(line))

@@ -8,7 +8,7 @@ import typer
 from study.cli.study import DataOption
 
 if TYPE_CHECKING:
-    from study.store.archive import SessionFolder
+    from study.store.sessions.archive import SessionFolder
 
 
 def note(
@@ -20,14 +20,14 @@ def note(
     data: DataOption = Path("data"),
 ) -> None:
     """Write a note into a session's log. Nothing that is in the log is changed."""
-    from study.store.archive import find_session
+    from study.store.sessions.archive import find_session
 
     write_note(find_session(session, data), text, adverse)
 
 
 def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
     from study.devices.clock import RealClock
-    from study.session.requests import NoteAsked
+    from study.session.watching.requests import NoteAsked
     from study.workflows.views.take_note import take_note
 
     written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())

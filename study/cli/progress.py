@@ -16,7 +16,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from study.session.views import Question
+from study.session.views.views import Question
 
 
 @contextmanager

@@ -17,7 +17,7 @@ NameArgument = Annotated[str, typer.Argument(help="A shipped protocol's name, or
 @app.command("list")
 def list_protocols() -> None:
     """The shipped protocols, one line each."""
-    from study.store.protocol_files import read_protocol, shipped_protocols
+    from study.store.formats.protocol_files import read_protocol, shipped_protocols
 
     for name in shipped_protocols():
         protocol = read_protocol(name).protocol
@@ -33,8 +33,8 @@ def show(
     """Every key of a protocol with its value, its default and the reason for it."""
     from protocols.explain import explain
     from protocols.hashing import protocol_hash
-    from study.session.limits import forces_in_words
-    from study.store.protocol_files import read_protocol
+    from study.session.stimulus.limits import forces_in_words
+    from study.store.formats.protocol_files import read_protocol
 
     file = read_protocol(name)
     if text:
@@ -59,8 +59,8 @@ def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     from importlib.metadata import version
 
     from study.devices.clock import RealClock
-    from study.store.privacy import make_folder
-    from study.store.protocol_files import lock_protocol, read_protocol
+    from study.store.disk.privacy import make_folder
+    from study.store.formats.protocol_files import lock_protocol, read_protocol
 
     file = read_protocol(name, data)
     make_folder(data, private=True)

@@ -33,7 +33,7 @@ def record(
     may be on the handle, and waits for Enter.
     """
     from study.cli.progress import late_bar
-    from study.store.protocol_files import read_recording_protocol
+    from study.store.formats.protocol_files import read_recording_protocol
     from study.workflows.recording.record_device import RecordingPlan, check_free, record_device
 
     source = read_recording_protocol(protocol)

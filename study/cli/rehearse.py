@@ -23,7 +23,7 @@ def rehearse(
 ) -> None:
     """Simulated participants take the whole study, ending with the report. Interrupted, the same command goes on."""
     from study.cli.progress import bar
-    from study.store.protocol_files import read_study_protocol
+    from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.results.analysis_files import ANALYSIS_NAME
     from study.workflows.results.analyze_data import analyze_data
     from study.workflows.session.equalize_stimuli import check_playable

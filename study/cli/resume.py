@@ -11,7 +11,7 @@ from study.cli.study import DataOption, DeviceOption, KeysOption, PlainOption
 from study.tui.answer_keys import parse_keys
 
 LOG_NAME = "events.jsonl"
-"""As `study.store.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
+"""As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
 
 
 def resume(
@@ -39,7 +39,7 @@ def resume(
 
 def _simulated(session: str, data: Path) -> bool:
     """Whether its first line says that a simulated participant takes it: that one needs no screen."""
-    from study.store.regular_file import DOCUMENT_BYTES, open_regular
+    from study.store.disk.regular_file import DOCUMENT_BYTES, open_regular
 
     for folder in (Path(session), data / session):
         try:

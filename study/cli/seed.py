@@ -3,7 +3,7 @@
 from study.errors import WrongUseError
 
 LARGEST_BITS = 128
-"""`study.store.strict_json` reads whole numbers of up to 40 digits."""
+"""`study.store.disk.strict_json` reads whole numbers of up to 40 digits."""
 
 
 def checked_seed(seed: int | None) -> int | None:

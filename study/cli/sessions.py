@@ -13,7 +13,7 @@ from study.cli.screen import columns
 from study.cli.study import DataOption
 
 if TYPE_CHECKING:
-    from study.session.archive_views import SessionLine
+    from study.session.views.archive_views import SessionLine
 
 
 def sessions(
@@ -37,7 +37,7 @@ def sessions(
 
 def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
     from study.local_clock import machine_zone
-    from study.session.local_time import local_column
+    from study.session.views.local_time import local_column
     from study.tui.standing_words import standing_words
     from study.tui.text_rows import aligned_rows
 

@@ -13,7 +13,7 @@ from study.cli.screen import columns
 from study.cli.study import DataOption
 
 if TYPE_CHECKING:
-    from study.session.archive_views import DiagnosisView, SessionView, Staircase
+    from study.session.views.archive_views import DiagnosisView, SessionView, Staircase
 
 PLOT_COLUMNS, PLOT_ROWS = 78, 12
 
@@ -31,7 +31,7 @@ def show(
 ) -> None:
     """Facts, thresholds, warnings and staircases of a session; verdict, effects and fit of a diagnosis; or channels,
     segments and facts of a recording."""
-    from study.store.hdf5_file import is_hdf5
+    from study.store.disk.hdf5_file import is_hdf5
 
     if Path(what).is_file() and is_hdf5(Path(what)):
         _show_recording(Path(what), as_json)
@@ -44,7 +44,7 @@ def show(
         _say([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
         return
     from study.local_clock import machine_zone
-    from study.session.local_time import in_utc
+    from study.session.views.local_time import in_utc
     from study.workflows.views.view_session import session_view
 
     session = session_view(_folder(what, data), in_utc if as_json else machine_zone)
@@ -64,7 +64,7 @@ def _show_recording(path: Path, as_json: bool) -> None:
 
 def _folder(what: str, data: Path) -> Path:
     """Also that of a session that was withdrawn or cannot be read: these are looked at too."""
-    from study.store.archive import find_session, session_folders
+    from study.store.sessions.archive import find_session, session_folders
 
     folder = Path(what) if Path(what).is_dir() else data / what
     known = [known.path.resolve() for known in session_folders(folder.absolute().parent)]

@@ -11,11 +11,11 @@ from study.cli.screen import columns
 from study.cli.study import DataOption
 
 if TYPE_CHECKING:
-    from study.session.requests import Request
-    from study.store.archive import SessionFolder
+    from study.session.watching.requests import Request
+    from study.store.sessions.archive import SessionFolder
 
 LOG_NAME = "events.jsonl"
-"""As `study.store.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
+"""As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
 PLAIN_EVERY_S = 0.2
 
 
@@ -48,7 +48,7 @@ def _folder(session: str, data: Path) -> Path:
     for path in (Path(session), data / session):
         if (path / LOG_NAME).is_file():
             return path.resolve()
-    from study.store.archive import find_session
+    from study.store.sessions.archive import find_session
 
     return find_session(session, data).path
 
@@ -65,7 +65,7 @@ def _last_changed(data: Path) -> str:
 
 
 def _screen(folder: Path) -> None:
-    from study.store.request_inbox import RequestInbox
+    from study.store.sessions.request_inbox import RequestInbox
     from study.tui.link.watch_feed import WatchFeed
     from study.tui.watch_app import WatchApp
 
@@ -100,7 +100,7 @@ def _once(folder: Path, as_json: bool) -> None:
 def _plain(folder: Path) -> None:
     """Until the sitting is over."""
     from study.devices.clock import RealClock
-    from study.session.watch_view import ON
+    from study.session.watching.watch_view import ON
     from study.tui.watch_lines import changes
     from study.workflows.views.watch_session import follow
 
@@ -116,8 +116,8 @@ def _plain(folder: Path) -> None:
 
 def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
     from study.cli.note import write_note
-    from study.session.requests import PauseAsked, StopAsked
-    from study.store.archive import SessionFolder
+    from study.session.watching.requests import PauseAsked, StopAsked
+    from study.store.sessions.archive import SessionFolder
 
     session = SessionFolder(folder)
     if stop:

@@ -7,8 +7,8 @@ import numpy as np
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.errors import DeviceError
-from study.session.held_stimulus import HeldStimulus
-from study.session.limits import Limits
+from study.session.stimulus.held_stimulus import HeldStimulus
+from study.session.stimulus.limits import Limits
 
 HAND_STIMULUS_CAP_N = 3.0
 HAND_TOTAL_CAP_N = 6.0

@@ -11,9 +11,9 @@ from typing import Protocol
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from study.session.held_stimulus import HeldStimulus
-from study.session.limits import Limits
-from study.session.void_reasons import PROGRAM_STALLED
+from study.session.facts.void_reasons import PROGRAM_STALLED
+from study.session.stimulus.held_stimulus import HeldStimulus
+from study.session.stimulus.limits import Limits
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from protocols.plausibility import PlausibilitySettings
 from study.devices import cells, govern
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health
 from study.devices.rig import READING_SIZE
-from study.session.held_stimulus import HeldStimulus
+from study.session.stimulus.held_stimulus import HeldStimulus
 
 VELOCITY_CORNER_HZ = 50.0
 """Of the low-pass behind the spring's damping: far above the spring, far below the encoders' chatter."""

@@ -24,7 +24,7 @@ from study.devices.seen import look_of
 from study.devices.stepped_runner import SteppedRunner
 from study.devices.virtual_drive import VirtualDrive
 from study.errors import DeviceError
-from study.session.held_stimulus import HeldStimulus
+from study.session.stimulus.held_stimulus import HeldStimulus
 
 BLOCK_S = 0.05
 """The longest stretch in real time during which Python is not asked."""

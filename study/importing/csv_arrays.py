@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from study.importing.import_map import CsvMap
-from study.store.text_file import read_text
+from study.store.disk.text_file import read_text
 
 MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""

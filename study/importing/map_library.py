@@ -16,7 +16,7 @@ from study.importing.map_errors import ImportProblemError, suggestion
 from study.importing.map_files import part_files
 from study.importing.map_toml import KIND, is_map, parse_map
 from study.importing.namespace import of_file
-from study.store.toml_text import read_toml_text
+from study.store.disk.toml_text import read_toml_text
 
 NO_DATA = (".toml", ".md")
 """Kinds of files that lie beside data."""

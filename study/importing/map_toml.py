@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from protocols.refusals import key_path, nearest_key, shown
 from protocols.schema import Node, Place, allowed, keys_of, node_at, resolved
 from study.importing.import_map import ImportMap
-from study.store.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError
 
 KIND = "import map"
 

@@ -14,8 +14,8 @@ from textual.events import Event
 from textual.screen import Screen
 
 from study.errors import ExitCode
-from study.session.requests import NoteAsked, PauseAsked
-from study.session.views import Reply as TrialReply
+from study.session.views.views import Reply as TrialReply
+from study.session.watching.requests import NoteAsked, PauseAsked
 from study.tui import home_messages, outcomes
 from study.tui.app_start import AppStart
 from study.tui.archive_screens import ArchiveScreens, ArchiveWanted, command_for

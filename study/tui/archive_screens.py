@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from textual.app import App
 
-from study.session.archive_views import DiagnosisView, SessionView
+from study.session.views.archive_views import DiagnosisView, SessionView
 from study.tui.app_start import AppStart
 from study.tui.home_messages import AnalyzeWanted, DiagnoseWanted, DiagnosisWanted, SessionWanted, WithdrawWanted
 from study.tui.link.from_engine import (

@@ -3,7 +3,7 @@
 import math
 from functools import lru_cache
 
-from study.session.views import DirectionPicture
+from study.session.views.views import DirectionPicture
 from study.tui.braille import Canvas
 
 ENDS = {

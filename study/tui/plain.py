@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import TextIO
 
 from study.devices.clock import Clock
-from study.session.counted import answers_are
-from study.session.form_views import Form, FormReply
-from study.session.requests import NoteAsked
-from study.session.views import (
+from study.session.facts.void_reasons import void_for_participant
+from study.session.views.counted import answers_are
+from study.session.views.form_views import Form, FormReply
+from study.session.views.views import (
     AfterPause,
     DemoChoice,
     DemoMenu,
@@ -23,7 +23,7 @@ from study.session.views import (
     Unanswered,
     Welcome,
 )
-from study.session.void_reasons import void_for_participant
+from study.session.watching.requests import NoteAsked
 from study.tui import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.conversation import Conversation

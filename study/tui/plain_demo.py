@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from study.session.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
+from study.session.views.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
 from study.tui.answer_keys import AnswerKeys
 from study.tui.conversation import GLANCE_S, Conversation, WaitOver, shown
 from study.tui.direction_picture import sentence

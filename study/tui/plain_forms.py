@@ -1,8 +1,8 @@
 """Line mode: forms and the device check, one question after the other."""
 
-from study.session.form_entry import CHECKED
-from study.session.form_views import Form, FormField, FormReply
-from study.session.views import DeviceReport
+from study.session.views.form_entry import CHECKED
+from study.session.views.form_views import Form, FormField, FormReply
+from study.session.views.views import DeviceReport
 from study.tui.conversation import Conversation, Line, printable, shown
 
 BACK = "b"

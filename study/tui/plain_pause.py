@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from study.session.counted import answers_are
-from study.session.requests import NoteAsked
-from study.session.views import AfterPause, PauseNotice, RestNotice
+from study.session.views.counted import answers_are
+from study.session.views.views import AfterPause, PauseNotice, RestNotice
+from study.session.watching.requests import NoteAsked
 from study.tui.conversation import GLANCE_S, Conversation, Line, WaitOver, printable, shown
 from study.tui.trial_words import WITHDRAW, progress_sentence, runs_left
 from study.workflows.trial.display import SignOfLife

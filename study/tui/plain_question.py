@@ -1,8 +1,8 @@
 """Line mode: one trial, and what is said around it."""
 
 from protocols.trial import VoidCause
-from study.session.counted import answers_are
-from study.session.views import (
+from study.session.views.counted import answers_are
+from study.session.views.views import (
     Answered,
     DirectionPicture,
     PracticeResult,

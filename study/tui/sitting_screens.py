@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from textual.app import App
 from textual.screen import Screen
 
-from study.session.views import Reply as TrialReply
+from study.session.views.views import Reply as TrialReply
 from study.tui.answer_keys import AnswerKeys
 from study.tui.drawn_before import forget_drawn_before
 from study.tui.link.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble

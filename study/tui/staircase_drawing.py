@@ -3,7 +3,7 @@
 import itertools
 import math
 
-from study.session.archive_views import Staircase
+from study.session.views.archive_views import Staircase
 from study.tui.braille import Canvas
 
 RIGHT, WRONG, PEAK, VALLEY = "○", "×", "▼", "▲"

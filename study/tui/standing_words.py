@@ -1,6 +1,6 @@
 """How a session stands, as a symbol and a word: neither is told by colour alone."""
 
-from study.session.archive_views import TURNED_AWAY, SessionLine, Standing
+from study.session.views.archive_views import TURNED_AWAY, SessionLine, Standing
 
 SYMBOLS: dict[Standing, str] = {
     "finished": "✓",

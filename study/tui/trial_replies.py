@@ -1,7 +1,7 @@
 """What a participant may say to a trial, or to anything that plays, beside an answer."""
 
 from protocols.trial import VoidCause
-from study.session.views import Unanswered
+from study.session.views.views import Unanswered
 
 PAUSE = Unanswered("asked for a pause", leave=False, asked=True, pause=True)
 LEAVING = Unanswered("asked to leave", leave=False, asked=True, pause=True)

@@ -4,7 +4,7 @@ levels."""
 from typing import Literal
 
 from protocols.trial import Phase
-from study.session.views import Progress, Question, Task, Welcome
+from study.session.views.views import Progress, Question, Task, Welcome
 
 WITHDRAW = "withdraw"
 """To be typed as a whole: one key must not erase a session."""

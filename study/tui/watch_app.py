@@ -10,7 +10,7 @@ from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.events import Event
 
-from study.session.requests import Request
+from study.session.watching.requests import Request
 from study.tui.departure import leave_with_the_terminal
 from study.tui.key_names import key_name
 from study.tui.keys_in_order import KeysInOrder

@@ -1,6 +1,6 @@
 """A watched session as lines of text: what changed between two views, and one view as a whole."""
 
-from study.session.watch_view import ClosedTrial, WatchView
+from study.session.watching.watch_view import ClosedTrial, WatchView
 from study.tui.watch_words import (
     NOT_MEASURED,
     SYMBOLS,

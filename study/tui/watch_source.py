@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from study.session.watch_view import WatchView
+from study.session.watching.watch_view import WatchView
 
 
 class WatchSource(Protocol):

@@ -1,8 +1,8 @@
 """What a watcher reads, in words: shared by the screen and by the lines of `hapteq watch --plain`."""
 
 from study.local_clock import machine_zone
-from study.session.local_time import local_parts
-from study.session.watch_view import ClosedTrial, Exposure, Standing, WatchedRun, WatchView
+from study.session.views.local_time import local_parts
+from study.session.watching.watch_view import ClosedTrial, Exposure, Standing, WatchedRun, WatchView
 
 SYMBOLS: dict[Standing, str] = {
     "running": "●",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from textual.app import App
 
-from study.session.requests import NoteAsked, Request
+from study.session.watching.requests import NoteAsked, Request
 
 if TYPE_CHECKING:
     from study.tui.link.watch_feed import WatchFeed

@@ -2,7 +2,7 @@
 
 from protocols.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
-from study.session.limits import limits_of_study
+from study.session.stimulus.limits import limits_of_study
 
 
 def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:

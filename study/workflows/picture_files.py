@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from analysis.figures.picture import Picture, picture_svg
-from study.store.atomic_write import write_atomically
-from study.store.file_errors import CannotWriteError
-from study.store.privacy import make_folder
-from study.store.text_file import write_text
+from study.store.disk.atomic_write import write_atomically
+from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.privacy import make_folder
+from study.store.disk.text_file import write_text
 
 FIGURE_DPI = 150
 

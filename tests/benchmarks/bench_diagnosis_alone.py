@@ -62,7 +62,7 @@ def measured(axes: int) -> dict:
     import tempfile
 
     began = time.process_time()
-    from study.store.recording_file import write_recording
+    from study.store.formats.recording_file import write_recording
     from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 
     imports = time.process_time() - began

@@ -15,8 +15,8 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.participants.observers import observer_named
-from study.session.due_trial import Present
-from study.session.form_views import Form
+from study.session.state.due_trial import Present
+from study.session.views.form_views import Form
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
 from study.workflows.session.simulated_display import SimulatedDisplay

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase
-from study.session.form_views import Form, FormField, FormKind, missing
-from study.session.views import (
+from study.session.views.form_views import Form, FormField, FormKind, missing
+from study.session.views.views import (
     AfterPause,
     Answered,
     DemoDone,

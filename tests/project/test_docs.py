@@ -8,7 +8,7 @@ from typer.main import get_command
 
 from equalizer.plant.identified_model import IdentifiedModel
 from study.cli.main import app
-from study.store.identified_model_file import write_identified_model
+from study.store.formats.identified_model_file import write_identified_model
 
 DOCS = Path(__file__).parents[2] / "docs"
 VAGUE = re.compile(r"\b(whoever|nobody|somebody|anybody)\b", re.IGNORECASE)

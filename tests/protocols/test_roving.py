@@ -71,6 +71,6 @@ def test_shipped_studies_vary_the_level(shipped):
 
 @pytest.fixture(params=["direction_threshold", "equalized_threshold"])
 def shipped(request):
-    from study.store.protocol_files import read_study_protocol
+    from study.store.formats.protocol_files import read_study_protocol
 
     return read_study_protocol(request.param).protocol

@@ -15,8 +15,8 @@ import time
 from pathlib import Path
 
 from study.cli.main import main as hapteq
-from study.store.archive import SessionFolder, session_folders
-from study.store.event_log import read_log
+from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.event_log import read_log
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 

@@ -14,9 +14,9 @@ from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.learning.iteration import rms
 from study.cli.main import main
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import write_recording
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import write_recording
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 RATE_HZ, BAND_HZ, MODES = 1000.0, (5.0, 35.0), 8
 FRICTION_N = (0.0, 0.15, 0.0)

@@ -10,8 +10,8 @@ import pytest
 from protocols.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
-from study.session.views import Answered
-from study.store.archive import SessionFolder
+from study.session.views.views import Answered
+from study.store.sessions.archive import SessionFolder
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new
 from study.workflows.session.open_session import SessionPlan

@@ -13,8 +13,8 @@ import pytest
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.cli.main import main
-from study.store.diagnosis_file import read_diagnosis
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.formats.diagnosis_file import read_diagnosis
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 CAP_N = 3.0
 QUICKLY = ("coulomb_friction", "viscous_damping", "hardening_stiffness", "amplifier_lag")

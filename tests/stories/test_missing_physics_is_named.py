@@ -13,8 +13,8 @@ import pytest
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.signals.recording import Recording
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import read_recording
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 from study.workflows.worker_threads import worker_threads
 
 SEED = 11

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import DeviceError, ExitCode, StudyError, WrongUseError
-from study.store.file_errors import AlreadyThereError, UnusableFileError
+from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
 
 
 @pytest.mark.parametrize(

@@ -20,9 +20,9 @@ import analysis.diagnosis
 import equalizer
 import study
 from study.evaluation.bank.proof_folder import ANSWER, CLEAN, MODEL, RECORDING, SETTINGS
-from study.store.provenance import sha256_of
-from study.store.strict_json import load_json
-from study.store.text_file import read_text, write_text
+from study.store.disk.provenance import sha256_of
+from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import read_text, write_text
 
 APART = "study.evaluation.challenge"
 OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
@@ -113,8 +113,8 @@ def _patience(processor_s: float | None) -> Callable[[], bool]:
 def _diagnosed(place: Path) -> dict[str, Any]:
     from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
     from analysis.diagnosis.document import diagnosis_to_json
-    from study.store.mechanical_model_file import read_mechanical_model
-    from study.store.recording_file import read_recording
+    from study.store.formats.mechanical_model_file import read_mechanical_model
+    from study.store.formats.recording_file import read_recording
 
     asked = load_json(read_text(place / SETTINGS))
     recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]

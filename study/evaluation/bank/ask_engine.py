@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
 from study.evaluation.bank.proof_seals import answer_at
-from study.store.text_file import write_text
+from study.store.disk.text_file import write_text
 
 PATIENCE_S = 1200.0
 """For one case; it takes seconds to a minute."""

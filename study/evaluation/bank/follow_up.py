@@ -22,10 +22,10 @@ from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, Proof
 from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seal
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redrawn
 from study.evaluation.challenge.drive_plan import RATE_HZ
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.provenance import sha256_of
-from study.store.recording_file import write_recording
-from study.store.text_file import read_text, write_text
+from study.store.disk.provenance import sha256_of
+from study.store.disk.text_file import read_text, write_text
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import write_recording
 
 NEXT = "next"
 """Folder of these cases: a bank of its own, whose labels say which start they take up."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError
-from study.store.json_document import parse_json
-from study.store.text_file import read_text, write_text
+from study.store.disk.json_document import parse_json
+from study.store.disk.text_file import read_text, write_text
 
 
 @dataclass(frozen=True, slots=True)

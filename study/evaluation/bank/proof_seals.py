@@ -6,11 +6,11 @@ from typing import Any
 
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, DIED, ProofFolder
-from study.store.file_errors import UnusableFileError
-from study.store.json_document import parse_json
-from study.store.provenance import sha256_of
-from study.store.strict_json import load_json
-from study.store.text_file import read_text, write_text
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.json_document import parse_json
+from study.store.disk.provenance import sha256_of
+from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import read_text, write_text
 
 HASHED = ("recording_sha256", "model_sha256", "others_sha256")
 """In a label, and again in the answer: what was sealed is what was answered."""

@@ -7,7 +7,7 @@ from analysis.diagnosis.document import diagnosis_from_json
 from analysis.evaluation.proof.outcome import Concealed, Outcome
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
 from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seals_of
-from study.store.provenance import sha256_of
+from study.store.disk.provenance import sha256_of
 
 
 def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:

@@ -12,10 +12,10 @@ from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, Proof
 from study.evaluation.bank.proof_seals import answer_at
 from study.evaluation.challenge.controls import CONTROLS, Asked, Control
 from study.evaluation.challenge.rig import Rig
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import write_recording
-from study.store.strict_json import load_json
-from study.store.text_file import read_text, write_text
+from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import read_text, write_text
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import write_recording
 
 SHORT = Rig((0,), 1000, 3, steps=80)
 

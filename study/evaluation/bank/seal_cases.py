@@ -15,10 +15,10 @@ from study.evaluation.bank.write_cases import truths
 from study.evaluation.challenge import second_engine
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
 from study.evaluation.challenge.draw_case import Case
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.provenance import sha256_of
-from study.store.recording_file import write_recording
-from study.store.text_file import write_text
+from study.store.disk.provenance import sha256_of
+from study.store.disk.text_file import write_text
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import write_recording
 from study.workflows.worker_processes import worker_processes
 
 SALT_BYTES = 16

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from study.evaluation.challenge.draw_case import Case
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import write_recording
-from study.store.text_file import write_text
+from study.store.disk.text_file import write_text
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import write_recording
 
 
 def write_case(folder: Path, name: str, case: Case, *, overwrite: bool = False) -> None:

@@ -15,10 +15,10 @@ from study.evaluation.bank.answer_cases import engine_digest
 from study.evaluation.bank.proof_summary import remarks
 from study.evaluation.bank.prove import Proof
 from study.local_clock import local_now
-from study.store.csv_rows import rows_to_csv
-from study.store.json_document import read_json, write_json
-from study.store.provenance import command_line, gather_provenance, versions
-from study.store.text_file import write_text
+from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.json_document import read_json, write_json
+from study.store.disk.provenance import command_line, gather_provenance, versions
+from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
 FORMAT, VERSION = "hapteq-proof", 1

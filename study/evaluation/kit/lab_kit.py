@@ -8,10 +8,10 @@ import numpy as np
 from analysis.evaluation.proof.lab_kit import CHANGES, CHANGES_BY_NAME, NOTHING, Label
 from equalizer.plant.mechanical_model import nearest
 from study.errors import StudyError
-from study.store.csv_rows import CsvError, rows_from_csv, rows_to_csv
-from study.store.file_errors import UnusableFileError
-from study.store.provenance import sha256_of
-from study.store.text_file import read_text, write_text
+from study.store.disk.csv_rows import CsvError, rows_from_csv, rows_to_csv
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.provenance import sha256_of
+from study.store.disk.text_file import read_text, write_text
 
 SEAL_SUFFIX = ".sha256"
 CORRECT = "Correct it before it is sealed; from then on nothing in it may be changed."

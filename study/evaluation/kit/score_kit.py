@@ -9,10 +9,10 @@ from analysis.evaluation.proof.lab_kit import MISSING, Label, Scored, kit_figure
 from analysis.evaluation.proof.share import Figure
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, seal_of, sealed_hash
-from study.store.csv_rows import rows_to_csv
-from study.store.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
-from study.store.provenance import sha256_of
-from study.store.text_file import write_text
+from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.provenance import sha256_of
+from study.store.disk.text_file import write_text
+from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
 
 UNSCORED = "Nothing was scored, and nothing written."
 

@@ -22,10 +22,10 @@ from study.evaluation.challenge.injections import fitting_injections, inject, pl
 from study.evaluation.real.diagnose_real import imported
 from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
 from study.evaluation.real.real_folder import RealRecording
-from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
-from study.store.provenance import sha256_of
-from study.store.recording_file import write_recording
-from study.store.text_file import write_text
+from study.store.disk.provenance import sha256_of
+from study.store.disk.text_file import write_text
+from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
+from study.store.formats.recording_file import write_recording
 
 NOTHING = 0.5
 """Share of draws into which nothing is injected: a name there is the worst answer."""

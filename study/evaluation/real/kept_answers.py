@@ -9,8 +9,8 @@ from typing import Any
 from analysis.diagnosis.result.real_answer import RealAnswer
 from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
-from study.store.provenance import Provenance, gather_provenance
-from study.store.real_answer_file import read_answer_and_origin
+from study.store.disk.provenance import Provenance, gather_provenance
+from study.store.formats.real_answer_file import read_answer_and_origin
 
 ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
 

@@ -9,7 +9,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from study.errors import StudyError
 from study.importing.map_library import FoundMap, find_map
 from study.importing.model_library import model_for
-from study.store.mechanical_model_file import read_mechanical_model
+from study.store.formats.mechanical_model_file import read_mechanical_model
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,12 +24,12 @@ from study.evaluation.real.kept_answers import (
 from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 from study.local_clock import machine_zone
-from study.session.local_time import local_time
-from study.store.file_errors import CannotWriteError
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.new_folder import new_folder
-from study.store.provenance import Provenance
-from study.store.real_answer_file import write_real_answer
+from study.session.views.local_time import local_time
+from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.new_folder import new_folder
+from study.store.disk.provenance import Provenance
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.real_answer_file import write_real_answer
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 
 RETUNED_NAME = "retuned.toml"

@@ -7,9 +7,9 @@ from analysis.diagnosis.result.real_answer import RealAnswer
 from analysis.evaluation.proof.injected import InjectedOutcome
 from analysis.figures.real_held_out import real_picture
 from analysis.reports.real_report import Trouble, render_real_report
-from study.store.csv_rows import rows_to_csv
-from study.store.provenance import gather_provenance
-from study.store.text_file import write_text
+from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.provenance import gather_provenance
+from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME, TABLE_NAME, INJECTED_NAME, FIGURES_NAME = "report.html", "recordings.csv", "injected.csv", "figures"

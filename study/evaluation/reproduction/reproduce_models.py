@@ -10,9 +10,9 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.evaluation.reproduction.reproduce_recordings import Recorded
 from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
-from study.store.file_errors import UnusableFileError
-from study.store.identified_model_file import read_identified_model
-from study.store.provenance import sha256_of
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.provenance import sha256_of
+from study.store.formats.identified_model_file import read_identified_model
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 
 

@@ -18,8 +18,8 @@ from study.evaluation.reproduction.reproduce_recordings import Recorded, Wanted,
 from study.evaluation.reproduction.reproduction_plan import BETWEEN, ReproductionPlan, Steps
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
-from study.store.file_errors import CannotWriteError
-from study.store.protocol_files import read_study_protocol
+from study.store.disk.file_errors import CannotWriteError
+from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.results.analyze_data import sensor_frame
 from study.workflows.results.collect_sessions import Collected, collect_sessions
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study

@@ -19,8 +19,8 @@ from study.devices.device import Device, DeviceSettings
 from study.devices.opening import SIMULATED, open_device
 from study.errors import StudyError
 from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
-from study.session.limits import limits_of_recording
-from study.store.protocol_files import read_recording_protocol
+from study.session.stimulus.limits import limits_of_recording
+from study.store.formats.protocol_files import read_recording_protocol
 
 AXES = ("ax", "ay", "az")
 OF_CAP = 0.93

@@ -11,9 +11,9 @@ from protocols.recording_protocol import RecordingProtocol
 from study.devices.opening import SIMULATED
 from study.errors import StudyError
 from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
-from study.store.file_errors import UnusableFileError
-from study.store.protocol_files import read_recording_protocol
-from study.store.recording_file import read_recording
+from study.store.disk.file_errors import UnusableFileError
+from study.store.formats.protocol_files import read_recording_protocol
+from study.store.formats.recording_file import read_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 

@@ -20,9 +20,9 @@ from equalizer.identification.frequency_response.frequency_bands import (
 from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 from study.evaluation.reproduction.reproduction_results import Results
 from study.local_clock import local_now
-from study.store.provenance import Provenance, gather_provenance
-from study.store.reproduction_file import REPRODUCTION_NAME, write_reproduction
-from study.store.text_file import write_text
+from study.store.disk.provenance import Provenance, gather_provenance
+from study.store.disk.text_file import write_text
+from study.store.formats.reproduction_file import REPRODUCTION_NAME, write_reproduction
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME = "report.html"

@@ -10,9 +10,9 @@ from study.devices.clock import RealClock
 from study.devices.device import Device
 from study.errors import WrongUseError
 from study.local_clock import machine_zone
-from study.session.archive_views import HomeView
-from study.store.archive import SessionFolder, find_session
-from study.store.privacy import left_open
+from study.session.views.archive_views import HomeView
+from study.store.disk.privacy import left_open
+from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.link.from_engine import (
     Diagnosis,
     Finished,

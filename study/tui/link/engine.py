@@ -24,7 +24,7 @@ from study.tui.link.to_engine import Command
 if TYPE_CHECKING:
     from study.tui.link.desk import Desk
 
-NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.trial_recordings")
+NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
 """Loaded while somebody still types a code, so that beginning is quick."""
 
 NEEDED_AT_THE_END = ("study.workflows.results.analyze_data",)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from study.session.archive_views import DiagnosisView, HomeView, SessionView
-from study.session.views import HandleView
+from study.session.views.archive_views import DiagnosisView, HomeView, SessionView
+from study.session.views.views import HandleView
 
 
 class Call(Enum):

@@ -6,8 +6,9 @@ from typing import Any
 
 from protocols.trial import VoidCause
 from study.devices.clock import Clock
-from study.session.form_views import Form, FormReply
-from study.session.views import (
+from study.session.facts.void_reasons import why_screen_silent
+from study.session.views.form_views import Form, FormReply
+from study.session.views.views import (
     AfterPause,
     DemoChoice,
     DemoDone,
@@ -23,8 +24,7 @@ from study.session.views import (
     Unanswered,
     Welcome,
 )
-from study.session.views import Reply as Answer
-from study.session.void_reasons import why_screen_silent
+from study.session.views.views import Reply as Answer
 from study.tui.link.from_engine import Ask, Call, Close, Feedback, LookUpdate, Trouble
 from study.tui.link.screen_link import ScreenLink
 from study.tui.link.to_engine import Reply

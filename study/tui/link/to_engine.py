@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from study.session.requests import Request
+from study.session.watching.requests import Request
 
 
 @dataclass(frozen=True, slots=True)

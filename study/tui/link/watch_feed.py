@@ -5,7 +5,7 @@ import subprocess
 import threading
 from multiprocessing.connection import Connection
 
-from study.session.watch_view import WatchView
+from study.session.watching.watch_view import WatchView
 from study.tui.link.child_process import start_child
 
 LOOK_EVERY_S = 0.2

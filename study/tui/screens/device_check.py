@@ -7,7 +7,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Footer
 
-from study.session.views import DeviceFinding, DeviceReport
+from study.session.views.views import DeviceFinding, DeviceReport
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.said import Said

@@ -11,7 +11,7 @@ from textual.containers import Container, Horizontal, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import Footer, Static
 
-from study.session.archive_views import DiagnosisView
+from study.session.views.archive_views import DiagnosisView
 from study.tui.home_messages import HomeWanted
 from study.tui.widgets.text_table import TextTable
 

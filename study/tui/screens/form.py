@@ -12,7 +12,7 @@ from textual.message import Message
 from textual.screen import Screen
 from textual.widgets import Button, Footer
 
-from study.session.form_entry import (
+from study.session.views.form_entry import (
     FormEntry,
     blank_entry,
     click_choice,
@@ -22,7 +22,7 @@ from study.session.form_entry import (
     press,
     reply_of,
 )
-from study.session.form_views import Form, FormReply, missing
+from study.session.views.form_views import Form, FormReply, missing
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow

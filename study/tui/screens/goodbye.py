@@ -7,8 +7,8 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Footer
 
-from study.session.counted import answers_are
-from study.session.views import Goodbye
+from study.session.views.counted import answers_are
+from study.session.views.views import Goodbye
 from study.tui.take_off import take_off
 from study.tui.trial_words import turned_away_words
 from study.tui.widgets.card import Card

@@ -9,7 +9,7 @@ from textual.containers import Container, Vertical, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import Footer, Input, Static
 
-from study.session.archive_views import HomeView
+from study.session.views.archive_views import HomeView
 from study.tui.home_messages import HomeWanted
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnose_form import DiagnoseForm

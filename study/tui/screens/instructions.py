@@ -8,8 +8,8 @@ from textual.containers import Horizontal
 from textual.screen import Screen
 from textual.widgets import Footer
 
-from study.session.counted import answers_are
-from study.session.views import Welcome
+from study.session.views.counted import answers_are
+from study.session.views.views import Welcome
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.take_off import take_off
 from study.tui.trial_words import plan

@@ -8,7 +8,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen
 from textual.widgets import Button, Footer, TextArea
 
-from study.session.requests import NoteAsked, Who
+from study.session.watching.requests import NoteAsked, Who
 from study.tui.screens.help import HelpScreen
 from study.tui.take_off import take_off
 from study.tui.widgets.card import Card

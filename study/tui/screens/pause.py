@@ -11,9 +11,9 @@ from textual.screen import Screen
 from textual.widgets import Footer, OptionList
 from textual.widgets.option_list import Option
 
-from study.session.counted import answers_are
-from study.session.requests import NoteAsked
-from study.session.views import AfterPause, PauseNotice
+from study.session.views.counted import answers_are
+from study.session.views.views import AfterPause, PauseNotice
+from study.session.watching.requests import NoteAsked
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
 from study.tui.take_off import take_off

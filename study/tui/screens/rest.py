@@ -9,7 +9,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Digits, Footer
 
-from study.session.views import RestNotice
+from study.session.views.views import RestNotice
 from study.tui.take_off import take_off
 from study.tui.trial_words import progress_sentence, runs_left
 from study.tui.widgets.card import Card

@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.screen import Screen
 from textual.widgets import Footer, Static, TabbedContent, TabPane
 
-from study.session.archive_views import SessionView
+from study.session.views.archive_views import SessionView
 from study.tui.home_messages import AnalyzeWanted, HomeWanted, ResumeWanted, WatchWanted, WithdrawWanted
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt

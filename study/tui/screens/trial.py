@@ -13,7 +13,7 @@ from textual.screen import Screen
 from textual.timer import Timer
 from textual.widgets import Footer
 
-from study.session.views import Answered, Question, Reply, Task, Unanswered
+from study.session.views.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.answer_keys import DIGITS, AnswerKeys
 from study.tui.key_presses import KeyPresses, arrival_s
 from study.tui.trial_replies import LEAVING, NO_REPEATS, PAUSE, REPEAT, TIME_OVER, repeat_words

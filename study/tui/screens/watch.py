@@ -18,8 +18,8 @@ from textual.screen import Screen
 from textual.widgets import Footer, Static
 
 from study.errors import StudyError
-from study.session.requests import NoteAsked, PauseAsked, Request, StopAsked
-from study.session.watch_view import ON, Alarm, WatchView
+from study.session.watching.requests import NoteAsked, PauseAsked, Request, StopAsked
+from study.session.watching.watch_view import ON, Alarm, WatchView
 from study.tui.screens.note_prompt import NotePrompt
 from study.tui.screens.watch_help import GUIDE, HELP
 from study.tui.screens.watch_style import STYLE

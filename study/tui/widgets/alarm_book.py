@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from study.session.watch_view import Alarm
+from study.session.watching.watch_view import Alarm
 
 RING_EVERY_S = 4.0
 FORGOTTEN_AFTER_S = 10.0

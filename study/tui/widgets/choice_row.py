@@ -11,7 +11,7 @@ from textual.message import Message
 from textual.reactive import reactive
 from textual.widget import Widget
 
-from study.session.form_entry import moved, named_choice
+from study.session.views.form_entry import moved, named_choice
 
 GAP = 3
 

@@ -9,7 +9,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
-from study.session.views import DirectionPicture
+from study.session.views.views import DirectionPicture
 from study.tui.direction_picture import large_drawing, sentence
 from study.tui.number_picture import large_number
 

@@ -5,8 +5,8 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.widgets import Static
 
-from study.session.form_entry import Given
-from study.session.form_views import FormField
+from study.session.views.form_entry import Given
+from study.session.views.form_views import FormField
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.said import Said
 

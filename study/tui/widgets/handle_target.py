@@ -8,7 +8,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
-from study.session.views import HandleView
+from study.session.views.views import HandleView
 from study.tui.braille import Canvas
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textual.content import Content
 from textual.widget import Widget
 
-from study.session.watch_view import StaircasePoint
+from study.session.watching.watch_view import StaircasePoint
 from study.tui.braille import Canvas
 from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG
 

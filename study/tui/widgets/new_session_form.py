@@ -8,8 +8,8 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Button, Input, Label, Select, Static
 
-from study.session.archive_views import HomeView, SessionLine
-from study.session.participant_codes import code_problem, is_code, next_code
+from study.session.views.archive_views import HomeView, SessionLine
+from study.session.views.participant_codes import code_problem, is_code, next_code
 from study.tui.home_messages import BeginWanted
 
 SIMULATED = "simulated"

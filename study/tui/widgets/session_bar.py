@@ -6,7 +6,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
-from study.session.views import Progress
+from study.session.views.views import Progress
 
 DONE, LEFT = "━", "─"
 

@@ -11,8 +11,8 @@ from textual.message import Message
 from textual.widgets import DataTable
 
 from study.local_clock import machine_zone
-from study.session.archive_views import SessionLine
-from study.session.local_time import local_column
+from study.session.views.archive_views import SessionLine
+from study.session.views.local_time import local_column
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
 from study.tui.standing_words import STYLES, standing_words
 

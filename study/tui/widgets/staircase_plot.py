@@ -5,7 +5,7 @@ import itertools
 from textual.content import Content
 from textual.widget import Widget
 
-from study.session.archive_views import Staircase
+from study.session.views.archive_views import Staircase
 from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from textual.content import Content
 
-from study.session.watch_view import Alarm, ClosedTrial, RunStatus, WatchedRun, WatchView
+from study.session.watching.watch_view import Alarm, ClosedTrial, RunStatus, WatchedRun, WatchView
 from study.tui.watch_words import (
     NOT_MEASURED,
     NOT_MEASURED_MARK,

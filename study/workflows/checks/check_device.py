@@ -8,8 +8,8 @@ from equalizer.signals.signal import FloatArray
 from protocols.apparatus import SafetySettings
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Look
-from study.session.limits import forces_in_words
-from study.session.views import DeviceFinding, DeviceReport
+from study.session.stimulus.limits import forces_in_words
+from study.session.views.views import DeviceFinding, DeviceReport
 
 LOOKS = 50
 EVERY_S = 0.01

@@ -16,8 +16,8 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 import study
-from study.session.views import DeviceFinding
-from study.store.privacy import warning
+from study.session.views.views import DeviceFinding
+from study.store.disk.privacy import warning
 
 HAPTEQ = "hapteq"
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")

@@ -9,9 +9,9 @@ import numpy as np
 from equalizer.signals.signal import Signal
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Health
-from study.session.held_stimulus import HeldStimulus
-from study.session.timing_verdict import Lateness, judge_lateness, judge_load, judge_missed, lateness_of
-from study.session.views import DeviceFinding
+from study.session.stimulus.held_stimulus import HeldStimulus
+from study.session.stimulus.timing_verdict import Lateness, judge_lateness, judge_load, judge_missed, lateness_of
+from study.session.views.views import DeviceFinding
 
 LOOP_S = 0.1
 FADE_S = 0.05

@@ -9,9 +9,9 @@ from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
 from study.devices.opening import examine_device, open_device
 from study.errors import DeviceError, ExitCode
-from study.session.timing_verdict import judge_load
-from study.session.views import DeviceFinding, DeviceReport
-from study.store.protocol_files import read_study_protocol
+from study.session.stimulus.timing_verdict import judge_load
+from study.session.views.views import DeviceFinding, DeviceReport
+from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing

@@ -5,7 +5,7 @@ from itertools import count
 from pathlib import Path
 
 from study.errors import LeftError
-from study.store.diagnosis_file import DIAGNOSIS_NAME
+from study.store.formats.diagnosis_file import DIAGNOSIS_NAME
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 
 

@@ -20,8 +20,8 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
-from study.store.new_folder import new_folder, require_new_folder
-from study.store.written_elsewhere import note_written
+from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.sessions.written_elsewhere import note_written
 from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,

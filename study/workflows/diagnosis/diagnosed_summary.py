@@ -7,7 +7,7 @@ from analysis.diagnosis.document import FORMAT, VERSION, Errors, diagnosis_to_js
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.unit_wording import error_text
-from study.store.diagnosis_file import MODEL_NAME, PAGE_NAME
+from study.store.formats.diagnosis_file import MODEL_NAME, PAGE_NAME
 
 
 def summary(findings: Findings) -> dict[str, Any]:

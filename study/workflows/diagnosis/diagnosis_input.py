@@ -29,8 +29,8 @@ from equalizer.identification.mechanical.open_tolerance import opened
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import read_recording
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.session_as_recordings import session_recordings
 
 STILL = 1e-9

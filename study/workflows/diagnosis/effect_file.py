@@ -9,9 +9,9 @@ from equalizer.effects.law_entry import LawEntry
 from equalizer.laws.law import Law, law_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from study.errors import StudyError
-from study.store.diagnosis_file import read_diagnosis
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.text_file import write_text
+from study.store.disk.text_file import write_text
+from study.store.formats.diagnosis_file import read_diagnosis
+from study.store.formats.mechanical_model_file import read_mechanical_model
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 TEXT = """\"\"\"{about}\"\"\"

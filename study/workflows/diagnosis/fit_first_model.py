@@ -11,8 +11,8 @@ from analysis.diagnosis.data.carried_weight import weighted
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import nearest
 from study.errors import StudyError, WrongUseError
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.provenance import gather_provenance
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.diagnosis.diagnosis_input import read_input
 from study.workflows.free_name import require_free
 

@@ -20,10 +20,10 @@ import numpy as np
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 from study.errors import StudyError
-from study.session.events import TrialMeasured
-from study.store.archive import SessionFolder, find_session
-from study.store.provenance import sha256_of
-from study.store.recording_file import read_recording
+from study.session.facts.events import TrialMeasured
+from study.store.disk.provenance import sha256_of
+from study.store.formats.recording_file import read_recording
+from study.store.sessions.archive import SessionFolder, find_session
 from study.workflows.results.fold_session import fold_session
 
 MOST_S = 60.0

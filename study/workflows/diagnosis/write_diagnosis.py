@@ -8,10 +8,10 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.figures.diagnosis_pictures import diagnosis_pictures
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from study.local_clock import local_now
-from study.store.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.provenance import Provenance, gather_provenance
-from study.store.text_file import write_text
+from study.store.disk.provenance import Provenance, gather_provenance
+from study.store.disk.text_file import write_text
+from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
+from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.picture_files import write_pictures
 
 

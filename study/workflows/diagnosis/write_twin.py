@@ -19,10 +19,10 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.recording import Recording
 from protocols.recording_protocol import RecordingProtocol
 from study.errors import StudyError, WrongUseError
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.protocol_files import read_recording_protocol
-from study.store.provenance import gather_provenance
-from study.store.recording_file import read_recording
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.protocol_files import read_recording_protocol
+from study.store.formats.recording_file import read_recording
 from study.workflows.free_name import require_free
 from study.workflows.recording.record_device import RecordingPlan, record_device
 

@@ -15,8 +15,8 @@ from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, re
 from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_within
 from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing, peak_gain
 from study.workflows.free_name import require_free
 

@@ -20,10 +20,10 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.plant.model_quality import ModelQuality, model_quality
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
-from study.store.identified_model_file import write_identified_model
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.provenance import gather_provenance
-from study.store.recording_file import read_recording
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.identified_model_file import write_identified_model
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 from study.workflows.equalizer.freed_recordings import freed_of, freed_recordings
 from study.workflows.free_name import require_free
 

@@ -19,8 +19,8 @@ from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.place_weights import place_weights
 from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
 from study.errors import StudyError, WrongUseError
-from study.store.identified_model_file import read_identified_model
-from study.store.provenance import sha256_of
+from study.store.disk.provenance import sha256_of
+from study.store.formats.identified_model_file import read_identified_model
 
 SAME_PLACE_M = 0.001
 GAIN_LINES = 100

@@ -16,8 +16,8 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, Fault, Played
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError, StudyError
-from study.session.limits import SPRING_SLEW_N_PER_S
-from study.store.repeats_file import beside
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
+from study.store.formats.repeats_file import beside
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, repeated, write_repeated
 
 REST_S = 2.0

@@ -13,9 +13,9 @@ from equalizer.tracking.learning.iteration import IterationState, Verdict
 from equalizer.tracking.learning.model_inverse import InverseOfLength
 from study.devices.device import DeviceSettings, Played
 from study.errors import StudyError
-from study.store.provenance import gather_provenance
-from study.store.repeats_file import Repeats, beside, read_repeats, write_repeats
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.repeats_file import Repeats, beside, read_repeats, write_repeats
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

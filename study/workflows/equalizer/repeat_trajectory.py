@@ -17,8 +17,8 @@ from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import inverse_at
 from study.devices.device import DeviceSettings
 from study.errors import StudyError
-from study.session.limits import SPRING_SLEW_N_PER_S, Limits
-from study.store.repeats_file import beside
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
+from study.store.formats.repeats_file import beside
 from study.workflows.equalizer.equalize_trajectory import (
     EqualizedTrajectory,
     EqualizePlan,

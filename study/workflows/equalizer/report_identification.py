@@ -15,7 +15,7 @@ from equalizer.identification.state_space.order_report import OrderReport, order
 from equalizer.identification.state_space.refusals import IdentificationRefused
 from equalizer.identification.state_space.settings import IdentificationSettings
 from study.local_clock import local_now
-from study.store.text_file import write_text
+from study.store.disk.text_file import write_text
 from study.workflows.equalizer.identified_summary import summary_lines
 from study.workflows.equalizer.identify_model import IdentifiedDevice
 from study.workflows.picture_files import write_pictures

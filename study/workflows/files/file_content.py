@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.store.file_errors import CannotReadError, UnusableFileError
-from study.store.hdf5_file import format_of, is_hdf5
-from study.store.regular_file import DOCUMENT_BYTES
-from study.store.strict_json import load_json
-from study.store.text_file import read_text
-from study.store.toml_text import TOML_BYTES, too_long_key
+from study.store.disk.file_errors import CannotReadError, UnusableFileError
+from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.disk.regular_file import DOCUMENT_BYTES
+from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import read_text
+from study.store.disk.toml_text import TOML_BYTES, too_long_key
 
 
 @dataclass(frozen=True, slots=True)

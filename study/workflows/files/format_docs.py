@@ -21,19 +21,13 @@ from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.schema import protocol_schema
 from protocols.trial import Trial
-from study.session.live import Live
-from study.store import (
-    identified_model_file,
-    live_file,
-    log_seal,
-    mechanical_model_file,
-    recording_layout,
-    repeats_file,
-)
-from study.store.csv_rows import columns, in_words
-from study.store.layout import Entry
-from study.store.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
-from study.store.text_file import write_text
+from study.session.watching.live import Live
+from study.store.disk.csv_rows import columns, in_words
+from study.store.disk.layout import Entry
+from study.store.disk.text_file import write_text
+from study.store.formats import identified_model_file, mechanical_model_file, recording_layout, repeats_file
+from study.store.sessions import live_file, log_seal
+from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files.importing_docs import importing_markdown
 from study.workflows.files.law_docs import LAWS
 from study.workflows.files.session_log_docs import event_schema, session_log_markdown

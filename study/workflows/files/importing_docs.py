@@ -10,8 +10,8 @@ from study.importing.csv_arrays import MOST_ROWS
 from study.importing.functions import FUNCTIONS
 from study.importing.map_library import read_map, shipped_maps
 from study.importing.map_toml import MAP_SCHEMA, allowed_in_map
-from study.store.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
-from study.store.regular_file import TABLE_BYTES
+from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
+from study.store.disk.regular_file import TABLE_BYTES
 
 EXAMPLE = """\
 device = "one axis of our rig"

@@ -15,20 +15,20 @@ from protocols.schema import ADAPTERS, protocol_schema
 from study.importing.import_map import ChannelMap, ComputedMap
 from study.importing.map_toml import KIND as MAP_KIND
 from study.importing.map_toml import is_map, parse_map
-from study.store import identified_model_file, recording_layout
-from study.store.csv_rows import header_problem
-from study.store.diagnosis_file import read_diagnosis
-from study.store.file_errors import UnusableFileError
-from study.store.identified_model_file import read_identified_model
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.real_answer_file import read_real_answer
-from study.store.recording_file import read_recording
-from study.store.repeats_file import FORMAT as REPEATS_FORMAT
-from study.store.repeats_file import read_repeats
-from study.store.reproduction_file import read_reproduction
-from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_HEADER, read_thresholds
-from study.store.trajectory_file import read_trajectory
-from study.store.trials_file import TRIALS_HEADER, read_trials
+from study.store.disk.csv_rows import header_problem
+from study.store.disk.file_errors import UnusableFileError
+from study.store.formats import identified_model_file, recording_layout
+from study.store.formats.diagnosis_file import read_diagnosis
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.real_answer_file import read_real_answer
+from study.store.formats.recording_file import read_recording
+from study.store.formats.repeats_file import FORMAT as REPEATS_FORMAT
+from study.store.formats.repeats_file import read_repeats
+from study.store.formats.reproduction_file import read_reproduction
+from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_HEADER, read_thresholds
+from study.store.formats.trajectory_file import read_trajectory
+from study.store.formats.trials_file import TRIALS_HEADER, read_trials
 from study.workflows.files.file_content import FileContent
 
 Recogniser = Callable[[FileContent], str | None]

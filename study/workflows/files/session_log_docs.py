@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from study.session import log_chain
-from study.session.events import EVENTS
+from study.session.facts import log_chain
+from study.session.facts.events import EVENTS
 
 
 def event_schema() -> dict[str, Any]:

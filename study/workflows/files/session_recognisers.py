@@ -7,19 +7,19 @@ from protocols.lock import FORMAT as LOCK_FORMAT
 from protocols.lock import LockError, lock_from_json
 from study.errors import StudyError
 from study.local_clock import machine_zone
-from study.session.events import SESSION_FORMAT, TrialMeasured
-from study.session.live import Live
-from study.session.local_time import local_time
-from study.store.archive import SessionFolder
-from study.store.event_log import LOG_NAME
-from study.store.file_errors import UnusableFileError
-from study.store.json_document import read_json
-from study.store.live_file import LIVE_FORMAT
-from study.store.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
-from study.store.provenance import sha256_of
-from study.store.request_inbox import REQUEST_FORMAT
-from study.store.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
-from study.store.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
+from study.session.facts.events import SESSION_FORMAT, TrialMeasured
+from study.session.views.local_time import local_time
+from study.session.watching.live import Live
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.json_document import read_json
+from study.store.disk.provenance import sha256_of
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import LOG_NAME
+from study.store.sessions.live_file import LIVE_FORMAT
+from study.store.sessions.log_seal import SEAL_FORMAT, SEAL_NAME, read_seal
+from study.store.sessions.request_inbox import REQUEST_FORMAT
+from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_VERSION
+from study.store.sessions.withdrawal_files import TOMBSTONE_FORMAT, WITHDRAWAL_FORMAT, how_to_finish
 from study.workflows.files.file_content import FileContent
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import result_problems

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from study.errors import StudyError
-from study.store.archive import FOLDER
-from study.store.file_errors import UnusableFileError
-from study.store.privacy import warning
-from study.store.recording_file import read_recording
-from study.store.regular_file import DOCUMENT_BYTES
-from study.store.strict_json import load_json
-from study.store.toml_text import TOML_BYTES, too_long_key
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.privacy import warning
+from study.store.disk.regular_file import DOCUMENT_BYTES
+from study.store.disk.strict_json import load_json
+from study.store.disk.toml_text import TOML_BYTES, too_long_key
+from study.store.formats.recording_file import read_recording
+from study.store.sessions.archive import FOLDER
 from study.workflows.files.file_content import FileContent, open_content
 from study.workflows.files.recognisers import RECOGNISERS, Recogniser
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS

@@ -7,8 +7,8 @@ from pathlib import Path
 from equalizer.effects.placing import PlacingError, placed_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import read_recording
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 from study.workflows.files.validate import Validation
 
 

@@ -17,10 +17,10 @@ from study.importing.import_map import CsvMap, ImportMap
 from study.importing.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
-from study.store.hdf5_file import format_of, is_hdf5
-from study.store.provenance import gather_provenance
-from study.store.recording_file import read_recording, write_recording
-from study.store.recording_layout import FORMAT
+from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.recording_file import read_recording, write_recording
+from study.store.formats.recording_layout import FORMAT
 from study.workflows.free_name import require_free
 
 Progress = Callable[[float], None]

@@ -11,8 +11,8 @@ import numpy as np
 from analysis.look.overview import Overview, overview
 from analysis.reports.look_report import pictures_of, render_look_report
 from study.local_clock import local_now
-from study.store.recording_file import read_recording
-from study.store.text_file import write_text
+from study.store.disk.text_file import write_text
+from study.store.formats.recording_file import read_recording
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME = "report.html"

@@ -8,7 +8,7 @@ from equalizer.signals.recording import Recording
 from protocols.recording_protocol import RecordingProtocol
 from study.devices.device import Device, Fault, Health
 from study.errors import DeviceError
-from study.session.recording_plan import Piece, pieces
+from study.session.stimulus.recording_plan import Piece, pieces
 
 LOWERED_TO = 0.7
 """3 dB less: after five times a sixth is left, and little of a clean amplitude is given away."""

@@ -13,11 +13,11 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, LeftError
-from study.session.handle_notice import handle_notice
-from study.session.limits import limits_of_recording
-from study.session.recording_plan import pieces
-from study.store.provenance import gather_provenance
-from study.store.recording_file import write_recording
+from study.session.stimulus.limits import limits_of_recording
+from study.session.stimulus.recording_plan import pieces
+from study.session.views.handle_notice import handle_notice
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.recording_file import write_recording
 from study.workflows.free_name import require_free
 from study.workflows.recording.play_pieces import Take, play_pieces
 from study.workflows.recording.take_facts import segment_facts, spring_facts, warnings_of

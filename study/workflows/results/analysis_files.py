@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from study.errors import StudyError
-from study.store.json_document import read_json
-from study.store.provenance import sha256_of
-from study.store.real_folder import is_real_folder
-from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
+from study.store.disk.json_document import read_json
+from study.store.disk.provenance import sha256_of
+from study.store.disk.real_folder import is_real_folder
+from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 
 ANALYSIS_NAME = "analysis"
 """Where an analysis goes, in the folder that was analysed, if nobody says otherwise."""

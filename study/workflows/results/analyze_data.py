@@ -15,14 +15,14 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
 from study.local_clock import local_now
-from study.store.file_errors import CannotWriteError
-from study.store.json_document import write_json
-from study.store.privacy import close_to_others, make_folder
-from study.store.provenance import Provenance, gather_provenance
-from study.store.recording_file import read_recording
-from study.store.text_file import write_text
-from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
-from study.store.written_elsewhere import note_written
+from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.json_document import write_json
+from study.store.disk.privacy import close_to_others, make_folder
+from study.store.disk.provenance import Provenance, gather_provenance
+from study.store.disk.text_file import write_text
+from study.store.formats.recording_file import read_recording
+from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
+from study.store.sessions.written_elsewhere import note_written
 from study.workflows.picture_files import write_pictures
 from study.workflows.results.analysis_files import PAGE_NAME, written_by_analysis
 from study.workflows.results.collect_sessions import Collected, collect_sessions

@@ -10,10 +10,10 @@ from equalizer.plant.model_quality import NOT_STORED
 from protocols.study_protocol import StudyProtocol
 from protocols.trial import Trial
 from study.errors import StudyError, WrongUseError
-from study.session.archive_views import TURNED_AWAY
-from study.session.state import SessionState
-from study.store.archive import SessionFolder, session_folders
-from study.store.event_log import LOG_NAME
+from study.session.state.state import SessionState
+from study.session.views.archive_views import TURNED_AWAY
+from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.event_log import LOG_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import finish_tables
 

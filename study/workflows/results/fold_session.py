@@ -9,14 +9,14 @@ from protocols.hashing import protocol_hash
 from protocols.loading import ProtocolError, load_protocol
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
-from study.session.draw_check import LogContradiction
-from study.session.events import SessionOpened
-from study.session.fold import apply, begin_session
-from study.session.state import SessionState
-from study.store.archive import SessionFolder, SessionWithdrawnError
-from study.store.event_log import LogContents, read_log
-from study.store.log_seal import check_seals
-from study.store.session_summary import SUMMARY_NAME, read_summary, said_to_have
+from study.session.facts.events import SessionOpened
+from study.session.state.draw_check import LogContradiction
+from study.session.state.fold import apply, begin_session
+from study.session.state.state import SessionState
+from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
+from study.store.sessions.event_log import LogContents, read_log
+from study.store.sessions.log_seal import check_seals
+from study.store.sessions.session_summary import SUMMARY_NAME, read_summary, said_to_have
 
 
 @dataclass(frozen=True, slots=True)

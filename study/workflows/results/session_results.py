@@ -9,18 +9,18 @@ from typing import Any
 from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.thresholds import Threshold, thresholds
 from protocols.trial import Trial
-from study.session.state import SessionState
-from study.store.archive import SessionFolder
-from study.store.csv_rows import Row, as_written_in
-from study.store.file_errors import CannotReadError, UnusableFileError
-from study.store.json_document import write_json
-from study.store.log_seal import SEAL_NAME, write_seal
-from study.store.provenance import gather_provenance
-from study.store.session_lock import locked
-from study.store.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
-from study.store.text_file import read_text
-from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds, write_thresholds
-from study.store.trials_file import TRIALS_NAME, read_trials, write_trials
+from study.session.state.state import SessionState
+from study.store.disk.csv_rows import Row, as_written_in
+from study.store.disk.file_errors import CannotReadError, UnusableFileError
+from study.store.disk.json_document import write_json
+from study.store.disk.provenance import gather_provenance
+from study.store.disk.text_file import read_text
+from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, read_thresholds, write_thresholds
+from study.store.formats.trials_file import TRIALS_NAME, read_trials, write_trials
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.log_seal import SEAL_NAME, write_seal
+from study.store.sessions.session_lock import locked
+from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
 from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.written_analysis import WrittenAnalysis

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault
 from study.devices.opening import open_device
-from study.session.state import SessionState
-from study.store.archive import SessionFolder
-from study.store.live_file import write_live
-from study.store.request_inbox import RequestInbox
+from study.session.state.state import SessionState
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.live_file import write_live
+from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.device_settings import device_settings
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.equalize_stimuli import Equalized, check_playable, equalized_again, equalized_stimuli

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
-from study.session.counted import answers_are
-from study.session.void_reasons import TOO_BUSY
-from study.store.archive import SessionFolder
-from study.store.session_lock import locked
+from study.session.facts.void_reasons import TOO_BUSY
+from study.session.views.counted import answers_are
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.session_lock import locked
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.results.fold_session import FoldedSession
 from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables

@@ -10,14 +10,14 @@ from protocols.hashing import protocol_hash
 from protocols.study_protocol import StudyProtocol
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
-from study.session.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
-from study.session.fold import begin_session
-from study.session.rules import LATEST
-from study.session.state import SessionState
-from study.store.archive import SessionFolder, new_session_folder
-from study.store.event_log import EventLog
-from study.store.provenance import versions
-from study.store.session_lock import locked
+from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
+from study.session.state.fold import begin_session
+from study.session.state.rules import LATEST
+from study.session.state.state import SessionState
+from study.store.disk.provenance import versions
+from study.store.sessions.archive import SessionFolder, new_session_folder
+from study.store.sessions.event_log import EventLog
+from study.store.sessions.session_lock import locked
 from study.workflows.session.equalize_stimuli import Equalized, keep_model
 from study.workflows.session.other_sessions import dose_before
 from study.workflows.session.participant_number import participant_number

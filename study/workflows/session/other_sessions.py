@@ -1,10 +1,10 @@
 """The other sessions of a participant, as far as they bear on the vibration dose of the hand."""
 
 from study.errors import StudyError
-from study.session.daily_dose import dose_elsewhere
-from study.session.sitting_events import DoseElsewhere
-from study.session.sitting_state import SittingState
-from study.store.archive import SessionFolder, session_folders
+from study.session.facts.sitting_events import DoseElsewhere
+from study.session.state.daily_dose import dose_elsewhere
+from study.session.state.sitting_state import SittingState
+from study.store.sessions.archive import SessionFolder, session_folders
 from study.workflows.results.fold_session import fold_session
 
 

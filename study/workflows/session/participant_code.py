@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.store.archive import SessionFolder, session_folders
+from study.store.sessions.archive import SessionFolder, session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import begun_in
 

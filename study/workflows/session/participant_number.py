@@ -5,15 +5,15 @@ import tomllib
 from pathlib import Path
 
 from study.errors import StudyError
-from study.session.events import PlaceTaken, SessionOpened, parse_event
-from study.session.log_chain import Chain, read_chained
-from study.session.rules import place_comes_later
-from study.session.state import SessionState
-from study.store.archive import SessionFolder, session_folders
-from study.store.event_log import read_opening
-from study.store.regular_file import read_regular
-from study.store.session_lock import places_locked
-from study.store.withdrawal_files import Begun, begun_of_tombstone, read_intent
+from study.session.facts.events import PlaceTaken, SessionOpened, parse_event
+from study.session.facts.log_chain import Chain, read_chained
+from study.session.state.rules import place_comes_later
+from study.session.state.state import SessionState
+from study.store.disk.regular_file import read_regular
+from study.store.sessions.archive import SessionFolder, session_folders
+from study.store.sessions.event_log import read_opening
+from study.store.sessions.session_lock import places_locked
+from study.store.sessions.withdrawal_files import Begun, begun_of_tombstone, read_intent
 from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'

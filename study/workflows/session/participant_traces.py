@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.store.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
-from study.store.real_folder import is_real_file, is_real_folder
-from study.store.regular_file import open_regular, read_regular
-from study.store.session_lock import LOCK_NAME
-from study.store.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
-from study.store.withdrawal_files import read_tombstone
-from study.store.written_elsewhere import WRITTEN_ELSEWHERE
+from study.store.disk.real_folder import is_real_file, is_real_folder
+from study.store.disk.regular_file import open_regular, read_regular
+from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
+from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
+from study.store.sessions.session_lock import LOCK_NAME
+from study.store.sessions.withdrawal_files import read_tombstone
+from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE
 from study.workflows.results.analysis_files import ANALYSIS_NAME, written_by_analysis
 
 PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.store.archive import check_subject
-from study.store.privacy import left_open
-from study.store.protocol_files import read_study_protocol
+from study.store.disk.privacy import left_open
+from study.store.formats.protocol_files import read_study_protocol
+from study.store.sessions.archive import check_subject
 from study.workflows.session.equalize_stimuli import check_playable
 from study.workflows.session.open_session import SessionPlan, fresh_seed
 from study.workflows.session.participant_code import check_code, unfinished_sessions

@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 from study.errors import StudyError
-from study.session.archive_views import TURNED_AWAY
-from study.session.events import DeviceChecked, FormFilled, SessionClosed
-from study.session.form_views import Form
-from study.session.forms import confirmation_of, confirmed, judge_form
-from study.session.machine import CheckDevice, FillIn, Leave, next_preparation
-from study.session.requests import NoteAsked
-from study.session.state import SessionState
-from study.session.views import DeviceFinding
+from study.session.facts.events import DeviceChecked, FormFilled, SessionClosed
+from study.session.state.machine import CheckDevice, FillIn, Leave, next_preparation
+from study.session.state.state import SessionState
+from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.form_views import Form
+from study.session.views.forms import confirmation_of, confirmed, judge_form
+from study.session.views.views import DeviceFinding
+from study.session.watching.requests import NoteAsked
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_timing import check_computer
 from study.workflows.checks.computer_load import load_per_processor

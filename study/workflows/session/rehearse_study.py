@@ -11,8 +11,8 @@ from protocols.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
 from study.errors import LeftError, StudyError
 from study.participants.population import population
-from study.store.archive import SessionFolder, session_folders
-from study.store.provenance import sha256_of
+from study.store.disk.provenance import sha256_of
+from study.store.sessions.archive import SessionFolder, session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
 from study.workflows.session.conduct_session import conduct_new, conduct_resumed

@@ -8,10 +8,7 @@ from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
-from study.session.counted import answers_are
-from study.session.delivered import delivered
-from study.session.due_trial import labels_are_swapped
-from study.session.events import (
+from study.session.facts.events import (
     SessionClosed,
     SessionInterrupted,
     SessionResumed,
@@ -19,17 +16,20 @@ from study.session.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.fold import apply
-from study.session.state import SessionState
-from study.session.stimulus import direction_vector
-from study.store.archive import SessionFolder
-from study.store.event_log import EventLog, mend
-from study.store.live_file import remove_live
-from study.store.privacy import close_data_folder, close_to_others
-from study.store.provenance import versions
-from study.store.request_inbox import RequestInbox
-from study.store.session_lock import locked
-from study.store.trial_recordings import find_trial_recording, recording_name
+from study.session.state.due_trial import labels_are_swapped
+from study.session.state.fold import apply
+from study.session.state.state import SessionState
+from study.session.stimulus.delivered import delivered
+from study.session.stimulus.stimulus import direction_vector
+from study.session.views.counted import answers_are
+from study.store.disk.privacy import close_data_folder, close_to_others
+from study.store.disk.provenance import versions
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import EventLog, mend
+from study.store.sessions.live_file import remove_live
+from study.store.sessions.request_inbox import RequestInbox
+from study.store.sessions.session_lock import locked
+from study.store.sessions.trial_recordings import find_trial_recording, recording_name
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import write_tables
 from study.workflows.session.open_session import OpenedSession, device_facts

@@ -7,16 +7,16 @@ from protocols.practice import practice_passed, practised, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError
-from study.session.archive_views import TURNED_AWAY
-from study.session.counted import answers_are
-from study.session.due_trial import Present, labels_are_swapped
-from study.session.events import RestTaken, SessionClosed, SessionInterrupted
-from study.session.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
-from study.session.progress import progress
-from study.session.state import SessionState, felt
-from study.session.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
-from study.session.void_reasons import busy_sentence, why_too_many
-from study.store.log_seal import seal_log
+from study.session.facts.events import RestTaken, SessionClosed, SessionInterrupted
+from study.session.facts.void_reasons import busy_sentence, why_too_many
+from study.session.state.due_trial import Present, labels_are_swapped
+from study.session.state.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
+from study.session.state.progress import progress
+from study.session.state.state import SessionState, felt
+from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.counted import answers_are
+from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
+from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import take_place
 from study.workflows.session.prepare_sitting import fill_in, prepare_sitting, turn_away

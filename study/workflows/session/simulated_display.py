@@ -5,9 +5,9 @@ from collections.abc import Callable
 from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.participants.observer import Felt, Observer
-from study.session.due_trial import Present
-from study.session.form_views import Form, FormField, FormReply
-from study.session.views import (
+from study.session.state.due_trial import Present
+from study.session.views.form_views import Form, FormField, FormReply
+from study.session.views.views import (
     AfterPause,
     Answered,
     DemoChoice,

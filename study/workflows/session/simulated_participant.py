@@ -5,7 +5,7 @@ from collections.abc import Callable
 from study.devices.clock import Clock
 from study.participants.observer import Observer
 from study.participants.observers import observer_named
-from study.session.views import Question
+from study.session.views.views import Question
 from study.workflows.session.conduct_session import Participant
 from study.workflows.session.simulated_display import SimulatedDisplay
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from study.errors import StudyError, WrongUseError
-from study.store.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
-from study.store.event_log import LOG_NAME, nobody_writes
-from study.store.real_folder import RealFolder, is_real_file, is_real_folder, opened_folder
-from study.store.session_lock import LOCK_NAME, locked
-from study.store.withdrawal_files import Intent, read_intent, write_intent, write_tombstone
-from study.store.written_elsewhere import written_elsewhere
+from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folder, opened_folder
+from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
+from study.store.sessions.event_log import LOG_NAME, nobody_writes
+from study.store.sessions.session_lock import LOCK_NAME, locked
+from study.store.sessions.withdrawal_files import Intent, read_intent, write_intent, write_tombstone
+from study.store.sessions.written_elsewhere import written_elsewhere
 from study.workflows.session.participant_number import begun_in
 from study.workflows.session.participant_traces import analysis_names, find_traces
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from equalizer.signals.masking_noise import masking_noise
 from study.errors import WrongUseError
-from study.store.file_errors import AlreadyThereError
-from study.store.wav_file import write_wav
+from study.store.disk.file_errors import AlreadyThereError
+from study.store.disk.wav_file import write_wav
 
 SAMPLE_RATE_HZ = 44_100
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from study.devices.device import Fault
-from study.session.state import SessionState
-from study.session.views import Unanswered
+from study.session.state.state import SessionState
+from study.session.views.views import Unanswered
 
 
 @dataclass(frozen=True, slots=True)

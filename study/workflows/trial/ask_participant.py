@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Health, Played
-from study.session.due_trial import Present
-from study.session.held_stimulus import HeldStimulus
-from study.session.level_scale import amplitude
-from study.session.state import SessionState
-from study.session.stimulus import direction_vector, held_stimulus
-from study.session.views import Answered, PlayingNotice, Question, Reply, Unanswered
+from study.session.facts.level_scale import amplitude
+from study.session.state.due_trial import Present
+from study.session.state.state import SessionState
+from study.session.stimulus.held_stimulus import HeldStimulus
+from study.session.stimulus.stimulus import direction_vector, held_stimulus
+from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
 from study.workflows.trial.release import released
 from study.workflows.trial.sitting import Sitting
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Look
-from study.session.live import Activity, Live
-from study.session.requests import NoteAsked, PauseAsked, StopAsked, Who
-from study.session.views import Answered, Reply, Unanswered
+from study.session.views.views import Answered, Reply, Unanswered
+from study.session.watching.live import Activity, Live
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked, Who
 from study.workflows.trial.requests_port import Requests
 
 LIVE_EVERY_S = 0.25

@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 from protocols.apparatus import Plane
 from protocols.exposure import GateSettings
-from study.session.state import SessionState
-from study.session.stimulus import AXES
-from study.session.views import HandleView, Unanswered
+from study.session.state.state import SessionState
+from study.session.stimulus.stimulus import AXES
+from study.session.views.views import HandleView, Unanswered
 from study.workflows.trial.sitting import Sitting
 
 

@@ -2,12 +2,12 @@
 
 from protocols.schedule import demo_level_n, label_of
 from study.devices.device import Fault
-from study.session.due_trial import labels_are_swapped
-from study.session.events import DemoFinished, DemoPlayed
-from study.session.level_scale import amplitude
-from study.session.state import SessionState, felt
-from study.session.stimulus import direction_angle_deg, direction_vector, held_stimulus
-from study.session.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, picture_of
+from study.session.facts.events import DemoFinished, DemoPlayed
+from study.session.facts.level_scale import amplitude
+from study.session.state.due_trial import labels_are_swapped
+from study.session.state.state import SessionState, felt
+from study.session.stimulus.stimulus import direction_angle_deg, direction_vector, held_stimulus
+from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, picture_of
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.sitting import Sitting, record
 

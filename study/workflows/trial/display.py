@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-from study.session.form_views import Form, FormReply
-from study.session.views import (
+from study.session.views.form_views import Form, FormReply
+from study.session.views.views import (
     AfterPause,
     DemoChoice,
     DemoMenu,
@@ -27,7 +27,7 @@ from study.session.views import (
 )
 
 if TYPE_CHECKING:
-    from study.session.due_trial import Present
+    from study.session.state.due_trial import Present
 
 SignOfLife = Callable[[], bool]
 """To be called at least every 100 ms while waiting: it keeps the device alive, and hears who asks for a stop or a

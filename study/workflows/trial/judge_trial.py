@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from protocols.study_protocol import MeasurementSettings
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
-from study.session.void_reasons import TICKS_MISSED
+from study.session.facts.void_reasons import TICKS_MISSED
 
 
 @dataclass(frozen=True, slots=True)

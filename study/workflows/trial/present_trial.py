@@ -3,12 +3,12 @@ disk."""
 
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Played
-from study.session.delivered import delivered
-from study.session.due_trial import Present
-from study.session.events import AnswerGiven
-from study.session.state import SessionState
-from study.session.stimulus import direction_vector
-from study.session.views import Unanswered
+from study.session.facts.events import AnswerGiven
+from study.session.state.due_trial import Present
+from study.session.state.state import SessionState
+from study.session.stimulus.delivered import delivered
+from study.session.stimulus.stimulus import direction_vector
+from study.session.views.views import Unanswered
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.ask_participant import Asked, ask_participant
 from study.workflows.trial.await_handle import await_handle

@@ -1,10 +1,10 @@
 """A due trial as the participant sees it: everything that could give the answer away left out."""
 
 from protocols.trial import Phase
-from study.session.due_trial import Present, labels_are_swapped
-from study.session.progress import progress
-from study.session.state import SessionState, repeats_left
-from study.session.views import Question, Task, picture_of
+from study.session.state.due_trial import Present, labels_are_swapped
+from study.session.state.progress import progress
+from study.session.state.state import SessionState, repeats_left
+from study.session.views.views import Question, Task, picture_of
 
 
 def question_of(state: SessionState, present: Present) -> Question:

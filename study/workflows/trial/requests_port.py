@@ -3,7 +3,7 @@
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
-from study.session.requests import Request
+from study.session.watching.requests import Request
 
 
 class Requests(Protocol):

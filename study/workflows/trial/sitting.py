@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from equalizer.tracking.feedforward.equalizer import Equalizer
 from study.devices.clock import Clock
 from study.devices.device import Device
-from study.session.events import Event, NoteTaken
-from study.session.fold import apply
-from study.session.log_time import ClockStep
-from study.session.requests import NoteAsked
-from study.session.state import SessionState
-from study.store.archive import SessionFolder
-from study.store.event_log import EventLog
+from study.session.facts.events import Event, NoteTaken
+from study.session.facts.log_time import ClockStep
+from study.session.state.fold import apply
+from study.session.state.state import SessionState
+from study.session.watching.requests import NoteAsked
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import EventLog
 from study.workflows.trial.attendant import Attendant
 from study.workflows.trial.display import Display, Hand
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from study.session.events import PauseTaken
-from study.session.state import SessionState
-from study.session.views import AfterPause, PauseNotice
+from study.session.facts.events import PauseTaken
+from study.session.state.state import SessionState
+from study.session.views.views import AfterPause, PauseNotice
 from study.workflows.trial.sitting import Sitting, record, write_notes
 
 

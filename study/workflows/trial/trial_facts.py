@@ -8,13 +8,13 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health, Played
-from study.session.answer_given import AnswerHealth
-from study.session.delivered import Delivered
-from study.session.due_trial import Present
-from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
-from study.session.state import SessionState
-from study.store.provenance import versions
-from study.store.trial_recordings import recording_name, save_trial_recording
+from study.session.facts.answer_given import AnswerHealth
+from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.state.due_trial import Present
+from study.session.state.state import SessionState
+from study.session.stimulus.delivered import Delivered
+from study.store.disk.provenance import versions
+from study.store.sessions.trial_recordings import recording_name, save_trial_recording
 from study.workflows.trial.sitting import Sitting
 
 

@@ -2,10 +2,10 @@
 
 from study.devices.clock import Clock
 from study.errors import StudyError
-from study.session.requests import NoteAsked, Request, StopAsked
-from study.store.archive import SessionFolder
-from study.store.log_writer import somebody_writes
-from study.store.request_inbox import RequestInbox
+from study.session.watching.requests import NoteAsked, Request, StopAsked
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.request_inbox import RequestInbox
 
 HEARD_WITHIN_S = 3.0
 """A session looks some twenty times a second, except while a form or a notice is read at its screen."""

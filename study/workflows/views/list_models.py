@@ -4,7 +4,7 @@ from pathlib import Path
 
 from equalizer.plant.model_quality import quality_brief
 from study.errors import StudyError
-from study.store.identified_model_file import is_identified_model, read_identified_model
+from study.store.formats.identified_model_file import is_identified_model, read_identified_model
 
 
 def model_files(data: Path) -> tuple[str, ...]:

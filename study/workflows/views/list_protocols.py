@@ -5,9 +5,9 @@ from pathlib import Path
 
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
-from study.session.archive_views import ProtocolLine
-from study.store.protocol_files import ProtocolRefusedError, read_protocol, shipped_protocols
-from study.store.toml_text import read_toml_text
+from study.session.views.archive_views import ProtocolLine
+from study.store.disk.toml_text import read_toml_text
+from study.store.formats.protocol_files import ProtocolRefusedError, read_protocol, shipped_protocols
 
 
 def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:

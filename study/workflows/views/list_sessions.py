@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from study.devices.opening import DEVICES
-from study.session.archive_views import HomeView, SessionLine
-from study.session.printable import printable, printable_text
-from study.store.archive import session_folders
+from study.session.views.archive_views import HomeView, SessionLine
+from study.session.views.printable import printable, printable_text
+from study.store.sessions.archive import session_folders
 from study.workflows.views.list_models import model_files, model_words
 from study.workflows.views.list_protocols import protocol_lines
 from study.workflows.views.session_line import session_line

@@ -1,10 +1,10 @@
 """What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
 
 from equalizer.plant.model_quality import NOT_STORED
-from study.session.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
-from study.session.local_time import Zone, local_time
-from study.session.state import SessionState
-from study.session.void_reasons import computer_too_busy
+from study.session.facts.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
+from study.session.facts.void_reasons import computer_too_busy
+from study.session.state.state import SessionState
+from study.session.views.local_time import Zone, local_time
 from study.workflows.results.fold_session import FoldedSession
 
 _HASH_DIGITS = 12

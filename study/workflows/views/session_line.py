@@ -12,16 +12,16 @@ from protocols.loading import ProtocolError, load_protocol
 from protocols.schedule import runs
 from protocols.study_protocol import StudyProtocol
 from study.errors import StudyError
-from study.session.archive_views import SessionLine
-from study.session.events import SessionOpened
-from study.session.state import SessionState
-from study.store.archive import SessionFolder
-from study.store.event_log import read_opening
-from study.store.log_seal import is_sealed, seal_paths
-from study.store.log_writer import somebody_writes
-from study.store.regular_file import read_regular
-from study.store.session_summary import SUMMARY_NAME
-from study.store.withdrawal_files import how_to_finish, read_intent, read_tombstone
+from study.session.facts.events import SessionOpened
+from study.session.state.state import SessionState
+from study.session.views.archive_views import SessionLine
+from study.store.disk.regular_file import read_regular
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import read_opening
+from study.store.sessions.log_seal import is_sealed, seal_paths
+from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.session_summary import SUMMARY_NAME
+from study.store.sessions.withdrawal_files import how_to_finish, read_intent, read_tombstone
 from study.workflows.results.fold_session import fold_session
 
 MEASURED = b',"event":"trial_measured",'

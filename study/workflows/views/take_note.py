@@ -2,14 +2,14 @@
 
 from study.devices.clock import Clock
 from study.errors import StudyError
-from study.session.events import NoteTaken
-from study.session.requests import NoteAsked
-from study.store.archive import SessionFolder
-from study.store.event_log import EventLog, mend
-from study.store.log_seal import seal_log
-from study.store.log_writer import somebody_writes
-from study.store.provenance import as_text
-from study.store.session_lock import locked
+from study.session.facts.events import NoteTaken
+from study.session.watching.requests import NoteAsked
+from study.store.disk.provenance import as_text
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import EventLog, mend
+from study.store.sessions.log_seal import seal_log
+from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.session_lock import locked
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.ask_session import ask_session
 

@@ -14,10 +14,10 @@ from analysis.diagnosis.result.wording import (
 )
 from analysis.wording import NONE, listed, p_value
 from study.errors import StudyError
-from study.session.archive_views import DiagnosisView
-from study.session.printable import printable
-from study.store.diagnosis_file import read_diagnosis
-from study.store.mechanical_model_file import read_mechanical_model
+from study.session.views.archive_views import DiagnosisView
+from study.session.views.printable import printable
+from study.store.formats.diagnosis_file import read_diagnosis
+from study.store.formats.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
 FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")

@@ -8,13 +8,13 @@ from analysis.wording import NONE, number
 from protocols.schedule import Run
 from protocols.trial import Phase
 from study.errors import StudyError
-from study.session.archive_views import SessionLine, SessionView, Staircase
-from study.session.event_words import log_in_words
-from study.session.local_time import Zone, in_utc, local_time
-from study.session.printable import printable
-from study.session.state import SessionState
-from study.store.archive import SessionFolder
-from study.store.event_log import readable_events
+from study.session.facts.event_words import log_in_words
+from study.session.state.state import SessionState
+from study.session.views.archive_views import SessionLine, SessionView, Staircase
+from study.session.views.local_time import Zone, in_utc, local_time
+from study.session.views.printable import printable
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import readable_events
 from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import due_results

@@ -4,23 +4,23 @@ import io
 from pathlib import Path
 
 from study.errors import StudyError
-from study.session.draw_check import LogContradiction
-from study.session.events import SessionOpened, parse_event
-from study.session.live import Live
-from study.session.log_chain import Chain, ChainBrokenError, read_chained
-from study.session.log_time import minutes_between
-from study.session.requests import Request
-from study.session.watch_alarms import SILENT_AFTER_S
-from study.session.watch_view import WatchView
-from study.session.watched import Watched, begin_watching
-from study.session.watched import follow as after
-from study.session.watching import Beside, watch_view
-from study.store.archive import SessionFolder
-from study.store.live_file import read_live
-from study.store.log_seal import read_seal, seal_paths
-from study.store.log_writer import somebody_writes
-from study.store.regular_file import TABLE_BYTES, open_regular
-from study.store.request_inbox import RequestInbox
+from study.session.facts.events import SessionOpened, parse_event
+from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
+from study.session.facts.log_time import minutes_between
+from study.session.state.draw_check import LogContradiction
+from study.session.watching.live import Live
+from study.session.watching.requests import Request
+from study.session.watching.watch_alarms import SILENT_AFTER_S
+from study.session.watching.watch_view import WatchView
+from study.session.watching.watched import Watched, begin_watching
+from study.session.watching.watched import follow as after
+from study.session.watching.watching import Beside, watch_view
+from study.store.disk.regular_file import TABLE_BYTES, open_regular
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.live_file import read_live
+from study.store.sessions.log_seal import read_seal, seal_paths
+from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import protocol_of
 
 PROBE_EVERY_S = 1.0

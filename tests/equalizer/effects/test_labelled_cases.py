@@ -13,8 +13,8 @@ from analysis.diagnosis.errors.output_error import evaluated, fit, gather_eviden
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.candidates import candidates
 from equalizer.effects.catalogue import EFFECTS
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import read_recording
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 
 NOISE = np.array([0.042, 0.042, 0.083, *[np.hypot(4e-6, 10e-6 / np.sqrt(12))] * 3])
 """As the cases' notes say: the accelerometer's, and the position's with its rounding."""

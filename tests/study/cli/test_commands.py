@@ -8,7 +8,7 @@ import pytest
 
 from study.cli.main import main
 from study.errors import ExitCode
-from study.store.protocol_files import shipped_protocols
+from study.store.formats.protocol_files import shipped_protocols
 
 
 @pytest.fixture
@@ -264,7 +264,7 @@ def test_ellipsoids_enter_the_report(run, data, tmp_path):
 
 
 def test_a_recording_away_from_the_centre_says_where(run, tmp_path):
-    from study.store.recording_file import read_recording
+    from study.store.formats.recording_file import read_recording
 
     assert run("record", "ellipsoid", "--out", tmp_path / "e.h5", "--place", "0.0", "0.03", "-0.02")[0] == 0
     recording = read_recording(tmp_path / "e.h5")
@@ -292,7 +292,7 @@ def test_figures_of_a_participant_who_withdrew_do_not_stay(run, data, small_file
 
 
 def test_leaving_is_not_finishing(run, small_file, tmp_path, monkeypatch):
-    from study.session.views import Unanswered
+    from study.session.views.views import Unanswered
 
     leave = Unanswered("the participant left", leave=True)
     monkeypatch.setattr("study.workflows.session.simulated_display.SimulatedDisplay.ask", lambda *_: leave)
@@ -357,7 +357,7 @@ def test_a_damaged_protocol_text_keeps_nobody_out(run, data, small_file):
 
 
 def test_a_session_that_is_being_written_is_not_withdrawn(run, data):
-    from study.store.event_log import EventLog
+    from study.store.sessions.event_log import EventLog
 
     log = EventLog.reopen(data / "P01_001" / "events.jsonl")
     code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")

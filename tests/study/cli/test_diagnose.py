@@ -7,8 +7,8 @@ import pytest
 
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from study.cli.main import main
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import write_recording
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import write_recording
 
 SUSPECTED = ("coulomb_friction", "viscous_damping")
 

@@ -10,8 +10,8 @@ from study.cli import doctor
 from study.cli.main import main
 from study.devices.device import Fault, Health
 from study.errors import ExitCode
-from study.session.timing_verdict import judge_lateness, judge_load, lateness_of
-from study.session.views import DeviceFinding, DeviceReport
+from study.session.stimulus.timing_verdict import judge_lateness, judge_load, lateness_of
+from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks.check_timing import Timing
 from study.workflows.checks.examine_setup import Examination
 

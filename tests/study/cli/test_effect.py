@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from equalizer.laws.law import law_of
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.cli.main import app
-from study.store.mechanical_model_file import write_mechanical_model
+from study.store.formats.mechanical_model_file import write_mechanical_model
 
 
 def test_a_law_of_a_model_is_kept_as_an_effect(tmp_path: Path):

@@ -9,8 +9,8 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.cli.main import main
-from study.store.identified_model_file import write_identified_model
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.formats.identified_model_file import write_identified_model
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 
 @pytest.fixture

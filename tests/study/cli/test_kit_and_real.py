@@ -14,7 +14,7 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Fit
 from study.cli.main import main
-from study.store.diagnosis_file import write_diagnosis
+from study.store.formats.diagnosis_file import write_diagnosis
 
 ROOT = Path(__file__).resolve().parents[3]
 LABELS = "recording,change,value,note,salt\nrec_01,added_mass,0.05,,a\nrec_02,nothing,,,b\n"

@@ -9,7 +9,7 @@ import pytest
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.cli.main import main
-from study.store.recording_file import write_recording
+from study.store.formats.recording_file import write_recording
 
 RATE_HZ = 500.0
 

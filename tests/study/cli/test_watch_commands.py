@@ -8,9 +8,9 @@ import pytest
 
 from study.cli import watch
 from study.cli.main import main
-from study.session.requests import PauseAsked, StopAsked
-from study.store.event_log import LOG_NAME, EventLog, read_log
-from study.store.request_inbox import RequestInbox
+from study.session.watching.requests import PauseAsked, StopAsked
+from study.store.sessions.event_log import LOG_NAME, EventLog, read_log
+from study.store.sessions.request_inbox import RequestInbox
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 

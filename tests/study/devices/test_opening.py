@@ -16,7 +16,7 @@ from study.devices.opening import DEVICES, FRICTIONLESS, REAL, SIMULATIONS, open
 from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError, ExitCode
-from study.session.limits import Limits
+from study.session.stimulus.limits import Limits
 
 ROOT = Path(__file__).parents[3]
 LIMITS = Limits(

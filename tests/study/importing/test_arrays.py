@@ -6,7 +6,7 @@ from scipy.io import savemat
 from study.importing.arrays import read_arrays
 from study.importing.import_map import CsvMap
 from study.importing.map_errors import ImportRefusedError
-from study.store.file_errors import CannotReadError
+from study.store.disk.file_errors import CannotReadError
 
 U = np.array([0.5, np.nan, -2.0])
 

@@ -8,7 +8,7 @@ from study.importing.import_map import CsvMap
 from study.importing.map_skeleton import map_skeleton
 from study.importing.map_toml import parse_map
 from study.importing.signal_words import named, proposed_roles, unit_in
-from study.store.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError
 
 
 def arrays(tmp_path, header):

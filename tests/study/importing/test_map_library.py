@@ -3,7 +3,7 @@ import pytest
 
 from study.errors import WrongUseError
 from study.importing.map_library import find_map, map_of_files, read_map, shipped_maps
-from study.store.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError
 
 OWN = """
 device = "rig"

@@ -4,7 +4,7 @@ import pytest
 
 from study.importing.import_map import ImportMap
 from study.importing.map_toml import is_map, parse_map
-from study.store.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError
 
 SOUND = """
 device = "rig"

@@ -6,7 +6,7 @@ import pytest
 from equalizer.signals.recording import Hold
 from study.importing.build_recording import build_recording
 from study.importing.map_library import find_map
-from study.store.recording_file import read_recording, write_recording
+from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.files.validate import validate_file
 
 ACTUATOR = "vibration_actuator"

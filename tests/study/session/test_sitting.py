@@ -13,8 +13,7 @@ from protocols.preparation import (
     SetupSettings,
 )
 from protocols.trial import Phase
-from study.session.draw_check import LogContradiction
-from study.session.events import (
+from study.session.facts.events import (
     DemoFinished,
     DemoPlayed,
     DeviceChecked,
@@ -24,11 +23,10 @@ from study.session.events import (
     SessionResumed,
     TrialSpoiled,
 )
-from study.session.fold import apply, begin_session
-from study.session.form_views import FormKind, FormReply, missing
-from study.session.forms import form_of, judge_form
-from study.session.log_time import Moment
-from study.session.machine import (
+from study.session.facts.log_time import Moment
+from study.session.state.draw_check import LogContradiction
+from study.session.state.fold import apply, begin_session
+from study.session.state.machine import (
     CheckDevice,
     Demonstrate,
     FillIn,
@@ -39,8 +37,10 @@ from study.session.machine import (
     next_action,
     next_preparation,
 )
-from study.session.progress import progress
-from study.session.vibration_dose import a8_mps2
+from study.session.state.progress import progress
+from study.session.state.vibration_dose import a8_mps2
+from study.session.views.form_views import FormKind, FormReply, missing
+from study.session.views.forms import form_of, judge_form
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 LATER = "2026-01-01T02:00:00.000+00:00"

@@ -18,13 +18,13 @@ from scipy.io import savemat
 from study.importing.arrays import read_arrays
 from study.importing.import_map import CsvMap
 from study.importing.map_errors import ImportRefusedError
-from study.store.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES, SizeLimit
-from study.store.file_errors import UnusableFileError
-from study.store.identified_model_file import read_identified_model
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import read_recording
-from study.store.strict_json import load_json
-from study.store.toml_text import too_long_key
+from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES, SizeLimit
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.strict_json import load_json
+from study.store.disk.toml_text import too_long_key
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 from study.workflows.files.validate import validate_file
 
 pytestmark = pytest.mark.timeout(60)

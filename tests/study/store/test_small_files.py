@@ -10,12 +10,12 @@ from equalizer.plant.mechanical_model import ActuatorLimits, SensorLimits, Toler
 from equalizer.plant.mechanical_model_toml import MATRICES, parse_mechanical_model
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from study.store.diagnosis_file import read_diagnosis, write_diagnosis
-from study.store.file_errors import AlreadyThereError, CannotReadError, UnusableFileError
-from study.store.mechanical_model_file import LAYOUT, read_mechanical_model, write_mechanical_model
-from study.store.provenance import gather_provenance
-from study.store.text_file import read_text, write_text
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.disk.file_errors import AlreadyThereError, CannotReadError, UnusableFileError
+from study.store.disk.provenance import gather_provenance
+from study.store.disk.text_file import read_text, write_text
+from study.store.formats.diagnosis_file import read_diagnosis, write_diagnosis
+from study.store.formats.mechanical_model_file import LAYOUT, read_mechanical_model, write_mechanical_model
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 ERRORS = {"before": 0.1, "retuned": 0.1, "after": 0.1, "noise": 0.1}
 NOTHING = {

@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from analysis.psychophysics.thresholds import Threshold
 from protocols.trial import Phase, Trial, TrialStatus
-from study.store.csv_rows import CsvError, as_written_in, in_words, rows_from_csv, rows_to_csv
-from study.store.file_errors import UnusableFileError
-from study.store.thresholds_file import THRESHOLDS_HEADER, read_thresholds, write_thresholds
-from study.store.trials_file import TRIALS_HEADER, read_trials, write_trials
+from study.store.disk.csv_rows import CsvError, as_written_in, in_words, rows_from_csv, rows_to_csv
+from study.store.disk.file_errors import UnusableFileError
+from study.store.formats.thresholds_file import THRESHOLDS_HEADER, read_thresholds, write_thresholds
+from study.store.formats.trials_file import TRIALS_HEADER, read_trials, write_trials
 
 CONTRACT = (
     "subject, session, run, trial, attempt, phase, frequency_hz, level_n, direction_shown, answer, correct, reversal, "

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.session.watch_view import Alarm
+from study.session.watching.watch_view import Alarm
 from study.tui.widgets.alarm_book import RING_EVERY_S, AlarmBook
 
 CLIPPED = Alarm("sensor", "clipped", "10:00")

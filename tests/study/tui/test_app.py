@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from study.store.log_writer import somebody_writes
+from study.store.sessions.log_writer import somebody_writes
 from study.tui.app import HapteqApp
 from study.tui.app_start import AppStart
 from study.tui.home_messages import BeginWanted

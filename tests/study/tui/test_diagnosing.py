@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import write_recording
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import write_recording
 from study.tui.app import HapteqApp
 from study.tui.app_start import AppStart
 from study.tui.home_messages import DiagnoseWanted

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from study.session.views import DirectionPicture
+from study.session.views.views import DirectionPicture
 from study.tui.braille import Canvas
 from study.tui.direction_picture import large_drawing
 from study.tui.number_picture import large_number

@@ -5,7 +5,7 @@ from textual._styles_cache import StylesCache
 from textual.app import App
 from textual.widgets._footer import FooterKey
 
-from study.session.views import PlayingNotice
+from study.session.views.views import PlayingNotice
 from study.tui.drawn_before import forget_drawn_before
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.trial import TrialScreen

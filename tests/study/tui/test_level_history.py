@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.session.watch_view import StaircasePoint
+from study.session.watching.watch_view import StaircasePoint
 from study.tui.widgets.level_history import LEGEND, level_history
 
 SIZE = (50, 12)

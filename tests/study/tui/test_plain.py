@@ -3,7 +3,8 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase
-from study.session.views import (
+from study.session.facts.void_reasons import SCREEN_LATE
+from study.session.views.views import (
     Answered,
     DirectionPicture,
     Goodbye,
@@ -14,7 +15,6 @@ from study.session.views import (
     Unanswered,
     Welcome,
 )
-from study.session.void_reasons import SCREEN_LATE
 from study.tui.answer_keys import AnswerKeys
 from study.tui.direction_picture import drawing, sentence
 from study.tui.trial_replies import REPEAT, TIME_OVER

@@ -3,7 +3,15 @@ from itertools import pairwise
 
 import pytest
 
-from study.session.views import DemoDone, DemoMenu, DirectionPicture, HandleView, PlayDemo, PlayingNotice, Unanswered
+from study.session.views.views import (
+    DemoDone,
+    DemoMenu,
+    DirectionPicture,
+    HandleView,
+    PlayDemo,
+    PlayingNotice,
+    Unanswered,
+)
 from study.tui.line_input import LineInput
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from study.devices.clock import RealClock
-from study.session.form_views import Form, FormField, FormKind, missing
-from study.session.views import DeviceFinding, DeviceReport
+from study.session.views.form_views import Form, FormField, FormKind, missing
+from study.session.views.views import DeviceFinding, DeviceReport
 from study.tui.line_input import LineInput
 from study.tui.plain import PlainDisplay
 

@@ -2,8 +2,8 @@ from itertools import pairwise
 
 import pytest
 
-from study.session.requests import NoteAsked
-from study.session.views import AfterPause, PauseNotice, Progress, RestNotice
+from study.session.views.views import AfterPause, PauseNotice, Progress, RestNotice
+from study.session.watching.requests import NoteAsked
 
 PAUSE = PauseNotice("the experimenter asked for it", answers=12)
 REST = RestNotice(seconds=25.0, runs_left=3)

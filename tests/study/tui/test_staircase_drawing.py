@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.session.archive_views import Staircase
+from study.session.views.archive_views import Staircase
 from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
 
 SMALL = Staircase("Run", (1.0, 1.0, 0.5, 1.0), (True, True, False, True), (False, True, True, False), 0.75, 3.0)

@@ -8,7 +8,7 @@ from textual.events import Key
 from textual.screen import Screen
 
 import study.tui
-from study.session.views import DemoMenu, PlayDemo, picture_of
+from study.session.views.views import DemoMenu, PlayDemo, picture_of
 from study.tui.screens.demo import DemoScreen
 from study.tui.take_off import take_off
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from study.session.events import DeviceFacts, SessionOpened, event_line
+from study.session.facts.events import DeviceFacts, SessionOpened, event_line
 from study.tui.link.watch_feed import WatchFeed
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
@@ -107,7 +107,7 @@ def test_the_child_dies_with_a_killed_parent(session, tmp_path):
 def test_the_screens_process_loads_neither_numpy_nor_pydantic():
     script = (
         "import sys\n"
-        "import study.cli.watch, study.tui.watch_app, study.tui.link.watch_feed, study.store.request_inbox\n"
+        "import study.cli.watch, study.tui.watch_app, study.tui.link.watch_feed, study.store.sessions.request_inbox\n"
         "print(*sys.modules)"
     )
     done = subprocess.run(

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from study.store.event_log import LOG_NAME
+from study.store.sessions.event_log import LOG_NAME
 from study.tui.watch_lines import changes, status
 from study.tui.watch_words import duration
 from study.workflows.views.watch_session import follow

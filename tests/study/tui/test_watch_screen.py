@@ -10,9 +10,9 @@ import pytest
 
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
-from study.session.live import Live
-from study.session.requests import NoteAsked, PauseAsked, StopAsked
-from study.session.watch_view import (
+from study.session.watching.live import Live
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.session.watching.watch_view import (
     Alarm,
     ClosedTrial,
     Exposure,

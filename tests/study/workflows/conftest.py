@@ -8,8 +8,8 @@ import pytest
 from protocols.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
-from study.session.views import Answered, Reply, Unanswered
-from study.store.archive import SessionFolder
+from study.session.views.views import Answered, Reply, Unanswered
+from study.store.sessions.archive import SessionFolder
 from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_display import SimulatedDisplay

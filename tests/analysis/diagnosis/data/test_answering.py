@@ -58,7 +58,7 @@ def test_gaps_in_the_response_are_left_out():
 
 
 def test_every_labelled_case_answers_its_commands(shared):
-    from study.store.recording_file import read_recording
+    from study.store.formats.recording_file import read_recording
 
     sure = answer([read_recording(shared / "cases" / "open-05.h5")])
     assert sure is not None and sure > 10 * ANSWER_DEVIATIONS

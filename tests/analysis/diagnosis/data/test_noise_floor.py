@@ -93,7 +93,7 @@ def test_where_nothing_is_quiet_the_noise_is_not_known():
 def test_the_noise_of_the_shared_cases_is_found(number):
     if not CASES.is_dir():
         pytest.skip("the shared cases lie outside the repository and are not here")
-    from study.store.recording_file import read_recording
+    from study.store.formats.recording_file import read_recording
 
     floor = noise_floor(read_recording(CASES / f"open-{number:02d}.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.03)
@@ -103,7 +103,7 @@ def test_the_noise_of_the_shared_cases_is_found(number):
 def test_rattling_in_every_segment_does_not_pass_for_noise():
     if not CASES.is_dir():
         pytest.skip("the shared cases lie outside the repository and are not here")
-    from study.store.recording_file import read_recording
+    from study.store.formats.recording_file import read_recording
 
     floor = noise_floor(read_recording(CASES / "open-03.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.05)

@@ -130,7 +130,7 @@ def test_images_of_a_held_command_are_no_driven_lines():
 def test_the_shared_cases_show_the_signature_of_their_effect(number, output, input, kind, course):
     if not CASES.is_dir():
         pytest.skip("the shared cases lie outside the repository and are not here")
-    from study.store.recording_file import read_recording
+    from study.store.formats.recording_file import read_recording
 
     found = whole(level_trends(found_in(read_recording(CASES / f"open-{number:02d}.h5")).cells), output, input)
     assert found[kind].course == course
@@ -140,7 +140,7 @@ def test_the_shared_cases_show_the_signature_of_their_effect(number, output, inp
 def test_linear_shared_cases_have_no_distortion(number):
     if not CASES.is_dir():
         pytest.skip("the shared cases lie outside the repository and are not here")
-    from study.store.recording_file import read_recording
+    from study.store.formats.recording_file import read_recording
 
     trends = level_trends(found_in(read_recording(CASES / f"open-{number:02d}.h5")).cells)
     assert not any(trend.present for trend in trends)

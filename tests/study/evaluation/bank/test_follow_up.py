@@ -16,8 +16,8 @@ from study.evaluation.bank.proof_folder import ANSWER, MODEL, RECORDING, SETTING
 from study.evaluation.bank.reveal_cases import outcome_of
 from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
 from study.evaluation.challenge.draw_bank import draw
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.provenance import sha256_of
+from study.store.disk.provenance import sha256_of
+from study.store.formats.mechanical_model_file import read_mechanical_model
 
 SEED, NUMBER, LEVEL_N = 51_404, 0, 3.0
 """A gain of the accelerometer."""

@@ -18,7 +18,7 @@ from study.evaluation.bank.reveal_cases import reveal_cases
 from study.evaluation.bank.seal_cases import BankPlan, to_draw
 from study.evaluation.bank.write_proof import commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw
-from study.store.file_errors import UnusableFileError
+from study.store.disk.file_errors import UnusableFileError
 
 ROOT = Path(__file__).parents[4]
 SEED = 51_404

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.drive_plan import PERIOD, draw_plan, multisine
-from study.store.recording_file import read_recording
+from study.store.formats.recording_file import read_recording
 
 CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 

@@ -13,8 +13,8 @@ from study.evaluation.challenge.effects.actuator import EFFECTS as ACTUATOR
 from study.evaluation.challenge.nominal import retuned
 from study.evaluation.challenge.sensor import NOISE_MPS2
 from study.evaluation.challenge.sensor_kernel import one_pole
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import read_recording
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import read_recording
 
 CASES = Path(__file__).parents[4].parent / "shared" / "cases"
 

@@ -10,7 +10,7 @@ from study.cli.main import main
 from study.errors import StudyError
 from study.evaluation.kit.lab_kit import seal_labels
 from study.evaluation.kit.score_kit import score_kit, score_lines
-from study.store.diagnosis_file import write_diagnosis
+from study.store.formats.diagnosis_file import write_diagnosis
 
 LABELS = (
     "recording,change,value,note,salt\n"

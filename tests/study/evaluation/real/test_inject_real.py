@@ -17,8 +17,8 @@ from study.errors import StudyError
 from study.evaluation.bank.proof_folder import opened
 from study.evaluation.real.inject_real import PROCESSOR_S, Carrier, seal_injections
 from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
-from study.store.provenance import sha256_of
-from study.store.recording_file import read_recording
+from study.store.disk.provenance import sha256_of
+from study.store.formats.recording_file import read_recording
 
 RATE_HZ, SAMPLES = 500.0, 6000
 LATER = 0

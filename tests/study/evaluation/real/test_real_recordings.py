@@ -11,7 +11,7 @@ from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
 from study.evaluation.real.real_summary import real_lines
 from study.importing.model_library import model_for, shipped_models
-from study.store.real_answer_file import read_real_answer
+from study.store.formats.real_answer_file import read_real_answer
 from study.workflows.files.validate import validate_file
 
 RATE_HZ, SECONDS = 500.0, 8.0

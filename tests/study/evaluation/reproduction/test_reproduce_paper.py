@@ -11,10 +11,10 @@ from study.evaluation.reproduction.reproduce_models import modelled
 from study.evaluation.reproduction.reproduce_paper import reproduce_paper
 from study.evaluation.reproduction.reproduce_recordings import Wanted, recorded
 from study.evaluation.reproduction.reproduction_plan import ReproducedProtocols, ReproductionPlan, Steps
-from study.store.file_errors import UnusableFileError
-from study.store.identified_model_file import read_identified_model
-from study.store.recording_file import read_recording, write_recording
-from study.store.reproduction_file import read_reproduction
+from study.store.disk.file_errors import UnusableFileError
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.recording_file import read_recording, write_recording
+from study.store.formats.reproduction_file import read_reproduction
 from study.workflows.files.validate import validate_file
 
 SAFETY = """

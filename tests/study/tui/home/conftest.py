@@ -15,7 +15,7 @@ from textual.message import Message
 from textual.pilot import Pilot
 from textual.screen import Screen
 
-from study.session.archive_views import DiagnosisView, HomeView, ProtocolLine, SessionLine, SessionView, Staircase
+from study.session.views.archive_views import DiagnosisView, HomeView, ProtocolLine, SessionLine, SessionView, Staircase
 from study.tui import home_messages
 from study.tui.keys_in_order import KeysInOrder
 from study.tui.screens.help import HelpScreen

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.session.archive_views import SessionView
+from study.session.views.archive_views import SessionView
 from study.tui.app_start import AppStart
 from study.tui.archive_screens import ArchiveScreens
 from study.tui.link.from_engine import Session

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from textual.widgets import Input, Select
 
-from study.session.archive_views import HomeView, ProtocolLine
+from study.session.views.archive_views import HomeView, ProtocolLine
 from study.tui.screens.home import HomeScreen
 from study.tui.widgets.session_table import AT_ONCE, SessionTable
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from study.session.form_views import FormReply
-from study.session.views import AfterPause, Answered, DemoDone
+from study.session.views.form_views import FormReply
+from study.session.views.views import AfterPause, Answered, DemoDone
 from study.tui.link.client import EngineClient
 from study.tui.link.from_engine import Ask, Call, Failed, Finished, FromEngine
 from study.tui.link.to_engine import Begin, Heartbeat, Reply, SessionOrder, ToEngine

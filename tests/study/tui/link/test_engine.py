@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from study.session.requests import NoteAsked, PauseAsked, StopAsked
-from study.session.views import Answered
-from study.session.void_reasons import SCREEN_LATE, SCREEN_SILENT
-from study.store.log_writer import somebody_writes
+from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
+from study.session.views.views import Answered
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.log_writer import somebody_writes
 from study.tui.link.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
 from study.tui.link.to_engine import (
     AskBeside,

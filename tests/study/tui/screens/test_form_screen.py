@@ -4,8 +4,8 @@ import random
 import pytest
 from textual import events
 
-from study.session.form_entry import blank_entry, press, reply_of
-from study.session.form_views import Form, FormField, FormKind, FormReply
+from study.session.views.form_entry import blank_entry, press, reply_of
+from study.session.views.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
 
 YES_NO = ("yes", "no")

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from study.session.views import (
+from study.session.views.views import (
     DemoDone,
     DemoMenu,
     DeviceFinding,

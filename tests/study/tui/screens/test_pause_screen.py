@@ -1,7 +1,7 @@
 import pytest
 
-from study.session.requests import NoteAsked
-from study.session.views import AfterPause, PauseNotice
+from study.session.views.views import AfterPause, PauseNotice
+from study.session.watching.requests import NoteAsked
 from study.tui.screens.note import NoteScreen
 from study.tui.screens.pause import PauseScreen
 

@@ -4,8 +4,8 @@ import pytest
 from textual.widgets._footer import FooterKey
 
 from protocols.trial import Phase
-from study.session.form_views import Form, FormField, FormKind
-from study.session.views import (
+from study.session.views.form_views import Form, FormField, FormKind
+from study.session.views.views import (
     DemoMenu,
     DeviceFinding,
     DeviceReport,

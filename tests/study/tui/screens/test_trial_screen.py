@@ -7,7 +7,7 @@ from textual import events
 
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
-from study.session.views import Answered, DirectionPicture, Progress, Question, Task
+from study.session.views.views import Answered, DirectionPicture, Progress, Question, Task
 from study.tui import key_presses
 from study.tui.answer_keys import parse_keys
 from study.tui.screens import trial

@@ -10,10 +10,10 @@ from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.errors import LeftError, StudyError, WrongUseError
-from study.store.diagnosis_file import read_diagnosis
-from study.store.json_document import read_json
-from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
-from study.store.recording_file import write_recording
+from study.store.disk.json_document import read_json
+from study.store.formats.diagnosis_file import read_diagnosis
+from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
+from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, answered, diagnose_recordings, written
 from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, summary

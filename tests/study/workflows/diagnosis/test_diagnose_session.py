@@ -8,7 +8,7 @@ import pytest
 from equalizer.plant.mechanical_model import MechanicalModel
 from protocols.loading import load_protocol
 from study.devices.clock import VirtualClock
-from study.store.mechanical_model_file import read_mechanical_model, write_mechanical_model
+from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan

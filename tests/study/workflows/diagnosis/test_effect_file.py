@@ -15,7 +15,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, Toler
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.errors import StudyError
-from study.store.mechanical_model_file import write_mechanical_model
+from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.diagnosis.effect_file import read_entry, write_entry
 
 RATE_HZ, N = 1000.0, 20_000

@@ -13,8 +13,8 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.cli.main import main
 from study.errors import StudyError
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.recording_file import write_recording
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnosis_input import given_model, read_input
 from study.workflows.diagnosis.fit_first_model import FirstModel, FirstModelPlan, fit_first_model
 

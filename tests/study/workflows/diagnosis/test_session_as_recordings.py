@@ -9,7 +9,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.devices.clock import VirtualClock
 from study.errors import StudyError, WrongUseError
-from study.store.recording_file import read_recording, write_recording
+from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.diagnosis.session_as_recordings import LEAD_S, MOST_S, session_recordings, spring_of
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan

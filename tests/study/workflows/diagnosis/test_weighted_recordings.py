@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import StudyError
-from study.store.recording_file import read_recording, write_recording
+from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.diagnosis.diagnosis_input import fitted_model, read_input
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from study.cli.main import main
 from study.errors import ExitCode, StudyError, WrongUseError
-from study.store.mechanical_model_file import read_mechanical_model
+from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 
 SEGMENT = """

@@ -14,10 +14,10 @@ from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.lqr.padding import band_error
 from study.errors import StudyError, WrongUseError
-from study.store.file_errors import CannotReadError, UnusableFileError
-from study.store.identified_model_file import write_identified_model
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.disk.file_errors import CannotReadError, UnusableFileError
+from study.store.formats.identified_model_file import write_identified_model
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan, equalize_trajectory
 from study.workflows.equalizer.equalized_summary import summary, summary_lines
 

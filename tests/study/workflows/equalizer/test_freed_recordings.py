@@ -13,10 +13,10 @@ from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.learning.iteration import rms
 from study.cli.main import main
 from study.errors import StudyError
-from study.store.identified_model_file import read_identified_model
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import read_recording, write_recording
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import read_recording, write_recording
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.freed_recordings import excited_band_hz
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 

@@ -9,8 +9,8 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
-from study.store.identified_model_file import read_identified_model
-from study.store.recording_file import write_recording
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.recording_file import write_recording
 from study.workflows.equalizer.identified_summary import summary, summary_lines
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.equalizer.report_identification import report_identification

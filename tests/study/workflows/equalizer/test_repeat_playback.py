@@ -20,11 +20,11 @@ from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import SweepSegment
 from study.devices.device import DeviceSettings
 from study.errors import DeviceError, LeftError, StudyError
-from study.session.limits import SPRING_SLEW_N_PER_S, Limits
-from study.store.file_errors import UnusableFileError
-from study.store.recording_file import read_recording
-from study.store.repeats_file import beside, read_repeats
-from study.store.trajectory_file import read_trajectory
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
+from study.store.disk.file_errors import UnusableFileError
+from study.store.formats.recording_file import read_recording
+from study.store.formats.repeats_file import beside, read_repeats
+from study.store.formats.trajectory_file import read_trajectory
 from study.workflows.equalizer.repeat_playback import repeat_playback
 from study.workflows.equalizer.repeat_results import RepeatPlan, earlier_forces
 from study.workflows.files.validate import validate_file

@@ -17,11 +17,11 @@ from protocols.apparatus import SafetySettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import SweepSegment
 from study.errors import DeviceError, LeftError, StudyError
-from study.store.identified_model_file import read_identified_model, write_identified_model
-from study.store.mechanical_model_file import write_mechanical_model
-from study.store.recording_file import read_recording
-from study.store.repeats_file import beside, read_repeats
-from study.store.trajectory_file import read_trajectory, write_trajectory
+from study.store.formats.identified_model_file import read_identified_model, write_identified_model
+from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.store.formats.recording_file import read_recording
+from study.store.formats.repeats_file import beside, read_repeats
+from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_trajectory, repeated_lines, repeated_summary
 from study.workflows.recording.record_device import RecordingPlan, record_device

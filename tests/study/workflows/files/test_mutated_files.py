@@ -21,15 +21,15 @@ from study.cli.main import app
 from study.errors import StudyError
 from study.importing.arrays import read_arrays
 from study.importing.import_map import CsvMap
-from study.store.archive import SessionFolder
-from study.store.event_log import readable_events
-from study.store.identified_model_file import read_identified_model
-from study.store.live_file import read_live
-from study.store.mechanical_model_file import read_mechanical_model
-from study.store.protocol_files import read_protocol
-from study.store.recording_file import read_recording, write_recording
-from study.store.request_inbox import RequestInbox
-from study.store.trajectory_file import read_trajectory
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.protocol_files import read_protocol
+from study.store.formats.recording_file import read_recording, write_recording
+from study.store.formats.trajectory_file import read_trajectory
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import readable_events
+from study.store.sessions.live_file import read_live
+from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
 from study.workflows.recording.import_recording import read_foreign
 from study.workflows.results.fold_session import fold_session

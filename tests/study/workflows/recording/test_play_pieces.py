@@ -14,7 +14,7 @@ from protocols.recording_segments import MultisineSegment, SweepSegment
 from study.devices.clock import VirtualClock
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError, LeftError
-from study.store.recording_file import read_recording
+from study.store.formats.recording_file import read_recording
 from study.workflows.recording.play_pieces import MOST_TRIES
 from study.workflows.recording.record_device import RecordingPlan, record_device, record_on
 

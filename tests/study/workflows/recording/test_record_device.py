@@ -7,7 +7,7 @@ from protocols.apparatus import SafetySettings
 from protocols.recording_protocol import RecordingProtocol
 from protocols.recording_segments import SineSegment, SweepSegment
 from study.errors import LeftError, StudyError
-from study.store.recording_file import read_recording
+from study.store.formats.recording_file import read_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 PROTOCOL = RecordingProtocol(

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from protocols.loading import load_protocol
-from study.store.thresholds_file import read_thresholds
+from study.store.formats.thresholds_file import read_thresholds
 from study.workflows.files.validate import validate_file
 from study.workflows.results.analysis_files import written_by_analysis
 from study.workflows.results.analyze_data import analyze_data

@@ -3,10 +3,10 @@
 import pytest
 
 from study.errors import LeftError
-from study.session.events import NoteTaken, TrialSpoiled
-from study.session.views import Unanswered
-from study.session.void_reasons import SCREEN_LATE
-from study.store.event_log import read_log
+from study.session.facts.events import NoteTaken, TrialSpoiled
+from study.session.facts.void_reasons import SCREEN_LATE
+from study.session.views.views import Unanswered
+from study.store.sessions.event_log import read_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new
 from study.workflows.session.end_sitting import end_sitting

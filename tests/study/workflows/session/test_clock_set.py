@@ -6,10 +6,10 @@ import pytest
 
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
-from study.session.events import NoteTaken, SessionResumed
-from study.session.sitting_state import dose_now
-from study.session.views import Unanswered
-from study.store.event_log import read_log
+from study.session.facts.events import NoteTaken, SessionResumed
+from study.session.state.sitting_state import dose_now
+from study.session.views.views import Unanswered
+from study.store.sessions.event_log import read_log
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed

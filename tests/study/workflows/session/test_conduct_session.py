@@ -7,11 +7,11 @@ import pytest
 
 from protocols.trial import Phase, TrialStatus
 from study.errors import DeviceError, LeftError, StudyError
-from study.session.events import TrialMeasured, TrialPresented, TrialSpoiled
-from study.session.views import Unanswered
-from study.store.event_log import read_log
-from study.store.recording_file import read_recording
-from study.store.session_lock import locked
+from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.views.views import Unanswered
+from study.store.formats.recording_file import read_recording
+from study.store.sessions.event_log import read_log
+from study.store.sessions.session_lock import locked
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_tables
@@ -222,7 +222,7 @@ def test_ctrl_c_leaves_a_log_that_can_be_resumed(sitter):
     assert left.value.saved == "4 answers are on disk."
     assert left.value.do_now.startswith("Go on with: hapteq resume ")
     (folder,) = [f for f in sitter.data.iterdir() if f.is_dir()]
-    from study.store.archive import SessionFolder
+    from study.store.sessions.archive import SessionFolder
 
     assert sitter.resumed(SessionFolder(folder)).state.closed
 
@@ -254,7 +254,7 @@ def test_nothing_is_presented_when_the_log_cannot_be_written(sitter, monkeypatch
                 raise OSError(28, "No space left on device")
         return real(descriptor, data)
 
-    monkeypatch.setattr("study.store.event_log.os.write", full)
+    monkeypatch.setattr("study.store.sessions.event_log.os.write", full)
     with pytest.raises(StudyError) as error:
         sitter.whole()
     assert "No space left on device" in error.value.happened

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from study.errors import StudyError
-from study.store.archive import SessionFolder
-from study.store.event_log import LOG_NAME, mend, read_log
-from study.store.file_errors import CannotWriteError
-from study.store.json_document import write_json
-from study.store.log_seal import SEAL_NAME
-from study.store.provenance import sha256_of
+from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.json_document import write_json
+from study.store.disk.provenance import sha256_of
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import LOG_NAME, mend, read_log
+from study.store.sessions.log_seal import SEAL_NAME
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session

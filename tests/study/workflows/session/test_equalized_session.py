@@ -11,9 +11,9 @@ from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from protocols.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
-from study.store.identified_model_file import write_identified_model
-from study.store.trial_recordings import find_trial_recording, recording_name
-from study.store.trials_file import TRIALS_NAME, read_trials
+from study.store.formats.identified_model_file import write_identified_model
+from study.store.formats.trials_file import TRIALS_NAME, read_trials
+from study.store.sessions.trial_recordings import find_trial_recording, recording_name
 from study.workflows.results.analyze_data import analyze_data
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_tables

@@ -4,10 +4,10 @@ import pytest
 
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
-from study.session.events import NoteTaken, PauseTaken, SessionInterrupted
-from study.session.requests import NoteAsked
-from study.session.views import AfterPause, Unanswered
-from study.store.event_log import read_log
+from study.session.facts.events import NoteTaken, PauseTaken, SessionInterrupted
+from study.session.views.views import AfterPause, Unanswered
+from study.session.watching.requests import NoteAsked
+from study.store.sessions.event_log import read_log
 from study.workflows.session.conduct_session import Participant, conduct_new
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.trial.requests_port import QueuedRequests

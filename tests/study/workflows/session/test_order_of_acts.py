@@ -7,8 +7,8 @@ import pytest
 
 from study.devices.device import Fault, Health, Played
 from study.errors import LeftError, StudyError
-from study.session.views import Unanswered
-from study.store.event_log import EventLog, read_log
+from study.session.views.views import Unanswered
+from study.store.sessions.event_log import EventLog, read_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session import conduct_session
 from study.workflows.session.conduct_session import conduct_new
@@ -163,7 +163,7 @@ def test_ctrl_c_at_any_line_leaves_a_session_that_can_be_resumed(sitter, monkeyp
     monkeypatch.setattr(EventLog, "append", press)
     with pytest.raises(LeftError) as left:
         sitter.whole()
-    from study.store.archive import find_session
+    from study.store.sessions.archive import find_session
 
     folder = find_session("P01_001", sitter.data)
     assert str(fold_session(folder).state.answers) == left.value.saved.split()[0]

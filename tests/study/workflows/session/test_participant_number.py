@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.store.archive import find_session
+from study.store.sessions.archive import find_session
 from study.workflows.session.participant_number import participant_number
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
 
@@ -20,7 +20,7 @@ def number(sitter):
         from study.workflows.session.conduct_session import conduct_new
 
         plan = replace(sitter_plan, protocol=protocol, protocol_text=text)
-        from study.session.views import Unanswered
+        from study.session.views.views import Unanswered
 
         leave = sitter.participant(0, lambda: Unanswered("left", leave=True))
         return conduct_new(plan, "simulated", leave).state.opened.participant_number

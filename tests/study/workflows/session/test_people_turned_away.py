@@ -13,14 +13,14 @@ from protocols.williams import williams_rows
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.participants.observers import observer_named
-from study.session.archive_views import TURNED_AWAY
-from study.session.events import FormFilled, PlaceTaken, SessionClosed, SessionInterrupted, SessionOpened
-from study.session.form_views import FormKind, FormReply
-from study.session.views import Unanswered
-from study.session.watched import begin_watching, follow
-from study.session.watching import Beside, watch_view
-from study.store.event_log import read_log
-from study.store.log_seal import seal_paths
+from study.session.facts.events import FormFilled, PlaceTaken, SessionClosed, SessionInterrupted, SessionOpened
+from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.form_views import FormKind, FormReply
+from study.session.views.views import Unanswered
+from study.session.watching.watched import begin_watching, follow
+from study.session.watching.watching import Beside, watch_view
+from study.store.sessions.event_log import read_log
+from study.store.sessions.log_seal import seal_paths
 from study.tui.standing_words import describe
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions

@@ -8,9 +8,9 @@ import pytest
 from equalizer.plant.identified_model import IdentifiedModel
 from protocols.loading import load_protocol
 from study.errors import StudyError
-from study.store.archive import session_folders
-from study.store.event_log import read_log
-from study.store.identified_model_file import read_identified_model, write_identified_model
+from study.store.formats.identified_model_file import read_identified_model, write_identified_model
+from study.store.sessions.archive import session_folders
+from study.store.sessions.event_log import read_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study, subject_seed
 

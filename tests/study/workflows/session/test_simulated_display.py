@@ -7,9 +7,9 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
-from study.session.due_trial import Present
-from study.session.form_views import Form, FormField, FormKind
-from study.session.views import Answered, DirectionPicture, HandleView, Question, RestNotice, Task, Unanswered
+from study.session.state.due_trial import Present
+from study.session.views.form_views import Form, FormField, FormKind
+from study.session.views.views import Answered, DirectionPicture, HandleView, Question, RestNotice, Task, Unanswered
 from study.workflows.session.simulated_display import SimulatedDisplay
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))

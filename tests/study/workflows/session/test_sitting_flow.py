@@ -18,7 +18,7 @@ from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
 from study.participants.observers import observer_named
-from study.session.events import (
+from study.session.facts.events import (
     AnswerGiven,
     DemoPlayed,
     DeviceChecked,
@@ -30,11 +30,11 @@ from study.session.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.form_views import FormKind, FormReply
-from study.session.requests import NoteAsked, PauseAsked, StopAsked
-from study.session.views import AfterPause, DemoDone, PlayDemo, Task
-from study.store.event_log import read_log
-from study.store.request_inbox import RequestInbox
+from study.session.views.form_views import FormKind, FormReply
+from study.session.views.views import AfterPause, DemoDone, PlayDemo, Task
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.event_log import read_log
+from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan

@@ -7,12 +7,12 @@ import pytest
 from protocols.trial import VoidCause
 from study.devices.device import Fault
 from study.errors import LeftError
-from study.session.rules import LATEST
-from study.session.views import Unanswered
-from study.store.archive import SessionFolder
-from study.store.event_log import read_log
-from study.store.log_seal import seal_paths
-from study.store.trials_file import TRIALS_NAME, read_trials
+from study.session.state.rules import LATEST
+from study.session.views.views import Unanswered
+from study.store.formats.trials_file import TRIALS_NAME, read_trials
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import read_log
+from study.store.sessions.log_seal import seal_paths
 from study.tui.link.remote_display import silent
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
 from study.workflows.files.validate import validate_file

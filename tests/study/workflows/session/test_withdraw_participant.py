@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from study.cli.main import app, main
 from study.errors import StudyError
-from study.store.archive import SessionFolder
-from study.store.event_log import EventLog
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import EventLog
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session

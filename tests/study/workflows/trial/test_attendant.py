@@ -7,8 +7,8 @@ import pytest
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
 from study.devices.safe import SafeDevice
-from study.session.requests import NoteAsked, PauseAsked, StopAsked
-from study.session.views import Answered, Unanswered
+from study.session.views.views import Answered, Unanswered
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.workflows.trial.attendant import Attendant
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests
 

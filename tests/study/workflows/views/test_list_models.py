@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from study.store.identified_model_file import write_identified_model
+from study.store.formats.identified_model_file import write_identified_model
 from study.workflows.views.list_models import model_files
 from study.workflows.views.list_sessions import home_view
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from study.store.archive import SessionFolder
-from study.store.event_log import EventLog
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import EventLog
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
 from study.workflows.views.list_sessions import home_view, session_lines
 
@@ -159,7 +159,7 @@ def test_protocols_beside_the_data_are_offered_and_bad_ones_with_their_problem(d
 
 
 def test_a_locked_protocol_is_said_to_be_locked(data):
-    from study.store.protocol_files import lock_protocol, read_protocol
+    from study.store.formats.protocol_files import lock_protocol, read_protocol
 
     lock_protocol(read_protocol("direction_threshold"), data, "2026-05-04T09:30:00+00:00", "1.0")
     locked = {line.name: line.locked for line in home_view(data).protocols}

@@ -17,7 +17,7 @@ from analysis.diagnosis.document import (
     Rival,
 )
 from study.errors import StudyError
-from study.store.diagnosis_file import write_diagnosis
+from study.store.formats.diagnosis_file import write_diagnosis
 from study.workflows.views.view_diagnosis import diagnosis_view
 
 PLACE = Mismatch("ax", "fx", (5.0, 15.0), 1.5, "near v = 0", 0.8, 1e-9)

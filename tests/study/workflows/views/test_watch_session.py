@@ -10,13 +10,13 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.errors import StudyError
-from study.session.live import Live
-from study.session.requests import NoteAsked, PauseAsked, StopAsked
-from study.store.archive import SessionFolder
-from study.store.event_log import LOG_NAME, EventLog, read_log
-from study.store.live_file import write_live
-from study.store.log_writer import somebody_writes
-from study.store.request_inbox import RequestInbox
+from study.session.watching.live import Live
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.event_log import LOG_NAME, EventLog, read_log
+from study.store.sessions.live_file import write_live
+from study.store.sessions.log_writer import somebody_writes
+from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.ask_session import ask_session

@@ -1,0 +1,190 @@
+"""The log of a session in words: one plain sentence per fact.
+
+Nothing about health is in them, and no direction of a trial that does not count (yet): it may come again, and whoever
+reads this may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
+"""
+
+from collections.abc import Iterable
+
+from protocols.trial import Phase
+from study.session.facts.events import (
+    AnswerGiven,
+    DemoFinished,
+    DemoPlayed,
+    DeviceChecked,
+    DeviceFacts,
+    Event,
+    FormFilled,
+    NoteTaken,
+    PauseTaken,
+    PlaceTaken,
+    RestTaken,
+    SessionClosed,
+    SessionInterrupted,
+    SessionOpened,
+    SessionResumed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
+from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.local_time import Zone, in_utc, local_parts
+
+_Key = tuple[int, int, int]
+
+
+def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
+    """One line per event, oldest first: its local time and a sentence; a line wherever date or offset change."""
+    events = tuple(events)
+    counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
+    presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
+    lines: list[str] = []
+    said = ""
+    for event in events:
+        date, time, offset = local_parts(event.utc, zone)
+        day = f"{date} (times are UTC {offset})" if offset else ""
+        if day and day != said:
+            said = day
+            lines.append(day)
+        lines.append(f"{time or date}  {_sentence(event, presented)}")
+    return tuple(lines)
+
+
+def in_words(event: Event) -> str:
+    """One event by itself: what depends on the others (which direction, right or wrong) is left out."""
+    return _sentence(event, {})
+
+
+def _sentence(event: Event, presented: dict[_Key, TrialPresented]) -> str:
+    """presented: the trials that count."""
+    match event:
+        case TrialPresented():
+            return _presented(event, told=_key(event) in presented)
+        case AnswerGiven():
+            return _answer(event, presented.get(_key(event)))
+        case TrialMeasured():
+            return _measured(event)
+        case TrialSpoiled():
+            return f"{_place(event)} is void and comes again: {event.reason}."
+        case RestTaken():
+            return f"Rested {_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
+        case _:
+            return _around(event)
+
+
+def _around(event: Event) -> str:
+    match event:
+        case SessionOpened() | SessionResumed() | SessionInterrupted() | SessionClosed():
+            return _sitting(event)
+        case FormFilled():
+            return _form(event)
+        case PlaceTaken():
+            return f"Takes part, as number {event.participant_number + 1} of this protocol."
+        case DeviceChecked():
+            found = " ".join(_whole(finding) for finding in event.findings)
+            return f"The device was checked: {'fine' if event.passed else 'not fine'}. {found}".rstrip()
+        case DemoPlayed():
+            return (
+                f"Demonstration: direction {event.direction} at {event.frequency_hz:g} Hz, {event.level_n:.3g} N, "
+                f"for {_seconds(event.seconds)}."
+            )
+        case DemoFinished():
+            return "The demonstration is over."
+        case PauseTaken():
+            return f"A pause of {_seconds(event.paused_s)}, asked for by the {event.who}."
+        case NoteTaken():
+            return f"{'Adverse event' if event.adverse else 'Note'} by the {event.who}: {_one_line(event.text)}"
+        case _:
+            return f"{event.event.replace('_', ' ').capitalize()}."
+
+
+def _sitting(event: SessionOpened | SessionResumed | SessionInterrupted | SessionClosed) -> str:
+    match event:
+        case SessionOpened():
+            who = f"simulated participant {event.observer}" if event.observer else "a person"
+            return f"Session {event.session} began: {event.subject}, {who}, on {_device(event.device)}."
+        case SessionResumed():
+            mended = " A last line that a crash had torn was taken off." if event.mended else ""
+            return f"The session went on, on {_device(event.device)}.{mended}"
+        case SessionInterrupted():
+            return f"The sitting ended: {event.reason}. The session can be resumed."
+        case SessionClosed():
+            if event.outcome != "completed":
+                return f"The session is over: {TURNED_AWAY[event.outcome]}. The person does not take part."
+            return "The session is finished."
+
+
+def _presented(event: TrialPresented, told: bool) -> str:
+    again = f", attempt {event.attempt + 1}" if event.attempt else ""
+    what = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
+    if told:
+        shown = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
+        what = f"{shown}, {what}"
+    return f"{_place(event)} ({event.phase.value}{again}): {what}."
+
+
+def _answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
+    said = f"Answer {event.answer} after {event.response_time_s:.2f} s"
+    if presented is None:
+        return f"{said}."
+    return f"{said}: {'right' if event.answer == presented.direction else 'wrong'}."
+
+
+def _measured(event: TrialMeasured) -> str:
+    if event.status == "unmeasured":
+        return " ".join(("Counts, without a measurement.", *map(_whole, event.flags)))
+    parts = []
+    if event.delivered_mps2 is not None:
+        parts.append(f"{event.delivered_mps2:.2f} m/s² along the direction")
+    if event.off_axis_mps2 is not None:
+        parts.append(f"{event.off_axis_mps2:.2f} m/s² across")
+    measured = f"Delivered {', '.join(parts)}." if parts else "Counts."
+    return " ".join((measured, *map(_whole, event.flags)))
+
+
+def _form(event: FormFilled) -> str:
+    version = f", version {event.version}" if event.version else ""
+    ethics = f" (ethics approval {event.ethics_id})" if event.ethics_id else ""
+    match event.form:
+        case "consent":
+            return f"Consent was {'given' if event.passed else 'not given'}{version}{ethics}."
+        case "exclusion":
+            outcome = "nothing speaks against taking part" if event.passed else "the sitting cannot go on"
+            return f"The exclusion questions were answered{version}: {outcome}."
+        case "setup":
+            how = "; ".join(f"{key.replace('_', ' ')}: {_one_line(said)}" for key, said in event.answers.items())
+            return f"Set-up. {how[:1].upper()}{how[1:]}." if how else "The set-up was gone through."
+        case "debrief":
+            return f"Debrief: {_count(len(event.answers), 'question')} answered; the answers stay in the log file."
+
+
+def _device(device: DeviceFacts) -> str:
+    return f"{device.name}{' (simulated, nothing moves)' if device.simulated else ''}"
+
+
+def _place(event: TrialPresented | TrialSpoiled) -> str:
+    return f"Run {event.run + 1}, trial {event.trial + 1}"
+
+
+def _key(event: TrialPresented | AnswerGiven | TrialMeasured) -> _Key:
+    return event.run, event.trial, event.attempt
+
+
+def _seconds(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.0f} min"
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def _one_line(text: str) -> str:
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def _whole(text: str) -> str:
+    """A flag or finding as a sentence of its own."""
+    line = _one_line(text)
+    return f"{line[:1].upper()}{line[1:]}{'' if line.endswith(('.', '!', '?')) else '.'}" if line else ""

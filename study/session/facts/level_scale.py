@@ -1,0 +1,51 @@
+"""What a level means where stimuli are equalized: a wanted acceleration, equal for both directions.
+
+Levels stay newtons, so that cap, steps and rules stay what they are: a level is the highest force that either of the
+two directions needs for its acceleration. Both directions then reach the cap at the same acceleration.
+"""
+
+from pydantic.dataclasses import dataclass
+
+from study.session.facts.fact_types import FileName, FrequencyHz, Magnitude, Positive, Sha256
+from study.session.facts.sitting_events import FACT
+
+
+@dataclass(frozen=True, config=FACT)
+class LevelScale:
+    """At one frequency."""
+
+    frequency_hz: FrequencyHz
+    n_per_mps2: Positive
+    """Level for a wanted acceleration of 1 m/s²."""
+    reachable_mps2: Magnitude
+    """At the cap of the staircase, in either direction."""
+
+
+@dataclass(frozen=True, config=FACT)
+class EqualizedFacts:
+    """Through what the stimuli of a session go."""
+
+    model: FileName
+    """File in the session folder."""
+    sha256: Sha256
+    """Of that file."""
+    levels: tuple[LevelScale, ...]
+    """One per frequency that may be played."""
+    quality: str = ""
+    """Of the model, by what was measured, in words; empty in logs of earlier versions."""
+
+
+def wanted_mps2(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:
+    """The acceleration that a level stands for; None where levels are commanded forces."""
+    if equalized is None:
+        return None
+    scale = next((scale for scale in equalized.levels if scale.frequency_hz == frequency_hz), None)
+    if scale is None:
+        raise ValueError(f"the session has no scale of levels for {frequency_hz} Hz")
+    return level_n / scale.n_per_mps2
+
+
+def amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
+    """In the unit that the equalizer takes: N without one, m/s² with one."""
+    wanted = wanted_mps2(equalized, level_n, frequency_hz)
+    return level_n if wanted is None else wanted

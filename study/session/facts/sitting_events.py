@@ -1,0 +1,126 @@
+"""Facts of a sitting around its trials: forms, checks, demonstrations, rests, pauses, notes, the end."""
+
+from typing import Literal
+
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+
+from study.session.facts.fact_types import AngleDeg, Count, ForceN, FrequencyHz, Index, Magnitude, Seconds, UtcTime
+
+FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, config=FACT)
+class DoseElsewhere:
+    """What the same hand got since its last night's rest in other sessions of the participant, see `Dose`."""
+
+    sessions: tuple[str, ...]
+    squared_s: Magnitude
+    vibrated_s: Seconds
+    unmeasured_s: Seconds
+    still_s: Seconds
+    """Since it last moved in any of them."""
+    unread: tuple[str, ...] = ()
+    """Sessions that cannot be read: nothing of them is counted."""
+
+
+@dataclass(frozen=True, config=FACT)
+class FormFilled:
+    """Consent, exclusion, set-up or debrief. What a form asks for the moment only (why a person may not take part)
+    is not kept: `answers` holds what the study needs."""
+
+    utc: UtcTime
+    form: Literal["consent", "exclusion", "setup", "debrief"]
+    version: str
+    """Of the form, as its protocol states it."""
+    ethics_id: str
+    passed: bool
+    """False: consent was not given, or somebody may not take part. Always true for the other forms."""
+    answers: dict[str, str]
+    monotonic_s: Seconds | None = None
+    event: Literal["form_filled"] = "form_filled"
+
+
+@dataclass(frozen=True, config=FACT)
+class PlaceTaken:
+    """A person takes part: consent, exclusion questions, set-up and device check are passed."""
+
+    utc: UtcTime
+    participant_number: Count
+    """How many participants of this protocol took their places before; from here on this one holds, not that of the
+    opening line."""
+    monotonic_s: Seconds | None = None
+    event: Literal["place_taken"] = "place_taken"
+
+
+@dataclass(frozen=True, config=FACT)
+class DeviceChecked:
+    utc: UtcTime
+    passed: bool
+    findings: tuple[str, ...]
+    """One sentence each."""
+    monotonic_s: Seconds | None = None
+    event: Literal["device_checked"] = "device_checked"
+
+
+@dataclass(frozen=True, config=FACT)
+class DemoPlayed:
+    """A labelled demonstration, written before the device moves."""
+
+    utc: UtcTime
+    frequency_hz: FrequencyHz
+    level_n: ForceN
+    direction: Literal[1, 2]
+    """The number on the screen."""
+    angle_deg: AngleDeg
+    seconds: Seconds
+    monotonic_s: Seconds | None = None
+    event: Literal["demo_played"] = "demo_played"
+
+
+@dataclass(frozen=True, config=FACT)
+class DemoFinished:
+    utc: UtcTime
+    monotonic_s: Seconds | None = None
+    event: Literal["demo_finished"] = "demo_finished"
+
+
+@dataclass(frozen=True, config=FACT)
+class RestTaken:
+    utc: UtcTime
+    run: Index
+    trial: Index
+    """Index of the trial that comes after the rest."""
+    rested_s: Seconds
+    monotonic_s: Seconds | None = None
+    event: Literal["rest_taken"] = "rest_taken"
+
+
+@dataclass(frozen=True, config=FACT)
+class PauseTaken:
+    utc: UtcTime
+    who: Literal["participant", "experimenter", "program"]
+    paused_s: Seconds
+    monotonic_s: Seconds | None = None
+    event: Literal["pause_taken"] = "pause_taken"
+
+
+@dataclass(frozen=True, config=FACT)
+class NoteTaken:
+    utc: UtcTime
+    who: Literal["participant", "experimenter", "program"]
+    text: str
+    adverse: bool = False
+    """Something happened to the participant: pain, numbness, a fright."""
+    monotonic_s: Seconds | None = None
+    event: Literal["note_taken"] = "note_taken"
+
+
+@dataclass(frozen=True, config=FACT)
+class SessionClosed:
+    """Last line of a session that is over: finished, or final because the person does not take part."""
+
+    utc: UtcTime
+    outcome: Literal["completed", "refused", "excluded"]
+    monotonic_s: Seconds | None = None
+    event: Literal["session_closed"] = "session_closed"

@@ -1,0 +1,44 @@
+"""A logged presentation against the one that rules, seed and place give. Nothing is trusted."""
+
+import math
+
+from study.session.facts.events import AnswerGiven, TrialMeasured, TrialPresented, TrialSpoiled
+from study.session.state.due_trial import Present
+
+
+class LogContradiction(ValueError):  # noqa: N818 - a contradiction is what it is
+    """An event cannot follow what came before it, or a logged level is not what the rules give."""
+
+
+def check_draw(event: TrialPresented, expected: Present) -> None:
+    place = (expected.run, expected.trial, expected.attempt)
+    if (event.run, event.trial, event.attempt) != place:
+        raise LogContradiction(
+            f"{place_of(event)} presented where run {place[0]}, trial {place[1]}, attempt {place[2]} was due"
+        )
+    given = {
+        "phase": (event.phase.value, expected.phase.value),
+        "frequency_hz": (event.frequency_hz, expected.frequency_hz),
+        "level_n": (event.level_n, expected.level_n),
+        "level_db": (event.level_db, expected.level_db),
+        "direction": (event.direction, expected.label),
+        "angle_deg": (event.angle_deg, expected.angle_deg),
+        "polarity": (event.polarity, expected.polarity),
+        "wanted_mps2": (event.wanted_mps2, expected.wanted_mps2),
+    }
+    wrong = [f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _same(logged, due)]
+    if wrong:
+        raise LogContradiction(
+            f"{place_of(event)} was presented with {', '.join(wrong)}: this session was begun with different rules"
+        )
+
+
+def _same(logged: str | float | None, due: str | float | None) -> bool:
+    """Powers may differ in the last bit between machines; rules differ by far more."""
+    if isinstance(logged, float) and isinstance(due, float):
+        return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)
+    return logged == due
+
+
+def place_of(event: TrialPresented | AnswerGiven | TrialMeasured | TrialSpoiled) -> str:
+    return f"run {event.run}, trial {event.trial}, attempt {event.attempt}"

@@ -1,0 +1,88 @@
+"""The trial that is due: everything about a presentation that follows from rules, seed and place in the session."""
+
+from dataclasses import dataclass
+
+from protocols.schedule import (
+    Run,
+    detection_direction,
+    draw_trial,
+    is_catch_trial,
+    label_of,
+    labels_swapped,
+    practice_level_n,
+)
+from protocols.staircase import StaircaseState, level_n, to_db
+from protocols.staircase_rule import StaircaseRule
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase
+from study.session.facts.events import SessionOpened
+from study.session.facts.level_scale import wanted_mps2
+from study.session.state.rules import same_stimulus_again
+from study.session.stimulus.stimulus import direction_angle_deg
+
+
+@dataclass(frozen=True, slots=True)
+class Present:
+    """Play this stimulus and ask for the answer."""
+
+    run: int
+    trial: int
+    attempt: int
+    phase: Phase
+    frequency_hz: float
+    level_db: float
+    level_n: float
+    label: int
+    """The number that is the right answer: of a direction, in a detection run of an interval."""
+    direction: int
+    """The protocol's direction to play; another number than the label where labels are swapped."""
+    angle_deg: float
+    polarity: int
+    wanted_mps2: float | None = None
+    """The acceleration that the level stands for; None where levels are commanded forces."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a session a trial stands."""
+
+    run: Run
+    trial: int
+    attempt: int
+    staircase: StaircaseState
+
+
+def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> Present:
+    run, polarity = place.run, protocol.stimulus.onset_polarity
+    draws = 0 if same_stimulus_again(opened) else place.attempt
+    draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
+    label, direction = label_of(draw.direction, labels_are_swapped(protocol, opened)), draw.direction
+    if run.phase is Phase.DETECTION:  # the answer is an interval; the direction matters to nobody
+        label = draw.direction
+        direction = detection_direction(opened.seed, run.index, place.trial, draws)
+    phase, level_db = run.phase, place.staircase.level_db
+    newton = level_n(rule, place.staircase)
+    if run.practice:
+        newton = practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
+        level_db = to_db(newton)
+    elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
+        phase, newton, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
+    return Present(
+        run=run.index,
+        trial=place.trial,
+        attempt=place.attempt,
+        phase=phase,
+        frequency_hz=run.frequency_hz,
+        level_db=level_db,
+        level_n=newton,
+        label=label,
+        direction=direction,
+        angle_deg=direction_angle_deg(protocol.directions, direction),
+        polarity=draw.polarity,
+        wanted_mps2=wanted_mps2(opened.equalized, newton, run.frequency_hz),
+    )
+
+
+def labels_are_swapped(protocol: StudyProtocol, opened: SessionOpened) -> bool:
+    """Whether the numbers 1 and 2 change places for this participant."""
+    return labels_swapped(protocol.schedule, len(protocol.stimulus.frequencies_hz), opened.participant_number)

@@ -1,0 +1,247 @@
+"""A session as a fold of its events: `begin_session` the first, `apply` each of the others."""
+
+import math
+from dataclasses import replace
+
+from protocols.practice import PracticeState, practice_over, practised
+from protocols.staircase import begin, finished, step
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Phase, TrialStatus, VoidCause
+from study.session.facts.events import (
+    AnswerGiven,
+    DemoFinished,
+    DemoPlayed,
+    DeviceChecked,
+    Event,
+    FormFilled,
+    NoteTaken,
+    PlaceTaken,
+    RestTaken,
+    SessionClosed,
+    SessionInterrupted,
+    SessionOpened,
+    SessionResumed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
+from study.session.facts.log_time import Moment
+from study.session.facts.void_reasons import computer_too_busy
+from study.session.state.daily_dose import with_dose_elsewhere
+from study.session.state.draw_check import LogContradiction, check_draw, place_of
+from study.session.state.rules import place_comes_later
+from study.session.state.sitting_state import (
+    SittingState,
+    check,
+    demonstrated,
+    exposed,
+    fill_in,
+    likely_amplitude_mps2,
+    moved,
+    pass_time,
+    sit_down_again,
+)
+from study.session.state.state import SessionState, begin_session, current_rule, due, felt, placed, repeats_left
+from study.session.state.trial_row import trial_row
+
+__all__ = ["apply", "begin_session"]
+
+
+def apply(state: SessionState, event: Event) -> SessionState:
+    """The state after one more event. Raises LogContradiction where it cannot follow."""
+    if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
+        raise LogContradiction(f"{event.event} after the session was closed")
+    if state.turned_away_for_good and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
+        raise LogContradiction(f"{event.event} of a person who does not take part")
+    state = replace(state, sitting=_up_to(state.sitting, event))
+    match event:
+        case TrialPresented():
+            return _present(state, event)
+        case AnswerGiven():
+            return _answer(state, event)
+        case TrialMeasured():
+            return _measure(state, event)
+        case TrialSpoiled():
+            return _spoil(state, event)
+        case _:
+            return _apply_between_trials(state, event)
+
+
+def _up_to(sitting: SittingState, event: Event) -> SittingState:
+    return pass_time(sitting, Moment(event.utc, event.monotonic_s), resumed=isinstance(event, SessionResumed))
+
+
+def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
+    match event:
+        case RestTaken():
+            return _rest(state, event)
+        case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
+            return _around(state, event)
+        case SessionResumed():
+            again = sit_down_again(state.sitting, state.answers)
+            return replace(state, sitting=with_dose_elsewhere(again, event.dose_elsewhere))
+        case PlaceTaken():
+            return _take_place(state, event)
+        case SessionClosed():
+            return _close(state, event)
+        case SessionOpened():
+            raise LogContradiction("a session cannot be opened twice")
+        case _:  # notes, pauses and interruptions change nothing
+            return state
+
+
+def _present(state: SessionState, event: TrialPresented) -> SessionState:
+    if state.presented is not None:
+        raise LogContradiction(f"{place_of(event)} presented while another trial is open")
+    if state.finished:
+        raise LogContradiction(f"{place_of(event)} presented after the last run")
+    check_draw(event, due(state))
+    repeat_cause = state.trials[-1].void_cause if state.attempt else None
+    row = trial_row(state.opened, event, felt(state.opened), repeat_cause)
+    return replace(state, presented=event, trials=(*state.trials, row), sitting=moved(state.sitting))
+
+
+def _answer(state: SessionState, event: AnswerGiven) -> SessionState:
+    presented = _open_trial(state, event)
+    if state.answered is not None:
+        raise LogContradiction(f"{place_of(event)} answered twice")
+    row = replace(
+        state.trials[-1],
+        answer=event.answer,
+        correct=event.answer == presented.direction,
+        response_time_s=event.response_time_s,
+        status=TrialStatus.UNMEASURED,
+    )
+    return replace(state, answered=event, trials=(*state.trials[:-1], row))
+
+
+def _rest(state: SessionState, event: RestTaken) -> SessionState:
+    if state.rest_due_s <= 0:
+        raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
+    return replace(state, rest_due_s=0.0)
+
+
+def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
+    if state.trials or state.sitting.placed or not place_comes_later(state.opened):
+        raise LogContradiction("a place in the order was taken where none was due")
+    return placed(state, event.participant_number)
+
+
+def _close(state: SessionState, event: SessionClosed) -> SessionState:
+    if event.outcome != "completed":
+        if not state.turned_away_for_good or event.outcome != state.sitting.turned_away:
+            raise LogContradiction(f"the session was closed as {event.outcome}, which no form says")
+        return replace(state, closed=True)
+    if not state.finished or state.presented is not None:
+        raise LogContradiction("the session was closed before its last run was finished")
+    return replace(state, closed=True)
+
+
+def _measure(state: SessionState, event: TrialMeasured) -> SessionState:
+    presented = _open_trial(state, event)
+    if state.answered is None:
+        raise LogContradiction(f"{place_of(event)} measured before it was answered")
+    stepped = _step(state, presented, correct=state.answered.answer == presented.direction)
+    row = replace(
+        state.trials[-1],
+        reversal=stepped.staircase.reversals > state.staircase.reversals,
+        delivered_mps2=event.delivered_mps2,
+        off_axis_mps2=event.off_axis_mps2,
+        displacement_mm=event.displacement_mm,
+        missed_ticks=event.missed_ticks,
+        status=TrialStatus(event.status),
+    )
+    amplitude_mps2 = None
+    if event.delivered_mps2 is not None:
+        amplitude_mps2 = math.hypot(event.delivered_mps2, event.off_axis_mps2 or 0.0)
+    after = replace(
+        _shaken(stepped, presented, amplitude_mps2, event.vibrated_s),
+        presented=None,
+        answered=None,
+        trial=state.trial + 1,
+        attempt=0,
+        trials=(*state.trials[:-1], row),
+        rest_due_s=_rest_within_run(state.protocol, state.trial + 1),
+    )
+    return _next_run(after) if _run_over(after) else after
+
+
+def _step(state: SessionState, presented: TrialPresented, correct: bool) -> SessionState:
+    """What an answer moves: the staircase, a practice run's tally, or, in a catch trial, nothing."""
+    if state.runs[state.run].practice:
+        return replace(state, practice=practised(state.practice, correct))
+    if presented.phase is Phase.CATCH:
+        return state
+    return replace(state, staircase=step(current_rule(state), state.staircase, correct))
+
+
+def _run_over(state: SessionState) -> bool:
+    if state.runs[state.run].practice:
+        return practice_over(state.protocol.practice, state.practice)
+    return finished(current_rule(state), state.staircase)
+
+
+def _next_run(state: SessionState) -> SessionState:
+    last = state.run + 1 == len(state.runs)
+    # Practice runs are short: their rest is the time it takes to read how they went.
+    rest_s = 0.0 if last or state.runs[state.run].practice else state.protocol.rests.after_run_s
+    after = replace(state, run=state.run + 1, trial=0, attempt=0, practice=PracticeState(), rest_due_s=rest_s)
+    return after if last else replace(after, staircase=begin(current_rule(after)))
+
+
+def _around(state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed | DemoFinished) -> SessionState:
+    if state.presented is not None:
+        raise LogContradiction(f"{event.event} while a trial is open")
+    match event:
+        case FormFilled():
+            return replace(state, sitting=fill_in(state.sitting, event))
+        case DeviceChecked():
+            return replace(state, sitting=check(state.sitting, event))
+        case DemoFinished():
+            return replace(state, sitting=demonstrated(state.sitting, event))
+        case DemoPlayed():
+            amplitude = likely_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
+            sitting = exposed(moved(state.sitting), event.frequency_hz, amplitude, event.seconds)
+            return replace(state, sitting=replace(sitting, demos=sitting.demos + 1))
+
+
+def _shaken(
+    state: SessionState, presented: TrialPresented, amplitude_mps2: float | None, seconds: float | None
+) -> SessionState:
+    """Whatever shook the hand counts for its dose, whether the trial counts or not."""
+    if amplitude_mps2 is None:
+        amplitude_mps2 = likely_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
+    sitting = exposed(state.sitting, presented.frequency_hz, amplitude_mps2, seconds)
+    return replace(state, sitting=sitting)
+
+
+def _spoil(state: SessionState, event: TrialSpoiled) -> SessionState:
+    presented = _open_trial(state, event)
+    if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
+        raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
+    row = replace(state.trials[-1], missed_ticks=event.missed_ticks, status=TrialStatus.SPOILED, void_cause=event.cause)
+    busy_voids = state.sitting.busy_voids + computer_too_busy(event.reason)
+    counted = replace(state, sitting=replace(state.sitting, busy_voids=busy_voids))
+    return replace(
+        _shaken(counted, presented, None, event.vibrated_s),
+        presented=None,
+        answered=None,
+        attempt=state.attempt + 1,
+        trials=(*state.trials[:-1], row),
+    )
+
+
+def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
+    presented = state.presented
+    if presented is None or (presented.run, presented.trial, presented.attempt) != (
+        event.run,
+        event.trial,
+        event.attempt,
+    ):
+        raise LogContradiction(f"{event.event} for {place_of(event)}, which is not open")
+    return presented
+
+
+def _rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
+    every = protocol.rests.after_trials
+    return protocol.rests.within_run_s if every and trials_done % every == 0 else 0.0

@@ -1,0 +1,102 @@
+"""What to do next in a session. Decides nothing by itself: it reads the state that the events made."""
+
+from dataclasses import dataclass
+
+from study.session.facts.log_time import Moment
+from study.session.state.due_trial import Present
+from study.session.state.sitting_state import dose_now, pass_time
+from study.session.state.state import SessionState, due
+from study.session.state.vibration_dose import a8_mps2
+from study.session.views.archive_views import TURNED_AWAY
+from study.session.views.form_views import Form, FormKind
+from study.session.views.forms import form_of
+
+
+@dataclass(frozen=True, slots=True)
+class FillIn:
+    form: Form
+
+
+@dataclass(frozen=True, slots=True)
+class CheckDevice:
+    """Before anybody holds the handle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demonstrate:
+    """Each direction at each frequency, labelled, as often as the participant wants."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """The sitting must end here; the session can go on another time."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Nothing is left to do."""
+
+
+Preparation = FillIn | CheckDevice | Leave
+Action = Demonstrate | Present | Rest | FillIn | Leave | Finish
+
+
+def next_preparation(state: SessionState) -> Preparation | None:
+    """What comes before the instructions, in each sitting; None when all is done. Simulated participants need none."""
+    sitting = state.sitting
+    if state.opened.observer is not None or state.finished:
+        return None
+    if sitting.turned_away:
+        return Leave(TURNED_AWAY[sitting.turned_away])
+    forms = (
+        (FormKind.CONSENT, sitting.consented),
+        (FormKind.EXCLUSION, sitting.included),
+        (FormKind.SETUP, sitting.setup_done),
+    )
+    for kind, done in forms:
+        form = None if done else form_of(state.protocol, kind)
+        if form is not None:
+            return FillIn(form)
+    return None if sitting.device_checked else CheckDevice()
+
+
+def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
+    """Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
+
+    utc, monotonic_s: the time now, against the limits of a sitting; utc is empty where the limits are not to end it.
+    """
+    if state.presented is not None:
+        raise ValueError("a trial is open; it must be closed before the next action")
+    person = state.opened.observer is None
+    if state.finished:
+        form = form_of(state.protocol, FormKind.DEBRIEF) if person and not state.sitting.debriefed else None
+        return FillIn(form) if form is not None and not state.closed else Finish()
+    if person and utc and (reason := limit_reached(state, utc, monotonic_s)):
+        return Leave(reason)
+    if person and state.protocol.demo.level_n > 0 and not state.sitting.demo_done and not state.trials:
+        return Demonstrate()
+    if state.rest_due_s > 0:
+        return Rest(seconds=state.rest_due_s)
+    return due(state)
+
+
+def limit_reached(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
+    """Why this sitting must end; empty where it may go on."""
+    limits = state.protocol.limits
+    sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
+    if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:
+        return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
+    dose = a8_mps2(dose_now(sitting))
+    if dose >= limits.dose_a8_mps2:
+        return (
+            f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "
+            "go on another day"
+        )
+    return ""

@@ -1,0 +1,168 @@
+"""What holds around the trials: forms, checks, the demonstration, and what the hand got today. A part of the fold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from protocols.trial import Trial
+from study.session.facts.log_time import ClockStep, Moment, clock_step, passed_s
+from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
+from study.session.state.vibration_dose import NO_DOSE, Dose, add, total
+
+
+@dataclass(frozen=True, slots=True)
+class Night:
+    """A rest after which the dose began again."""
+
+    still_s: float
+    """How long the handle had not moved, as far as the clock said."""
+    dose: Dose
+    """What was set to zero by it."""
+
+
+@dataclass(frozen=True, slots=True)
+class SittingState:
+    """Consent, inclusion, demonstration and debrief hold for the session; set-up and check for one sitting."""
+
+    consented: bool = False
+    included: bool = False
+    turned_away: Literal["", "refused", "excluded"] = ""
+    """Why nothing may be played: see TURNED_AWAY. Empty where nothing speaks against it."""
+    placed: bool = False
+    """The place in the balanced order is taken."""
+    setup_done: bool = False
+    device_checked: bool = False
+    demo_done: bool = False
+    demos: int = 0
+    """Demonstrations played in the session."""
+    debriefed: bool = False
+    last: Moment = Moment("")  # noqa: RUF009 - frozen
+    """Time of the last entry in the log, up to which everything here counts."""
+    sat_s: float | None = None
+    """Since the handle first moved in this sitting; None before."""
+    busy_voids: int = 0
+    """Trials of this sitting that were void because the computer was too busy."""
+    answers_before: int = 0
+    """Given in earlier sittings."""
+    still_s: float | None = None
+    """Since the handle last moved, in any sitting; None before."""
+    dose: Dose = NO_DOSE
+    """Since the last long rest: see NIGHT_H."""
+    elsewhere: Dose = NO_DOSE
+    """In other sessions of the participant since then, as known when this sitting began."""
+    not_counted: tuple[str, ...] = ()
+    """Sessions of the participant that could not be read then."""
+    night: Night | None = None
+    """The last long rest."""
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Where the computer's wall clock was set."""
+
+
+NIGHT_H = 10.0
+"""After so long without a movement a new day begins for the hand. A date would do worse: midnight, in whatever time
+zone, may fall into a sitting. Within a sitting the monotonic clock counts, between two of them the wall clock does: a
+clock that is set forward by so much between them passes for a night, unless it is set back later."""
+NIGHT_S = 3600 * NIGHT_H
+
+
+def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
+    match event.form:
+        case "consent":
+            return replace(sitting, consented=event.passed, turned_away="" if event.passed else "refused")
+        case "exclusion":
+            return replace(sitting, included=event.passed, turned_away="" if event.passed else "excluded")
+        case "setup":
+            return replace(sitting, setup_done=True)
+        case "debrief":
+            return replace(sitting, debriefed=True)
+
+
+def check(sitting: SittingState, event: DeviceChecked) -> SittingState:
+    return replace(sitting, device_checked=event.passed)
+
+
+def demonstrated(sitting: SittingState, event: DemoFinished) -> SittingState:
+    return replace(sitting, demo_done=True)
+
+
+def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
+    """A new sitting of the same session. Under the first rules, which ask once, a person who was turned away is asked
+    again, in case it was a slip of the finger."""
+    return replace(
+        sitting,
+        setup_done=False,
+        device_checked=False,
+        sat_s=None,
+        busy_voids=0,
+        turned_away="",
+        answers_before=answers,
+    )
+
+
+def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> SittingState:
+    """Up to this moment. resumed: a new sitting begins with it, so that its monotonic clock says nothing of before."""
+    last = Moment(sitting.last.utc) if resumed else sitting.last
+    passed, step = passed_s(last, now), clock_step(last, now, between_sittings=resumed)
+    later = replace(
+        sitting,
+        last=now,
+        sat_s=None if sitting.sat_s is None else sitting.sat_s + passed,
+        still_s=None if sitting.still_s is None else sitting.still_s + passed,
+    )
+    return later if step is None else _stepped(later, step)
+
+
+def _stepped(sitting: SittingState, step: ClockStep) -> SittingState:
+    """A clock set back may take back a step forward that passed for rest, because it happened between two sittings: the
+    rest may then be shorter by as much. A night that was none gives its dose back."""
+    steps = (*sitting.clock_steps, step)
+    known = replace(sitting, clock_steps=steps)
+    # Steps forward that are known never passed for rest: setting the clock back by as much says nothing of it.
+    doubt_s = max(0.0, -_sum_s(steps)) - max(0.0, -_sum_s(sitting.clock_steps))
+    if doubt_s <= 0:
+        return known
+    if known.still_s is not None:
+        known = replace(known, still_s=max(0.0, known.still_s - doubt_s))
+    if known.night is None:
+        return known
+    night = replace(known.night, still_s=known.night.still_s - doubt_s)
+    if night.still_s >= NIGHT_S:
+        return replace(known, night=night)
+    return replace(known, night=None, dose=total(night.dose, known.dose))
+
+
+def _sum_s(steps: tuple[ClockStep, ...]) -> float:
+    return sum(step.by_s for step in steps)
+
+
+def moved(sitting: SittingState) -> SittingState:
+    """The handle moves now."""
+    if sitting.still_s is not None and sitting.still_s >= NIGHT_S:
+        sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE, elsewhere=NO_DOSE)
+    return replace(sitting, sat_s=sitting.sat_s or 0.0, still_s=0.0)
+
+
+def dose_now(sitting: SittingState) -> Dose:
+    """What counts today: nothing after a night's rest."""
+    rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
+    return NO_DOSE if rested else total(sitting.dose, sitting.elsewhere)
+
+
+def exposed(
+    sitting: SittingState, frequency_hz: float, amplitude_mps2: float | None, seconds: float | None
+) -> SittingState:
+    """seconds: None where nobody counted them (an older log); that adds nothing."""
+    if not seconds:
+        return sitting
+    return replace(sitting, dose=add(sitting.dose, frequency_hz, amplitude_mps2, seconds))
+
+
+def likely_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
+    """What a stimulus without a measurement gave the hand: at the largest ratio measured so far at this frequency."""
+    ratios = [
+        trial.delivered_mps2 / trial.level_n
+        for trial in trials
+        if trial.frequency_hz == frequency_hz and trial.delivered_mps2 is not None
+    ]
+    return level_n * max(ratios) if ratios else None

@@ -1,0 +1,123 @@
+"""What a session is at one moment: everything decided so far. `study.session.state.fold` makes it from events."""
+
+from dataclasses import dataclass, field, replace
+
+from protocols.practice import PracticeState
+from protocols.run_rules import staircase_rule
+from protocols.schedule import Run, runs
+from protocols.staircase import StaircaseState, begin
+from protocols.staircase_rule import StaircaseRule
+from protocols.study_protocol import StudyProtocol
+from protocols.trial import Trial, VoidCause
+from study.session.facts.events import AnswerGiven, SessionOpened, TrialPresented
+from study.session.facts.log_time import Moment
+from study.session.state.daily_dose import with_dose_elsewhere
+from study.session.state.draw_check import LogContradiction
+from study.session.state.due_trial import Place, Present, due_trial
+from study.session.state.rules import place_comes_later, refusal_is_final, same_stimulus_again
+from study.session.state.sitting_state import SittingState
+
+
+@dataclass(frozen=True, slots=True)
+class SessionState:
+    """Everything decided so far in one sitting."""
+
+    opened: SessionOpened
+    protocol: StudyProtocol
+    runs: tuple[Run, ...]
+    run: int
+    """Index of the present run; len(runs) when all are finished."""
+    staircase: StaircaseState
+    trial: int
+    attempt: int
+    presented: TrialPresented | None
+    """The open trial."""
+    answered: AnswerGiven | None
+    """Its answer, not yet closed by a measurement."""
+    trials: tuple[Trial, ...]
+    rest_due_s: float
+    closed: bool
+    practice: PracticeState = field(default_factory=PracticeState)
+    """Of the present run, where it is a practice run; the staircase then stands still."""
+    sitting: SittingState = field(default_factory=SittingState)
+
+    @property
+    def finished(self) -> bool:
+        return self.run >= len(self.runs)
+
+    @property
+    def turned_away_for_good(self) -> bool:
+        """Refused or excluded, under rules by which that is final."""
+        return bool(self.sitting.turned_away) and refusal_is_final(self.opened)
+
+    @property
+    def takes_part(self) -> bool:
+        """Whether the participant number of `opened` is a place in the balanced order."""
+        return self.sitting.placed or bool(self.trials) or not place_comes_later(self.opened)
+
+    @property
+    def answers(self) -> int:
+        return sum(trial.counts for trial in self.trials)
+
+
+def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:
+    """Raises LogContradiction where the opening line does not go with its protocol."""
+    _check_scales(opened, protocol)
+    state = SessionState(
+        opened=opened,
+        protocol=protocol,
+        runs=runs(protocol, opened.seed, opened.participant_number),
+        run=0,
+        staircase=begin(protocol.staircase),
+        trial=0,
+        attempt=0,
+        presented=None,
+        answered=None,
+        trials=(),
+        rest_due_s=0.0,
+        closed=False,
+        sitting=with_dose_elsewhere(SittingState(last=Moment(opened.utc, opened.monotonic_s)), opened.dose_elsewhere),
+    )
+    return replace(state, staircase=begin(current_rule(state)))
+
+
+def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
+    """Every frequency that is due later has its scale of levels."""
+    if opened.equalized is None:
+        return
+    known = {scale.frequency_hz for scale in opened.equalized.levels}
+    missing = [f"{frequency:g} Hz" for frequency in protocol.all_frequencies_hz if frequency not in known]
+    if missing:
+        raise LogContradiction(f"the session has no scale of levels for {', '.join(missing)}")
+
+
+def placed(state: SessionState, participant_number: int) -> SessionState:
+    """Before the first trial: from here on this number, not that of the opening line, gives the order of the runs."""
+    opened = replace(state.opened, participant_number=participant_number)
+    order = runs(state.protocol, opened.seed, participant_number)
+    after = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, placed=True))
+    return replace(after, staircase=begin(current_rule(after)))
+
+
+def current_rule(state: SessionState) -> StaircaseRule:
+    """Of the present run; a practice run, at its fixed level, uses nothing of it."""
+    return staircase_rule(state.protocol, state.runs[state.run].phase)
+
+
+def due(state: SessionState) -> Present:
+    """The trial that comes next."""
+    place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
+    return due_trial(state.protocol, state.opened, current_rule(state), place)
+
+
+def repeats_left(state: SessionState) -> int | None:
+    """How often the participant may still ask for a trial of this run again; None where the rules set no limit."""
+    if not same_stimulus_again(state.opened):
+        return None
+    asked = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
+    return max(0, state.protocol.trial.repeats_per_run - asked)
+
+
+def felt(opened: SessionOpened) -> bool | None:
+    """Whether a person felt the stimuli; None for a simulated participant."""
+    return None if opened.observer is not None else not opened.device.simulated

@@ -1,0 +1,76 @@
+"""From a level to a force that can be held: one loop of whole periods along one of the two directions."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.tracking.feedforward.equalizer import Equalizer
+from protocols.apparatus import TestDirections
+from protocols.study_protocol import StimulusSettings
+from study.session.stimulus.held_stimulus import HeldStimulus
+
+AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}
+
+
+def direction_vector(directions: TestDirections, direction: int) -> FloatArray:
+    """Unit vector (3,) of direction 1 or 2: 45° to either side of the line of symmetry."""
+    if direction not in (1, 2):
+        raise ValueError(f"there are directions 1 and 2, not {direction}")
+    angle = math.radians(direction_angle_deg(directions, direction))
+    first, second = AXES[directions.plane]
+    vector = np.zeros(3)
+    vector[first], vector[second] = math.cos(angle), math.sin(angle)
+    return vector
+
+
+def direction_angle_deg(directions: TestDirections, direction: int) -> float:
+    """Angle in the plane, from its first axis towards its second."""
+    return directions.symmetry_deg + (45.0 if direction == 1 else -45.0)
+
+
+def loop_length(frequency_hz: float, sample_rate_hz: float) -> int:
+    """Samples of the shortest loop of whole periods; frequencies are whole tenths of a hertz."""
+    rate, frequency = round(sample_rate_hz * 10), round(frequency_hz * 10)
+    return rate // math.gcd(rate, frequency)
+
+
+def fade_in(settings: StimulusSettings, sample_rate_hz: float) -> FloatArray:
+    """(ticks,): how an amplitude rises, as the safety layer does it where a stimulus has no onset of its own."""
+    ticks = round(settings.fade_in_s * sample_rate_hz)
+    share: FloatArray = np.arange(ticks) / max(ticks, 1)
+    return share if settings.fade_shape == "linear" else 0.5 - 0.5 * np.cos(np.pi * share)
+
+
+def held_stimulus(
+    settings: StimulusSettings,
+    unit_vector: FloatArray,
+    frequency_hz: float,
+    amplitude: float,
+    equalizer: Equalizer,
+    sample_rate_hz: float,
+) -> HeldStimulus:
+    """The stimulus of one trial. `amplitude` carries the onset's polarity in its sign; its unit is what the
+    equalizer takes: N without one, m/s² with one. unit_vector: (3,)."""
+    n = loop_length(frequency_hz, sample_rate_hz)
+    phase = 2 * math.pi * frequency_hz / sample_rate_hz * np.arange(n)
+    force = equalizer.takes == "force"
+    wanted = Signal(
+        samples=amplitude * np.sin(phase)[:, None] * unit_vector,
+        sample_rate_hz=sample_rate_hz,
+        quantity=equalizer.takes,
+        unit="N" if force else "m/s^2",
+        channels=("fx", "fy", "fz") if force else ("ax", "ay", "az"),
+    )
+    envelope = fade_in(settings, sample_rate_hz)
+    loop, onset = equalizer.periodic(wanted), equalizer.onset(wanted, envelope)
+    if onset is not None:  # the loop goes on where its onset ends
+        loop = replace(loop, samples=np.roll(loop.samples, -len(envelope), axis=0))
+    return HeldStimulus(
+        loop=loop,
+        onset=onset,
+        fade_in_s=settings.fade_in_s,
+        fade_out_s=settings.fade_out_s,
+        fade_shape=settings.fade_shape,
+    )

@@ -1,0 +1,94 @@
+"""Whether a computer keeps the time of a device: the limits, and the verdict that follows from a measurement.
+
+A real device waits for nobody: a loop that wakes up later than one tick has missed it. A simulated device waits for its
+computer, so that lateness is a warning there and no fault. A verdict never says fine of what is too late for the device
+at hand, nor of what would be too late for a real one.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.session.facts.void_reasons import LOAD_PER_PROCESSOR
+from study.session.views.views import DeviceFinding
+
+MS_PER_S = 1000.0
+
+LATE_TICKS = 1.0
+"""99 of 100 wake-ups must come before so many ticks of the device have passed: 1 ms at 1 kHz."""
+
+MISSED_SHARE = 0.001
+"""Missed ticks that are still fine: a twentieth of what makes a trial void by default."""
+
+ADVICE = "Close other programs, switch power saving off, and measure again."
+
+
+@dataclass(frozen=True, slots=True)
+class Lateness:
+    """Of this program, which wanted to wake up at every tick of the device's rate."""
+
+    median_ms: float
+    p99_ms: float
+    longest_ms: float
+    missing_a_tick: float
+    """Share of the wake-ups that were later than a tick."""
+    tick_ms: float
+
+    @property
+    def too_late(self) -> bool:
+        """For a real device. A measurement that is no number is no evidence of being in time."""
+        return not self.p99_ms < LATE_TICKS * self.tick_ms
+
+
+def lateness_of(late_s: FloatArray, rate_hz: float) -> Lateness:
+    """late_s (n,): how late each wake-up was, s, not negative. Raises ValueError where there is none."""
+    if len(late_s) == 0:
+        raise ValueError("no wake-up was measured")
+    late_ms = MS_PER_S * np.asarray(late_s, dtype=float)
+    tick_ms = MS_PER_S / rate_hz
+    return Lateness(
+        median_ms=float(np.median(late_ms)),
+        p99_ms=float(np.percentile(late_ms, 99)),
+        longest_ms=float(late_ms.max()),
+        missing_a_tick=float(np.mean(late_ms > tick_ms)),
+        tick_ms=tick_ms,
+    )
+
+
+def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
+    value = (
+        f"half of the wake-ups within {lateness.median_ms:.2f} ms, 99 % within {lateness.p99_ms:.2f} ms, "
+        f"the latest {lateness.longest_ms:.1f} ms"
+    )
+    if not lateness.too_late:
+        return DeviceFinding("Lateness", value, fine=True)
+    limit = f"99 % must come within {LATE_TICKS * lateness.tick_ms:g} ms"
+    if simulated:
+        value += f"; too late for a real device ({limit}); a simulated one waits"
+    else:
+        value += f"; too late for this device ({limit})"
+    return DeviceFinding("Lateness", value, fine=False, advice=ADVICE, warning=simulated)
+
+
+def judge_missed(missed_ticks: int, ticks: int, simulated: bool) -> DeviceFinding:
+    share = missed_ticks / max(ticks, 1)
+    fine = share <= MISSED_SHARE
+    value = f"{missed_ticks} of {ticks} ({share:.2%})"
+    if simulated:
+        value += "; a simulated device's loop catches up, so it misses none"
+    elif not fine:
+        value += f"; at most {MISSED_SHARE:.1%} are fine"
+    return DeviceFinding("Missed ticks", value, fine, "" if fine else ADVICE)
+
+
+def judge_load(per_processor: float | None) -> DeviceFinding:
+    """per_processor: None where the system does not tell. A warning with every device: the lateness is what counts."""
+    if per_processor is None:
+        return DeviceFinding("Load", "this system does not tell it, so it was not checked", fine=True)
+    value = f"{per_processor:.0%} of what its processors can do, over the last minute"
+    if math.isfinite(per_processor) and per_processor <= LOAD_PER_PROCESSOR:
+        return DeviceFinding("Load", value, fine=True)
+    value += f"; above {LOAD_PER_PROCESSOR:.0%} trials may be cut short"
+    return DeviceFinding("Load", value, fine=False, advice="Close other programs.", warning=True)

@@ -1,0 +1,145 @@
+"""The forms of a sitting, made from its protocol, and what a filled one means."""
+
+from dataclasses import dataclass
+
+from protocols.preparation import ConsentSettings, DebriefQuestion, SetupSettings
+from protocols.study_protocol import StudyProtocol
+from study.session.views.form_views import Form, FormField, FormKind, FormReply
+
+YES_NO = ("yes", "no")
+HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothing")
+
+
+@dataclass(frozen=True, slots=True)
+class FormOutcome:
+    passed: bool
+    kept: dict[str, str]
+    """Of the answers, what goes into the log."""
+    reminder: str = ""
+    """Where the set-up is not what the protocol asks for; empty where it is."""
+
+
+def form_of(protocol: StudyProtocol, kind: FormKind) -> Form | None:
+    """None where the protocol asks nothing of that kind."""
+    match kind:
+        case FormKind.CONSENT:
+            return _consent(protocol.consent) if protocol.consent.statements else None
+        case FormKind.EXCLUSION:
+            return _exclusion(protocol.consent) if protocol.consent.exclusions else None
+        case FormKind.SETUP:
+            return _setup(protocol.setup) if protocol.setup.ask else None
+        case FormKind.DEBRIEF:
+            return _debrief(protocol.debrief) if protocol.debrief else None
+
+
+def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> FormOutcome:
+    answers = {key: answer.strip() for key, answer in reply.answers.items()}
+    match kind:
+        case FormKind.CONSENT:
+            agreed = all(answer == "yes" for answer in answers.values())
+            # Of a person who does not take part only that is kept.
+            return FormOutcome(agreed, answers if agreed else {})
+        case FormKind.EXCLUSION:
+            # Which question it was is about somebody's health, and no study needs it.
+            return FormOutcome(all(answer == "no" for answer in answers.values()), {})
+        case FormKind.SETUP:
+            return FormOutcome(True, answers, _reminder(protocol.setup, answers))
+        case FormKind.DEBRIEF:
+            return FormOutcome(True, {key: answer for key, answer in answers.items() if answer})
+
+
+def confirmation_of(form: Form, reply: FormReply) -> Form:
+    """Before consent that was not given, or an exclusion, is final: what was answered, and whether that is right."""
+    consent = form.kind is FormKind.CONSENT
+    given, other = ("no", "yes") if consent else ("yes", "no")
+    told = [f"“{field.label}”" for field in form.fields if reply.answers.get(field.key, "").strip() != other]
+    end = "you do not take part in the study" if consent else "you cannot take part in the study"
+    return Form(
+        form.kind,
+        "Please check your answer",
+        f"You answered {given} to: {' '.join(told)}",
+        (FormField("right", f"With this answer {end}, and nothing is played. Is that right?", YES_NO),),
+        form.version,
+        form.ethics_id,
+    )
+
+
+def confirmed(reply: FormReply) -> bool:
+    """Else the form is to be filled in once more."""
+    return reply.answers.get("right", "").strip() == "yes"
+
+
+def _consent(settings: ConsentSettings) -> Form:
+    fields = tuple(
+        FormField(f"statement_{number}", statement, YES_NO)
+        for number, statement in enumerate(settings.statements, start=1)
+    )
+    return Form(
+        FormKind.CONSENT,
+        "Consent",
+        "Please read each statement. The study begins only if you agree to all of them.",
+        fields,
+        settings.version,
+        settings.ethics_id,
+    )
+
+
+def _exclusion(settings: ConsentSettings) -> Form:
+    fields = tuple(
+        FormField(f"question_{number}", question, YES_NO)
+        for number, question in enumerate(settings.exclusions, start=1)
+    )
+    return Form(
+        FormKind.EXCLUSION,
+        "Before anything moves",
+        "With one yes you cannot take part today. Your answers are not kept, only whether you can take part.",
+        fields,
+        settings.version,
+        settings.ethics_id,
+    )
+
+
+def _setup(settings: SetupSettings) -> Form:
+    wanted = "The protocol asks for {}."
+    return Form(
+        FormKind.SETUP,
+        "How you sit",
+        "Arrange these with the experimenter; they are kept with the data.",
+        (
+            FormField("hearing", _asked("What covers the sound of the device?", wanted.format(
+                "ear protection or masking noise (hapteq noise makes a file)"), settings.hearing_masked), HEARING),
+            FormField("hand_hidden", _asked("Is the hand hidden from your eyes?", wanted.format("a hidden hand"),
+                                            settings.hand_hidden), YES_NO),
+            FormField("arm_supported", _asked("Does your forearm rest on a support?", wanted.format("a supported arm"),
+                                              settings.arm_supported), YES_NO),
+            FormField("grip", f"How do you hold the handle? Asked for: {settings.grip}.",
+                      ("pen grip", "whole hand", "finger tips", "other")),
+            FormField("hand", "Which hand holds it?", ("right", "left")),
+        ),
+    )  # fmt: skip
+
+
+def _asked(question: str, wish: str, wished: bool) -> str:
+    return f"{question} {wish}" if wished else question
+
+
+def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
+    differing = (
+        (setup.hearing_masked and answers.get("hearing") == "nothing", "the device can be heard"),
+        (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
+        (setup.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
+    )
+    told = ", ".join(what for differs, what in differing if differs)
+    return f"The set-up is not the protocol's: {told}." if told else ""
+
+
+def _debrief(questions: tuple[DebriefQuestion, ...]) -> Form:
+    return Form(
+        FormKind.DEBRIEF,
+        "Looking back",
+        "A few questions to end with. Free text may stay empty.",
+        tuple(
+            FormField(question.key, question.question, question.choices, needed=bool(question.choices))
+            for question in questions
+        ),
+    )

@@ -1,0 +1,79 @@
+"""A session as somebody follows it: its state, and the facts that decide nothing (notes, remarks, how it ended)."""
+
+from dataclasses import dataclass, replace
+
+from protocols.study_protocol import StudyProtocol
+from study.session.facts.events import (
+    Event,
+    SessionInterrupted,
+    SessionOpened,
+    SessionResumed,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
+from study.session.facts.sitting_events import FormFilled, NoteTaken
+from study.session.state.fold import apply, begin_session
+from study.session.state.state import SessionState
+from study.session.watching.watch_view import FormLine, NoteLine
+
+NO_STEADY_PART = "no steady part to measure, or too little of it"
+"""A flag of logs before version 1.1: on nearly every trial, and no fault. Later logs have the status `unmeasured`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    state: SessionState
+    remarks: tuple[str, ...]
+    """One for each of `state.trials`: its flags, or why it is void."""
+    forms: tuple[FormLine, ...]
+    notes: tuple[NoteLine, ...]
+    """Oldest first."""
+    left: str
+    """Why the sitting was ended; empty while nobody ended it."""
+    sitting_utc: str
+    """When the present sitting was opened."""
+    notes_before: int
+    """How many of `notes` are older than the present sitting."""
+    last_utc: str
+    """Of the last fact."""
+
+
+def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
+    return Watched(
+        state=begin_session(opened, protocol),
+        remarks=(),
+        forms=(),
+        notes=(),
+        left="",
+        sitting_utc=opened.utc,
+        notes_before=0,
+        last_utc=opened.utc,
+    )
+
+
+def follow(watched: Watched, event: Event) -> Watched:
+    """After one more event. Raises LogContradiction where it cannot follow."""
+    after = replace(watched, state=apply(watched.state, event), last_utc=event.utc)
+    match event:
+        case TrialPresented():
+            return replace(after, remarks=(*watched.remarks, ""))
+        case TrialMeasured():
+            return _remarked(after, ", ".join(flag for flag in event.flags if flag != NO_STEADY_PART))
+        case TrialSpoiled():
+            return _remarked(after, event.reason)
+        case FormFilled():
+            return replace(after, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
+        case NoteTaken():
+            note = NoteLine(event.utc, event.who, event.text, event.adverse)
+            return replace(after, notes=(*watched.notes, note))
+        case SessionInterrupted():
+            return replace(after, left=event.reason)
+        case SessionResumed():
+            return replace(after, left="", sitting_utc=event.utc, notes_before=len(watched.notes))
+        case _:
+            return after
+
+
+def _remarked(watched: Watched, remark: str) -> Watched:
+    return replace(watched, remarks=(*watched.remarks[:-1], remark))

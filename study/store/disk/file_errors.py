@@ -1,0 +1,128 @@
+"""Files that cannot be read, used or written, each as an error that a person can act on."""
+
+import csv
+import errno
+import struct
+import tokenize
+import zipfile
+import zlib
+from itertools import islice
+from pathlib import Path
+
+from study.errors import StudyError
+from study.store.disk.regular_file import RefusedFileError
+
+CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
+
+
+DAMAGED = (
+    OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RuntimeError, EOFError, MemoryError,
+    AssertionError, SystemError, SyntaxError, csv.Error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+    struct.error,
+)  # fmt: skip
+"""What the libraries that read files raise for those that are damaged or not what their name says."""
+
+_LONGEST_PROBLEM = 600
+_MOST_PROBLEMS = 40
+
+
+class UnusableFileError(StudyError):
+    """A file that was read and is not what it should be.
+
+    `problems`: one each, without a full stop; `sentences`: the same, ready to be shown.
+    """
+
+    def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = CHECKED) -> None:
+        self.kind = kind
+        self.problems = _shown(problems)
+        self.sentences = tuple(_sentence(problem) for problem in self.problems)
+        super().__init__(
+            title=f"{path.name} is not a usable {kind}",
+            happened=" ".join(self.sentences),
+            do_now=do_now,
+        )
+
+
+class CannotReadError(StudyError):
+    """A file that is not there or cannot be opened."""
+
+    def __init__(self, path: Path, problem: OSError | UnicodeDecodeError) -> None:
+        super().__init__(
+            title=f"{path.name} cannot be read",
+            happened=_why_not_read(path, problem) + ".",
+            do_now="Check the name and the folder.",
+        )
+
+
+class CannotWriteError(StudyError):
+    """A file that could not be written. What stood there before is untouched."""
+
+    def __init__(self, path: Path, problem: OSError) -> None:
+        why, do_now = _why_not_written(path, problem)
+        super().__init__(
+            title=f"{path.name} was not written",
+            happened=why + ".",
+            saved="Nothing was changed: no half-written file is left, and what stood there before is as it was.",
+            do_now=do_now,
+        )
+
+
+class AlreadyThereError(StudyError):
+    """Nothing existing is overwritten unless asked for."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            title=f"{path.name} already exists",
+            happened="Nothing that exists is overwritten.",
+            saved="The file is as it was.",
+            do_now="Choose another name, or move the old file away.",
+        )
+
+
+_PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
+
+
+def _shown(problems: tuple[str, ...]) -> tuple[str, ...]:
+    """A damaged file may have a name of a million letters, and a million problems."""
+    rest = len(problems) - _MOST_PROBLEMS
+    more = (f"and {rest} problems more",) if rest > 0 else ()
+    cut = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
+    return (*islice(cut, _MOST_PROBLEMS), *more)
+
+
+def _sentence(problem: str) -> str:
+    """A problem that begins with a key or a name of the file keeps it as it is written there."""
+    capital = problem[:1].upper() if problem.partition(" ")[0] in _PROSE else problem[:1]
+    return capital + problem[1:].rstrip(".") + "."
+
+
+def _why_not_read(path: Path, problem: OSError | UnicodeDecodeError) -> str:
+    match problem:
+        case FileNotFoundError():
+            return f"There is no file {path}"
+        case IsADirectoryError():
+            return f"{path} is a folder"
+        case PermissionError():
+            return f"You have no right to read {path}"
+        case UnicodeDecodeError():
+            return f"It is neither HDF5 nor text in UTF-8 (byte {problem.start})"
+        case RefusedFileError():
+            return problem.words[:1].upper() + problem.words[1:]
+    return f"The system says: {problem.strerror or problem}"
+
+
+def _why_not_written(path: Path, problem: OSError) -> tuple[str, str]:
+    match problem.errno:
+        case errno.ENOSPC | errno.EDQUOT:
+            return "The disk is full", "Make room and do it again."
+        case errno.EFBIG:
+            return "It would be larger than the system allows for one file", "Raise the limit, or write less at once."
+        case errno.EACCES | errno.EPERM | errno.EROFS:
+            return f"You have no right to write in {path.parent}", "Choose another folder."
+        case errno.ENOENT | errno.ENOTDIR:
+            return f"There is no folder {path.parent}", "Make the folder first, or choose another."
+        case errno.EEXIST:
+            return f"{path} is there, and is no folder", "Choose another name for the folder."
+        case errno.EISDIR:
+            return f"{path} is a folder", "Choose a name for a file."
+    return f"The system says: {problem.strerror or problem}", "Choose another folder, or mend this and do it again."

@@ -1,0 +1,89 @@
+"""What an HDF5 file consists of, looked at before any of it is read: nothing outside the file, nothing oversized."""
+
+import math
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+import h5py
+
+from study.store.disk.declared_size import PLAIN_BYTES, DeclaredSizeError, SizeLimit
+
+MOST_OBJECTS = 100_000
+_COMPRESSIONS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
+_OBJECT_BYTES = 1024
+"""What a text of any length, a reference or a row of a table takes as an object of Python, with room to spare."""
+_DEFLATE_FACTOR = 1032
+"""What zlib can gain at most: its densest code is 2 bits for 258 bytes."""
+
+
+def check_contents(file: Any) -> None:
+    """Raises ValueError with a sentence fragment for data in other files and for sizes that are not read."""
+    limit = SizeLimit(file.id.get_filesize())
+    for name, dataset in datasets_in(file):
+        _check_dataset(name, dataset, limit)
+
+
+def datasets_in(file: Any) -> Iterator[tuple[str, Any]]:
+    """Every dataset once, with its path. Raises ValueError for links to other files; links within it are left out.
+
+    Walked by ourselves: h5py's own visitors do not say external links, and fail badly on damaged ones.
+    """
+    seen: set[int] = set()
+    waiting = [("", file)]
+    while waiting:
+        path, group = waiting.pop()
+        for key in sorted(group, reverse=True):
+            name = f"{path}{key}"
+            link = group.get(key, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                raise ValueError(f"{name} is a link to another file ({link.filename}); copy the data into this one")
+            entry = group[key] if isinstance(link, h5py.HardLink) else None
+            if entry is None or (address := h5py.h5o.get_info(entry.id).addr) in seen:
+                continue
+            seen.add(address)
+            if len(seen) > MOST_OBJECTS:
+                raise ValueError(f"it holds more than {MOST_OBJECTS} objects")
+            if isinstance(entry, h5py.Dataset):
+                yield name, entry
+            elif isinstance(entry, h5py.Group):
+                waiting.append((f"{name}/", entry))
+
+
+def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
+    properties = dataset.id.get_create_plist()
+    if properties.get_layout() == h5py.h5d.VIRTUAL or properties.get_external_count():
+        raise ValueError(f"the samples of {name} lie in other files; copy them into this one")
+    if dataset.shape is None:  # empty by its kind
+        return
+    filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+    if sum(code in _COMPRESSIONS for code in filters) > 1:
+        raise ValueError(f"{name} is compressed more than once; save it compressed once, or not at all")
+    in_python = dataset.dtype.hasobject or dataset.dtype.names is not None
+    entry_bytes = _OBJECT_BYTES if in_python else max(8, dataset.dtype.itemsize)  # as float64
+    limit.take(name, math.prod(dataset.shape) * entry_bytes)
+    if dataset.chunks is not None:
+        chunk_bytes = math.prod(dataset.chunks) * entry_bytes
+        if chunk_bytes > limit.most_bytes:
+            raise DeclaredSizeError(f"{name} is stored in pieces of {chunk_bytes} bytes; save it in smaller ones")
+        if h5py.h5z.FILTER_DEFLATE in filters and dataset.id.get_storage_size() * _DEFLATE_FACTOR > PLAIN_BYTES:
+            _check_pieces(name, dataset, chunk_bytes)
+
+
+def _check_pieces(name: str, dataset: Any, chunk_bytes: int) -> None:
+    """HDF5 unpacks a compressed piece whole, whatever its size was said to be: those that could be large are tried."""
+
+    large: list[tuple[int, ...]] = []
+
+    def look(stored: Any) -> None:
+        if stored.size * _DEFLATE_FACTOR > PLAIN_BYTES:
+            large.append(stored.chunk_offset)
+
+    dataset.id.chunk_iter(look)
+    for offset in large:
+        try:
+            unpacked = zlib.decompressobj().decompress(dataset.id.read_direct_chunk(offset)[1], 2 * chunk_bytes)
+        except zlib.error:
+            continue  # damaged: HDF5 itself says so
+        if len(unpacked) >= 2 * chunk_bytes:
+            raise DeclaredSizeError(f"a piece of {name} unpacks to more than the {chunk_bytes} bytes of its size")

@@ -1,0 +1,65 @@
+"""JSON documents of ours: each says its format and version, and is written whole."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.provenance import Provenance
+from study.store.disk.regular_file import DOCUMENT_BYTES
+from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import read_text, write_text
+
+
+def write_json(
+    path: Path,
+    format_name: str,
+    version: int,
+    payload: Mapping[str, Any],
+    provenance: Provenance | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """`payload`: plain values; a NaN in it is a ValueError, because JSON has none (write null).
+
+    Raises AlreadyThereError, CannotWriteError.
+    """
+    origin = {} if provenance is None else {"provenance": provenance.as_dict()}
+    document = {"format": format_name, "version": version, **payload, **origin}
+    try:
+        text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    except ValueError as error:
+        raise ValueError(f"{path.name} would hold a value that JSON does not have: {error}") from error
+    write_text(path, text + "\n", overwrite=overwrite)
+
+
+def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
+    """What the document holds beside format and version, provenance included.
+
+    Raises CannotReadError, UnusableFileError.
+    """
+    document = parse_json(path, read_text(path, DOCUMENT_BYTES), format_name)
+    found, number = document.pop("format", None), document.pop("version", None)
+    if found != format_name:
+        raise UnusableFileError(path, format_name, (f"its format is {_said(found)}, not '{format_name}'",))
+    if number != version or isinstance(number, bool):
+        wrong = f"its version is {_said(number)}; this program reads version {version}"
+        raise UnusableFileError(path, format_name, (wrong,))
+    return document
+
+
+def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
+    """A JSON object. Raises UnusableFileError."""
+    try:
+        document = load_json(text)
+    except ValueError as error:
+        raise UnusableFileError(path, kind, (f"this is not JSON: {error}",)) from error
+    if not isinstance(document, dict):
+        wrong = f"it holds a {type(document).__name__}; a document of ours is an object with format and version"
+        raise UnusableFileError(path, kind, (wrong,))
+    return document
+
+
+def _said(value: Any) -> str:
+    return "missing" if value is None else repr(value)

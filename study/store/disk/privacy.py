@@ -1,0 +1,115 @@
+"""Who can read participants' data: the account that recorded them, and no other on the computer.
+
+Folders of a study are made with mode 700 and their files with 600, whatever the umask says. Elsewhere, files take the
+rights of the folder that they are written into.
+"""
+
+import contextlib
+import errno
+import os
+import stat
+from pathlib import Path
+
+from study.store.disk.real_folder import RealFolder, is_real_folder, opened_folder
+
+PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
+OTHERS = 0o077
+"""What group and others may do."""
+
+
+def open_to_others(folder: Path) -> bool:
+    """Whether group or others have any right to the folder. Raises nothing; False where rights have other names."""
+    try:
+        return os.name == "posix" and bool(folder.stat().st_mode & OTHERS)
+    except OSError:
+        return False
+
+
+def file_mode(folder: Path) -> int:
+    """For a new file in `folder`, before the umask."""
+    return 0o666 if open_to_others(folder) else PRIVATE_FILE
+
+
+def write_private(path: Path, content: bytes) -> None:
+    """In the place of what was there, without waiting for the disk. A link in its place is refused. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(path, flags, PRIVATE_FILE), "wb") as file:
+        file.write(content)
+
+
+def make_folder(folder: Path, *, private: bool = False) -> None:
+    """With those above it, where they are not there yet. In a private folder every new one is. Raises OSError."""
+    if folder.is_dir():
+        return
+    parent = folder.absolute().parent
+    make_folder(parent, private=private)
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(mode=PRIVATE_FOLDER if private or not open_to_others(parent) else 0o777)
+    if not folder.is_dir():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(folder))
+
+
+def close_to_others(folder: Path, *, inside: bool = False) -> None:
+    """Take the rights of group and others away; inside: also from everything in it. No link is followed, and what
+    belongs to another account stays as it is. Raises nothing."""
+    with contextlib.suppress(OSError), opened_folder(folder.absolute()) as place:
+        _close(place, inside)
+
+
+def close_data_folder(data: Path) -> None:
+    """The data folder and the folders in it, where `why_open` knows no reason against it."""
+    if not open_to_others(data) or why_open(data):
+        return
+    close_to_others(data.resolve())
+    for folder in (path for path in data.iterdir() if is_real_folder(path) and open_to_others(path)):
+        close_to_others(folder)
+
+
+def why_open(data: Path) -> str:
+    """Why a data folder that others can read is not closed to them by itself; empty where nothing speaks against it."""
+    if not open_to_others(data):
+        return ""
+    found, place = data.stat(), data.resolve()
+    if found.st_uid != os.geteuid():
+        return "it belongs to another account"
+    if found.st_mode & (stat.S_ISVTX | stat.S_ISGID):
+        return "it was made to be shared"
+    if any(inner.is_relative_to(place) for inner in (Path.cwd(), Path.home().resolve())):
+        return "it holds more than the study"
+    return ""
+
+
+def warning(folder: Path, why: str = "") -> str:
+    """Sentences where others have rights to the folder; else empty. why: it stays so."""
+    if not open_to_others(folder):
+        return ""
+    mode = stat.S_IMODE(folder.stat().st_mode)
+    said = f"Other accounts of this computer have rights to {folder} (mode {mode:03o})."
+    return f"{said}{why and f' A session leaves them: {why}.'} Take them away: chmod 700 {folder}"
+
+
+def left_open(data: Path) -> str:
+    """Sentences where others have rights to a data folder and a session does not take them away; else empty."""
+    why = why_open(data)
+    return warning(data, why) if why else ""
+
+
+def _close(place: RealFolder, inside: bool) -> None:
+    if place.descriptor is None:
+        return
+    _narrow(place.descriptor)
+    for name in place.names() if inside else ():
+        with contextlib.suppress(OSError):
+            descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=place.descriptor)
+            try:
+                _narrow(descriptor)
+                if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+                    _close(RealFolder(place.path / name, descriptor), inside)
+            finally:
+                os.close(descriptor)
+
+
+def _narrow(descriptor: int) -> None:
+    found = os.fstat(descriptor)
+    if found.st_mode & OTHERS and (stat.S_ISDIR(found.st_mode) or stat.S_ISREG(found.st_mode)):
+        os.fchmod(descriptor, stat.S_IMODE(found.st_mode) & ~OTHERS)

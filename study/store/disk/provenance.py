@@ -1,0 +1,100 @@
+"""Where a result comes from: versions, protocol, seeds, parents. Without machine paths and without a date, so that
+the same work gives the same file."""
+
+import hashlib
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path, PurePath
+from typing import Any
+
+from study.store.disk.file_errors import CannotReadError
+from study.store.disk.regular_file import open_regular
+
+PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels")
+
+
+@dataclass(frozen=True, slots=True)
+class Parent:
+    """A file that went into a result."""
+
+    file: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    versions: Mapping[str, str]
+    command: tuple[str, ...]
+    """As typed, paths cut down to file names."""
+    protocol_hash: str | None = None
+    seeds: Mapping[str, int] | None = None
+    settings: Mapping[str, float] | None = None
+    """Options that the result hangs on, as they held, typed or not."""
+    parents: tuple[Parent, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, TOML and HDF5; what is not known is left out."""
+        plain = asdict(self)
+        plain["command"] = list(self.command)
+        plain["parents"] = list(plain["parents"])
+        return {key: value for key, value in plain.items() if value is not None}
+
+
+def gather_provenance(
+    *,
+    protocol_hash: str | None = None,
+    seeds: Mapping[str, int] | None = None,
+    settings: Mapping[str, float] | None = None,
+    parents: Sequence[Path] = (),
+) -> Provenance:
+    """Of the running program. Raises CannotReadError where a parent is not there."""
+    return Provenance(
+        versions=versions(),
+        command=command_line(sys.argv),
+        protocol_hash=protocol_hash,
+        seeds=seeds,
+        settings=settings,
+        parents=tuple(Parent(as_text(path.name), sha256_of(path)) for path in parents),
+    )
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of everything that computes."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def command_line(arguments: Sequence[str]) -> tuple[str, ...]:
+    """File names only: paths tell about a machine and its owner, and mean nothing elsewhere."""
+    return tuple(_without_folders(argument) for argument in arguments)
+
+
+def as_text(name: str) -> str:
+    """A file name may hold bytes that are not UTF-8, which Python carries as half characters: no text file takes
+    these."""
+    return name.encode(errors="replace").decode()
+
+
+def sha256_of(path: Path) -> str:
+    try:
+        with open_regular(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as problem:
+        raise CannotReadError(path, problem) from problem
+
+
+@cache
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _without_folders(argument: str) -> str:
+    option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
+    name = PurePath(value).name if "/" in value or "\\" in value else value
+    return as_text(option + equals + name)

@@ -1,0 +1,21 @@
+"""WAV files of 16-bit samples, one channel."""
+
+import io
+import wave
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.store.disk.atomic_write import write_atomically
+
+
+def write_wav(path: Path, samples: NDArray[np.int16], sample_rate_hz: int) -> None:
+    """samples: (n,). Raises AlreadyThereError, CannotWriteError."""
+    content = io.BytesIO()
+    with wave.open(content, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(sample_rate_hz)
+        file.writeframes(samples.astype("<i2").tobytes())
+    write_atomically(path, content.getvalue())

@@ -1,0 +1,36 @@
+"""`diagnosis.json`: the format `hapteq-diagnosis`, version 1."""
+
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.document import (
+    FORMAT,
+    VERSION,
+    Diagnosis,
+    DiagnosisError,
+    diagnosis_from_json,
+    diagnosis_to_json,
+)
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.json_document import read_json, write_json
+from study.store.disk.provenance import Provenance
+
+DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "report.html"
+"""In the folder of a diagnosis."""
+
+
+def read_diagnosis(path: Path) -> Diagnosis:
+    """Raises CannotReadError, UnusableFileError."""
+    document: dict[str, Any] = read_json(path, FORMAT, VERSION)
+    document.pop("provenance", None)
+    try:
+        return diagnosis_from_json(document)
+    except DiagnosisError as error:
+        raise UnusableFileError(path, "diagnosis", error.problems) from error
+
+
+def write_diagnosis(
+    path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None, *, overwrite: bool = False
+) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance, overwrite=overwrite)

@@ -1,0 +1,157 @@
+"""Identified models as HDF5: the format `hapteq-model`, version 1."""
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel, IdentifiedModelError
+from equalizer.plant.model_quality import ModelQuality
+from equalizer.signals.signal import FloatArray
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.hdf5_attributes import (
+    numbers_attribute,
+    text_attribute,
+    text_or_list,
+    texts_attribute,
+    write_texts,
+)
+from study.store.disk.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
+from study.store.disk.layout import Entry
+from study.store.disk.strict_json import load_json
+
+FORMAT, VERSION = "hapteq-model", 1
+KIND = "identified model"
+
+LAYOUT = (
+    Entry("format", "attribute, text", f"`{FORMAT}`"),
+    Entry("version", "attribute, whole number", f"{VERSION}"),
+    Entry("A", "(n, n) float32 or float64", "x[k+1] = A x[k] + B u[k]"),
+    Entry("B", "(n, m) float32 or float64", "likewise"),
+    Entry("C", "(p, n) float32 or float64", "y[k] = C x[k] + D u[k]"),
+    Entry("D", "(p, m) float32 or float64", "likewise"),
+    Entry("sample_rate_hz", "attribute, number", "the only rate at which the model can run"),
+    Entry("band_hz", "attribute, 2 numbers", "where the fit was made"),
+    Entry("input_unit", "attribute, text or list", "SI; one for all channels, or one per channel"),
+    Entry("output_unit", "attribute, text or list", "likewise"),
+    Entry("input_channels", "attribute, list of text", "one name per input"),
+    Entry("output_channels", "attribute, list of text", "one name per output"),
+    Entry("delay_samples", "attribute, number", "for information: A, B, C, D include the delay", False),
+    Entry("place_m", "attribute, 3 numbers", "where in the workspace; left out = not known", False),
+    Entry("covariance", "(k, k) float32 or float64", "of the k entries of A, B, C, D, each row by row", False),
+    Entry("samples", "(draws, k) float32 or float64", "draws of the same entries from their uncertainty", False),
+    Entry("expected_error", "attribute, number", "of model against device, relative; not below any other", False),
+    Entry("misfit_error", "attribute, number", "against the lines it was fitted to, beyond their noise", False),
+    Entry("scatter_error", "attribute, number", "left by the noise of those lines", False),
+    Entry("held_out_error", "attribute, number", "on a record kept for a test, its noise included", False),
+    Entry("held_out_noise", "attribute, number", "of that record", False),
+    Entry("held_out_s", "attribute, number", "length of that record", False),
+    Entry("quality_remarks", "attribute, list of text", "what the errors come from", False),
+    Entry("provenance", "attribute, JSON text", "versions, command, seeds, parents", False),
+)
+
+
+def read_identified_model(path: Path) -> IdentifiedModel:
+    """Raises CannotReadError, or UnusableFileError with everything that is wrong."""
+    problems = Problems()
+    with opened_hdf5(path, KIND, FORMAT, VERSION) as file:
+        parts = _parts(file, problems)
+    if problems.found:
+        raise UnusableFileError(path, KIND, tuple(problems.found))
+    try:
+        return IdentifiedModel(**parts)
+    except IdentifiedModelError as error:
+        raise UnusableFileError(path, KIND, error.problems) from error
+
+
+def is_identified_model(path: Path) -> bool:
+    """By what the file says of itself. Raises StudyError for one that says nothing, or something else."""
+    with opened_hdf5(path, KIND, FORMAT, VERSION):
+        return True
+
+
+def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: bool = False) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+
+    def fill(file: Any) -> None:
+        file.attrs.update({"format": FORMAT, "version": VERSION, "sample_rate_hz": model.sample_rate_hz})
+        file.attrs.update({"band_hz": model.band_hz, "delay_samples": model.delay_samples})
+        if model.place_m is not None:
+            file.attrs["place_m"] = model.place_m
+        for name in ("input_unit", "output_unit", "input_channels", "output_channels"):
+            write_texts(file, name, getattr(model, name))
+        for name in ("A", "B", "C", "D", "covariance", "samples"):
+            if getattr(model, name) is not None:
+                file.create_dataset(name, data=getattr(model, name), fletcher32=True)
+        if model.quality is not None:
+            _write_quality(file, model.quality)
+        file.attrs["provenance"] = json.dumps(dict(model.provenance), allow_nan=False)
+
+    write_hdf5(path, fill, overwrite=overwrite)
+
+
+QUALITY = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
+
+
+def _write_quality(file: Any, quality: ModelQuality) -> None:
+    for name in QUALITY:
+        if getattr(quality, name) is not None:
+            file.attrs[name] = getattr(quality, name)
+    write_texts(file, "quality_remarks", quality.remarks)
+
+
+def _quality(file: Any) -> ModelQuality | None:
+    """None for a file of an earlier version. Raises ValueError."""
+    if "expected_error" not in file.attrs:
+        return None
+    found = {name: numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
+    remarks = texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
+    return ModelQuality(
+        expected_error=found["expected_error"],
+        misfit_error=found.get("misfit_error", found["expected_error"]),
+        scatter_error=found.get("scatter_error"),
+        held_out_error=found.get("held_out_error"),
+        held_out_noise=found.get("held_out_noise"),
+        held_out_s=found.get("held_out_s"),
+        remarks=remarks,
+    )
+
+
+def _parts(file: Any, problems: Problems) -> dict[str, Any]:
+    """The model's fields, by name."""
+
+    def matrix(name: str) -> FloatArray:
+        return problems.attempt(lambda: float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
+
+    def texts(name: str) -> tuple[str, ...]:
+        return problems.attempt(lambda: texts_attribute(file, name), ())
+
+    def numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+        return problems.attempt(lambda: numbers_attribute(file, name, count, default), (0.0,) * count)
+
+    provenance: dict[str, Any] = problems.attempt(lambda: _provenance(file), {})
+    present = [name for name in ("covariance", "samples") if name in file]
+    return {
+        **{name: matrix(name) for name in ("A", "B", "C", "D", *present)},
+        **{name: text_or_list(texts(name)) for name in ("input_unit", "output_unit")},
+        **{name: texts(name) for name in ("input_channels", "output_channels")},
+        "sample_rate_hz": numbers("sample_rate_hz", 1)[0],
+        "band_hz": numbers("band_hz", 2),
+        "delay_samples": numbers("delay_samples", 1, (0.0,))[0],
+        "place_m": numbers("place_m", 3) if "place_m" in file.attrs else None,
+        "provenance": provenance,
+        "quality": problems.attempt(lambda: _quality(file), None),
+    }
+
+
+def _provenance(file: Any) -> dict[str, Any]:
+    text = text_attribute(file, "provenance", "{}")
+    try:
+        found = load_json(text)
+    except ValueError as error:
+        raise ValueError(f"the attribute 'provenance' is not JSON: {error}") from error
+    if not isinstance(found, dict):
+        raise ValueError(f"the attribute 'provenance' is {found!r}; it must be a JSON object")
+    return found

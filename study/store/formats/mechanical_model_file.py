@@ -1,0 +1,53 @@
+"""Mechanical models as TOML files."""
+
+from pathlib import Path
+
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError
+from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.layout import Entry
+from study.store.disk.text_file import write_text
+from study.store.disk.toml_text import read_toml_text
+
+KIND = "mechanical model"
+
+LAYOUT = (
+    Entry("model.name", "text", "what it is a model of"),
+    Entry("model.quantity", "text", "of the response: " + ", ".join(f"`{word}`" for word in DERIVATIVE_OF_QUANTITY)),
+    Entry("model.mass", "n rows of n", "symmetric, positive definite; kg"),
+    Entry("model.damping", "n rows of n", "N s/m"),
+    Entry("model.stiffness", "n rows of n", "N/m"),
+    Entry("model.input", "n rows of m", "which coordinate each command drives"),
+    Entry("model.output", "p rows of n", "what each response sees; the same rows give the recorded position"),
+    Entry("model.rotational", "true or false", "kg m^2, N m s/rad, N m/rad in place of the above", False),
+    Entry(
+        "sensor.bandwidth_hz", "number", "one pole per channel: y += (1 - exp(-2 pi f / rate)) (x - y); 0 = none", False
+    ),
+    Entry("sensor.range", "number", "largest magnitude, in the response's SI unit; 0 = none", False),
+    Entry("actuator.delay_s", "number", "0 = none", False),
+    Entry("actuator.bandwidth_hz", "number", "one pole; 0 = none", False),
+    Entry("actuator.limit", "number", "largest force or torque; 0 = none", False),
+    Entry("effect.kind", "text", "a name of the table of effects; one [[effect]] per effect", False),
+    Entry("effect.axis", "text", "axis or channel; left out where all share it", False),
+    Entry("effect.acts_on", "text", "of a `discovered_law`: force, command or response", False),
+    Entry("effect.expression", "text", "of a `discovered_law`: its formula, see below", False),
+    Entry("effect.…", "number", "every parameter of the effect, by its name", False),
+    Entry("tolerance.mass_kg", "number", "one standard deviation, as calibrated, at each driven axis", False),
+    Entry("tolerance.damping_n_s_per_m", "number", "likewise", False),
+    Entry("tolerance.stiffness_n_per_m", "number", "likewise", False),
+    Entry("tolerance.modes", "number", "relative, of modal frequencies and masses", False),
+    Entry("provenance.…", "anything", "versions, command, seeds, parents", False),
+)
+
+
+def read_mechanical_model(path: Path) -> MechanicalModel:
+    """Raises CannotReadError, UnusableFileError."""
+    try:
+        return parse_mechanical_model(read_toml_text(path, KIND))
+    except MechanicalModelError as error:
+        raise UnusableFileError(path, KIND, error.problems) from error
+
+
+def write_mechanical_model(path: Path, model: MechanicalModel, *, overwrite: bool = False) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_text(path, mechanical_model_toml(model), overwrite=overwrite)

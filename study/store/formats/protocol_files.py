@@ -1,0 +1,170 @@
+"""Protocols from the disk: the shipped ones by name, others by path; and locks that fix them before data come in."""
+
+import os
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from protocols.loading import Protocol, ProtocolError, load_protocol
+from protocols.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
+from protocols.problem import Problem
+from protocols.recording_protocol import RecordingProtocol
+from protocols.study_protocol import StudyProtocol
+from study.errors import StudyError, WrongUseError
+from study.local_clock import machine_zone
+from study.session.views.local_time import local_time
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.regular_file import DOCUMENT_BYTES
+from study.store.disk.text_file import read_text, write_text
+from study.store.disk.toml_text import read_toml_text
+
+P = TypeVar("P", bound=Protocol, covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolFile(Generic[P]):
+    """A protocol and where it came from."""
+
+    protocol: P
+    text: str
+    """As it stands in the file, comments and all."""
+    path: Path | None
+    """None for a shipped protocol."""
+    lock: ProtocolLock | None
+    """The lock that it was checked against, if one was found."""
+
+    @property
+    def locked(self) -> bool:
+        return self.lock is not None
+
+
+class ProtocolRefusedError(StudyError):
+    """A protocol file with problems."""
+
+    def __init__(self, name: str, error: ProtocolError) -> None:
+        super().__init__(
+            title=f"{name} is not a usable protocol",
+            happened=str(error),
+            do_now="Correct the file and run the command again; `hapteq protocol show direction_threshold` (for "
+            "a recording: sweep_band) lists every key with what is allowed.",
+        )
+        self.problems: tuple[Problem, ...] = error.problems
+
+
+class LockedProtocolChangedError(StudyError):
+    """A protocol that is not, or no longer, the one that was locked."""
+
+    def __init__(self, lock_path: Path, error: LockError) -> None:
+        super().__init__(
+            title="This protocol is locked, and it is not the locked one",
+            happened=f"According to {lock_path}, {error}.",
+            saved="Nothing was changed, and no session was begun.",
+            do_now="Restore the locked version, or save yours under a name of its own and lock that.",
+        )
+
+
+def shipped_protocols() -> tuple[str, ...]:
+    """Names of the protocols that come with hapteq."""
+    return tuple(
+        sorted(entry.name.removesuffix(".toml") for entry in files("protocols").iterdir() if _is_toml(entry.name))
+    )
+
+
+def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]:
+    """A shipped protocol by its name, or any by its path.
+
+    A lock beside the file or in `data` must be that of this very protocol. Raises WrongUseError (no such protocol),
+    CannotReadError, ProtocolRefusedError, LockedProtocolChangedError, UnusableFileError (the lock).
+    """
+    path = None if name in shipped_protocols() else _path_of(name)
+    text = (
+        files("protocols").joinpath(f"{name}.toml").read_text("utf-8")
+        if path is None
+        else read_toml_text(path, "protocol")
+    )
+    source = f"{name}.toml" if path is None else path.name
+    try:
+        protocol = load_protocol(text, source)
+    except ProtocolError as error:
+        raise ProtocolRefusedError(source, error) from error
+    return ProtocolFile(protocol, text, path, _checked_lock(protocol, path, data))
+
+
+def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[StudyProtocol]:
+    """As `read_protocol`; raises WrongUseError for a recording protocol."""
+    found = read_protocol(name, data)
+    if not isinstance(found.protocol, StudyProtocol):
+        raise _other_kind(found.protocol, "a participant can take", "hapteq record")
+    return ProtocolFile(found.protocol, found.text, found.path, found.lock)
+
+
+def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile[RecordingProtocol]:
+    """As `read_protocol`; raises WrongUseError for a study protocol."""
+    found = read_protocol(name, data)
+    if not isinstance(found.protocol, RecordingProtocol):
+        raise _other_kind(found.protocol, "a device can record", "hapteq study")
+    return ProtocolFile(found.protocol, found.text, found.path, found.lock)
+
+
+def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, hapteq: str) -> Path:
+    """Write NAME.lock.json into `folder`, beside the data or beside the protocol. hapteq: its version.
+
+    Locking the same protocol again changes nothing. Raises LockedProtocolChangedError where another version is
+    locked there, CannotWriteError, UnusableFileError (the lock that is there).
+    """
+    path = lock_path(file.protocol, folder)
+    if _lock_at(path, file.protocol) is None:
+        write_text(path, lock_to_json(lock_of(file.protocol, locked_utc, hapteq)))
+    return path
+
+
+def lock_path(protocol: Protocol, folder: Path) -> Path:
+    return folder / f"{protocol.name}.lock.json"
+
+
+def _checked_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
+    folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
+    locks = [_lock_at(lock_path(protocol, folder), protocol) for folder in folders]
+    return next((lock for lock in locks if lock is not None), None)
+
+
+def _lock_at(path: Path, protocol: Protocol) -> ProtocolLock | None:
+    if not os.path.lexists(path):  # a link that leads nowhere is a lock that cannot be read, not none
+        return None
+    text = read_text(path, DOCUMENT_BYTES)
+    try:
+        lock = lock_from_json(text)
+    except LockError as error:
+        raise UnusableFileError(path, "protocol lock", (str(error),)) from error
+    try:
+        check_lock(lock, protocol, local_time(lock.locked_utc, machine_zone))
+    except LockError as error:
+        raise LockedProtocolChangedError(path, error) from error
+    return lock
+
+
+def _path_of(name: str) -> Path:
+    path = Path(name)
+    if _is_toml(name) or path.parent != Path() or path.exists():
+        return path
+    close = get_close_matches(name, shipped_protocols(), n=1)
+    guess = f" Did you mean {close[0]}?" if close else ""
+    raise WrongUseError(
+        title="There is no such protocol",
+        happened=f"'{name}' is neither a file nor a shipped protocol.{guess}",
+        do_now=f"Give the path of a .toml file, or one of {', '.join(shipped_protocols())}.",
+    )
+
+
+def _is_toml(name: str) -> bool:
+    return name.endswith(".toml")
+
+
+def _other_kind(protocol: Protocol, wanted: str, command: str) -> WrongUseError:
+    return WrongUseError(
+        title="This protocol is of another kind",
+        happened=f"'{protocol.name}' is a {protocol.kind} protocol, not one that {wanted}.",
+        do_now=f"Use it with `{command}`, or choose another one; `hapteq protocol list` shows the shipped ones.",
+    )

@@ -1,0 +1,36 @@
+"""`answer.json` of a real recording: the format `hapteq-real-answer`, version 1."""
+
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.result.real_answer import (
+    FORMAT,
+    VERSION,
+    RealAnswer,
+    RealAnswerError,
+    real_answer_from_json,
+    real_answer_to_json,
+)
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.json_document import read_json, write_json
+from study.store.disk.provenance import Provenance
+
+
+def read_real_answer(path: Path) -> RealAnswer:
+    """Raises CannotReadError, UnusableFileError."""
+    return read_answer_and_origin(path)[0]
+
+
+def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
+    """With its provenance as it stands there; empty where it has none. Raises CannotReadError, UnusableFileError."""
+    document: dict[str, Any] = read_json(path, FORMAT, VERSION)
+    origin = document.pop("provenance", None)
+    try:
+        return real_answer_from_json(document), origin if isinstance(origin, dict) else {}
+    except RealAnswerError as error:
+        raise UnusableFileError(path, "answer to a real recording", error.problems) from error
+
+
+def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_json(path, FORMAT, VERSION, real_answer_to_json(answer), provenance)

@@ -1,0 +1,189 @@
+"""Recordings as HDF5: read into SI units with every check, written whole. The format is in `recording_layout`."""
+
+import json
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+
+from equalizer.signals.recording import Hold, Recording, Segment
+from equalizer.signals.recording_checks import recording_problems, signals_of
+from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.units import check_quantity, parse_unit
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.hdf5_attributes import (
+    numbers_attribute,
+    text_attribute,
+    text_or_list,
+    texts_attribute,
+    write_texts,
+)
+from study.store.disk.hdf5_file import Problems, float_dataset, opened_hdf5, write_hdf5
+from study.store.disk.strict_json import load_json
+from study.store.formats.recording_layout import FORMAT, KIND, SEGMENT_FIELDS, VERSION
+
+_SEGMENT_TYPE = np.dtype(
+    [
+        ("start", "<i8"), ("stop", "<i8"), ("kind", h5py.string_dtype()),
+        ("amplitude", "<f8"), ("period", "<i8"), ("role", h5py.string_dtype()),
+    ]
+)  # fmt: skip
+
+_PACK_ABOVE_BYTES = 2**18
+
+
+def read_recording(path: Path) -> Recording:
+    """In SI units, checked. Raises CannotReadError, or UnusableFileError with everything that is wrong."""
+    with opened_hdf5(path, KIND, FORMAT, VERSION) as file:
+        problems = Problems()
+        rate_hz = problems.attempt(lambda: _rate(file), 1.0)
+
+        def signal(name: str) -> Signal | None:
+            return problems.attempt(lambda: _signal(file, name, rate_hz), None)
+
+        command, response = signal("command"), signal("response")
+        position, excitation, condition = (
+            signal(name) if name in file else None for name in ("position", "excitation", "condition")
+        )
+        device = problems.attempt(lambda: text_attribute(file, "device"), "")
+        hold = problems.attempt(lambda: _hold(text_attribute(file, "hold", Hold.ZERO_ORDER.value)), Hold.ZERO_ORDER)
+        segments: tuple[Segment, ...] = problems.attempt(lambda: _segments(file), ())
+        time_s = problems.attempt(lambda: _time_s(file), None)
+        meta: dict[str, Any] = problems.attempt(lambda: _meta(file), {})
+    if problems.found or command is None or response is None:
+        raise UnusableFileError(path, KIND, tuple(problems.found))
+    recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta, condition)
+    if wrong := recording_problems(recording):
+        raise UnusableFileError(path, KIND, wrong)
+    return recording
+
+
+def write_recording(
+    path: Path,
+    recording: Recording,
+    *,
+    precision: Literal["float32", "float64"] = "float64",
+    overwrite: bool = False,
+) -> None:
+    """`precision` is that of command, response and excitation; position and time always keep float64, because
+    micrometres in a large workspace need it. Raises StudyError; ValueError for an inconsistent recording."""
+    if wrong := recording_problems(recording):
+        raise ValueError(f"this recording cannot be written: {'; '.join(wrong)}")
+
+    def fill(file: Any) -> None:
+        file.attrs.update(
+            {"format": FORMAT, "version": VERSION, "sample_rate_hz": recording.sample_rate_hz,
+             "device": recording.device, "hold": recording.hold.value}
+        )  # fmt: skip
+        for name, signal in signals_of(recording).items():
+            _write_signal(file, name, signal, "float64" if name == "position" else precision)
+        if recording.time_s is not None:
+            file.create_dataset("time_s", data=np.asarray(recording.time_s, dtype=np.float64), fletcher32=True)
+        rows = np.array([astuple(segment) for segment in recording.segments], dtype=_SEGMENT_TYPE)
+        file.create_dataset("segments", data=rows)
+        meta = file.create_group("meta")
+        for key, value in recording.meta.items():
+            meta.attrs[key] = json.dumps(value, allow_nan=False)
+
+    write_hdf5(path, fill, overwrite=overwrite)
+
+
+def _rate(file: Any) -> float:
+    (rate_hz,) = numbers_attribute(file, "sample_rate_hz", 1)
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise ValueError(f"sample_rate_hz is {rate_hz:g}; it must be a positive number")
+    return rate_hz
+
+
+def _signal(file: Any, name: str, rate_hz: float) -> Signal:
+    samples = float_dataset(file, name, "(samples, channels)")
+    quantity, unit, channels = (texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
+    channels = _one_each(channels, samples.shape[1])
+    try:
+        signal = Signal(samples, rate_hz, text_or_list(quantity), text_or_list(unit), channels)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
+    scale, offset, si = [], [], []
+    for channel, word, text in zip(signal.channels, signal.quantities, signal.units, strict=True):
+        try:
+            parsed = parse_unit(text)
+            check_quantity(word, parsed)
+        except ValueError as error:
+            raise ValueError(f"{name}, channel '{channel}': {error}") from error
+        scale.append(parsed.factor)
+        offset.append(parsed.offset)
+        si.append(parsed.si)
+    return Signal(samples * np.array(scale) + np.array(offset), rate_hz, signal.quantity, tuple(si), channels)
+
+
+def _one_each(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
+    """One text for several columns lists their names, or is a name that all of them share and that is numbered."""
+    if len(channels) != 1 or columns < 2:
+        return channels
+    names = tuple(channels[0].replace(",", " ").split())
+    return names if len(names) == columns else tuple(f"{channels[0]} {number + 1}" for number in range(columns))
+
+
+def _time_s(file: Any) -> FloatArray | None:
+    if "time_s" not in file:
+        return None
+    stamps = float_dataset(file, "time_s", "(samples)")
+    stamps.flags.writeable = False
+    return stamps
+
+
+def _hold(text: str) -> Hold:
+    if text not in {hold.value for hold in Hold}:
+        raise ValueError(f"hold is '{text}'; allowed are {', '.join(hold.value for hold in Hold)}")
+    return Hold(text)
+
+
+def _segments(file: Any) -> tuple[Segment, ...]:
+    if "segments" not in file:
+        return ()
+    rows = file["segments"][()]
+    names = [entry.name for entry in SEGMENT_FIELDS]
+    missing = [name for name in names if name not in (rows.dtype.names or ())]
+    if missing:
+        raise ValueError(f"segments lacks {', '.join(missing)}; its rows are {', '.join(names)}")
+    scale = _amplitude_scale(file)
+    return tuple(_segment(row, scale) for row in rows.ravel())
+
+
+def _segment(row: Any, scale: float) -> Segment:
+    start, stop, period = (int(row[name]) for name in ("start", "stop", "period"))
+    kind, role = (row[name].decode() if isinstance(row[name], bytes) else str(row[name]) for name in ("kind", "role"))
+    return Segment(start, stop, kind, float(row["amplitude"]) * scale, period, role)
+
+
+def _amplitude_scale(file: Any) -> float:
+    """Amplitudes are in the command's unit; where its channels differ in unit, they are left as they are."""
+    try:
+        factors = {parse_unit(text).factor for text in texts_attribute(file.get("command", file), "unit")}
+    except ValueError:
+        return 1.0  # the command itself reports what is wrong with it
+    return factors.pop() if len(factors) == 1 else 1.0
+
+
+def _meta(file: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key in file["meta"].attrs if "meta" in file else ():
+        text = text_attribute(file["meta"], key)
+        try:
+            found[key] = load_json(text)
+        except ValueError as error:
+            raise ValueError(f"the attribute '{key}' of meta is not JSON: {error}") from error
+    return found
+
+
+def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:
+    samples = signal.samples.astype(precision)
+    # A session keeps thousands of short recordings: they are written faster as they are.
+    packed = {"compression": "gzip", "shuffle": True} if samples.nbytes > _PACK_ABOVE_BYTES else {}
+    # With a checksum: a sample that a disk changed is found when it is read.
+    dataset = file.create_dataset(name, data=samples, fletcher32=True, **packed)
+    write_texts(dataset, "quantity", signal.quantity)
+    write_texts(dataset, "unit", signal.unit)
+    write_texts(dataset, "channels", signal.channels)

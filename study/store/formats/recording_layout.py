@@ -1,0 +1,45 @@
+"""What a recording's file holds: the format `hapteq-recording`, version 1."""
+
+from equalizer.signals.recording import SEGMENT_KINDS, Hold
+from equalizer.signals.units import UNSTATED
+from study.store.disk.layout import Entry
+
+FORMAT, VERSION = "hapteq-recording", 1
+KIND = "recording"
+
+LAYOUT = (
+    Entry("format", "attribute, text", f"`{FORMAT}`"),
+    Entry("version", "attribute, whole number", f"{VERSION}"),
+    Entry("sample_rate_hz", "attribute, number", "of every dataset; the faster of command and sensor"),
+    Entry("device", "attribute, text", "what was recorded"),
+    Entry("hold", "attribute, text", "how the command moves: " + ", ".join(f"`{h.value}`" for h in Hold), False),
+    Entry("command", "(n, m) float32 or float64", "what entered the plant; `command[k]` is held until t_(k+1)"),
+    Entry("response", "(n, p) float32 or float64", "what came out, taken at t_k just before `command[k]` is written"),
+    Entry("position", "(n, d) float32 or float64", "taken with the response", False),
+    Entry("excitation", "(n, m) float32 or float64", "the part of the command that was decided beforehand", False),
+    Entry("condition", "(n, q) float32 or float64", "what was known beside: temperature, pressure, a setting", False),
+    Entry("time_s", "(n) float32 or float64", "time stamps, where the device kept them", False),
+    Entry("segments", "rows of `start, stop, kind, amplitude, period, role`", "samples outside are rest", False),
+    Entry(
+        "meta",
+        "group of attributes, each JSON text",
+        "place, sensor, feedback, grip, operator, added_mass_kg or added_inertia_kg_m2 (a weight on it), provenance; "
+        "`time` is `unknown` where samples are only numbered (then sample_rate_hz is 1)",
+        False,
+    ),
+)
+SIGNAL_ATTRIBUTES = (
+    Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
+    Entry("unit", "attribute, text or list", f"likewise; converted to SI on reading; `{UNSTATED}` where none is known"),
+    Entry(
+        "channels", "attribute, text or list", "one name per column; one text lists them (`fx, fy, fz`), or is numbered"
+    ),
+)
+SEGMENT_FIELDS = (
+    Entry("start", "whole number", "first sample"),
+    Entry("stop", "whole number", "the sample after the last"),
+    Entry("kind", "text", ", ".join(f"`{kind}`" for kind in SEGMENT_KINDS)),
+    Entry("amplitude", "number", "peak of the excitation, in the command's unit"),
+    Entry("period", "whole number", "samples per period, 0 = not periodic"),
+    Entry("role", "text", "`fit`, `test`, or empty"),
+)

@@ -1,0 +1,73 @@
+"""`*.repeats.json` beside a table of forces: the format `hapteq-repeats`, version 1.
+
+How the forces were found and what they belong to, so that a later run can go on from them.
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.json_document import read_json, write_json
+from study.store.disk.provenance import Provenance
+
+FORMAT, VERSION = "hapteq-repeats", 1
+SUFFIX = ".repeats.json"
+KIND = "document of repeats"
+
+
+@dataclass(frozen=True, slots=True)
+class Repeats:
+    """Errors are root mean squares in the band over that of what is wanted."""
+
+    trajectory_sha256: str
+    """Of the wanted samples and their rate."""
+    model_sha256: str
+    """Of the model file, or of all of them together."""
+    forces_sha256: str
+    """Of the table of forces beside this document."""
+    device: str
+    place_m: tuple[float, float, float]
+    band_hz: tuple[float, float]
+    errors: tuple[float, ...]
+    """As measured, noise included, play by play; the first is that of the forces begun with."""
+    kept: int
+    """Which play's forces are in the table, from 0."""
+    noise_floor: float
+    """What the sensor's noise alone gives."""
+    gains: tuple[float, ...]
+    """Share of each error that was corrected."""
+    fitted: tuple[float, ...]
+    """Share of each correction that fitted under the cap."""
+    verdict: str
+    remark: str
+    interrupted: bool
+
+
+REPEATS: TypeAdapter[Repeats] = TypeAdapter(Repeats)
+
+
+def beside(forces: Path) -> Path:
+    return forces.with_suffix(SUFFIX)
+
+
+def read_repeats(path: Path) -> Repeats:
+    """Raises CannotReadError, UnusableFileError."""
+    document = read_json(path, FORMAT, VERSION)
+    document.pop("provenance", None)
+    try:
+        found = REPEATS.validate_python(document)
+    except ValidationError as error:
+        problems = tuple(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        raise UnusableFileError(path, KIND, problems) from error
+    if not 0 <= found.kept < len(found.errors):
+        raise UnusableFileError(path, KIND, (f"kept is {found.kept}, but there are {len(found.errors)} plays",))
+    return found
+
+
+def write_repeats(
+    path: Path, repeats: Repeats, provenance: Provenance | None = None, *, overwrite: bool = False
+) -> None:
+    """Raises AlreadyThereError, CannotWriteError."""
+    write_json(path, FORMAT, VERSION, asdict(repeats), provenance, overwrite=overwrite)

@@ -1,0 +1,32 @@
+"""`thresholds.csv`, and `detection.csv` for detection runs: one row per run, columns as the fields of
+`analysis.psychophysics.thresholds.Threshold`."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from analysis.psychophysics.thresholds import Threshold
+from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.text_file import read_text, write_text
+
+THRESHOLDS_NAME = "thresholds.csv"
+DETECTION_NAME = "detection.csv"
+"""Written only where there are detection runs."""
+THRESHOLDS_HEADER = columns(Threshold)
+KIND = "table of thresholds"
+
+
+def write_thresholds(path: Path, thresholds: Iterable[Threshold], *, overwrite: bool = True) -> None:
+    """Replaces an older table by default: it can be computed again at will.
+
+    Raises AlreadyThereError, CannotWriteError.
+    """
+    write_text(path, rows_to_csv(thresholds, Threshold), overwrite=overwrite)
+
+
+def read_thresholds(path: Path) -> tuple[Threshold, ...]:
+    """Raises CannotReadError, UnusableFileError."""
+    try:
+        return rows_from_csv(read_text(path), Threshold)
+    except CsvError as error:
+        raise UnusableFileError(path, KIND, error.problems) from error

@@ -1,0 +1,44 @@
+"""`trials.csv`: one row per presentation, rewritten at will from the log."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from protocols.trial import Trial
+from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.text_file import read_text, write_text
+
+TRIALS_NAME = "trials.csv"
+TRIALS_HEADER = columns(Trial)
+KIND = "table of trials"
+
+
+def write_trials(path: Path, trials: Iterable[Trial]) -> None:
+    """Replaces an older table: the log is the truth. Raises CannotWriteError."""
+    write_text(path, rows_to_csv(trials, Trial), overwrite=True)
+
+
+def read_trials(path: Path) -> tuple[Trial, ...]:
+    """Raises CannotReadError, UnusableFileError."""
+    try:
+        trials = rows_from_csv(read_text(path), Trial)
+    except CsvError as error:
+        raise UnusableFileError(path, KIND, error.problems) from error
+    if wrong := trial_problems(trials):
+        raise UnusableFileError(path, KIND, wrong)
+    return trials
+
+
+def trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
+    """Rows that no session can have written."""
+    found = []
+    for line, trial in enumerate(trials, start=2):
+        if trial.direction_shown not in (1, 2):
+            found.append(f"line {line}: direction_shown is {trial.direction_shown}; directions are 1 and 2")
+        if trial.answer not in (1, 2, None):
+            found.append(f"line {line}: answer is {trial.answer}; answers are 1, 2, or empty")
+        if trial.correct != (None if trial.answer is None else trial.answer == trial.direction_shown):
+            found.append(f"line {line}: correct does not follow from direction_shown and answer")
+        if not (trial.level_n > 0 and trial.frequency_hz > 0):
+            found.append(f"line {line}: level_n and frequency_hz must be above 0")
+    return tuple(found)

@@ -1,0 +1,133 @@
+"""Where sessions lie: one folder each in the data folder, named after participant code and number."""
+
+import contextlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from study.errors import StudyError, WrongUseError
+from study.session.views.participant_codes import ALLOWED, is_code
+from study.store.disk.atomic_write import sync_folder
+from study.store.disk.privacy import PRIVATE_FOLDER, close_data_folder, make_folder
+from study.store.sessions.event_log import LOG_NAME
+
+FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
+TOMBSTONE_NAME = "withdrawn.json"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFolder:
+    path: Path
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+    @property
+    def subject(self) -> str:
+        return self.name.rpartition("_")[0]
+
+    @property
+    def log(self) -> Path:
+        return self.path / LOG_NAME
+
+    @property
+    def recordings(self) -> Path:
+        return self.path / "recordings"
+
+    @property
+    def tombstone(self) -> Path:
+        return self.path / TOMBSTONE_NAME
+
+    @property
+    def withdrawal(self) -> Path:
+        """There as long as the erasing of this participant's sessions is not finished."""
+        return withdrawal_file(self.path.parent, self.subject)
+
+    @property
+    def withdrawn(self) -> bool:
+        return self.tombstone.exists() or self.withdrawal.exists()
+
+
+def withdrawal_file(data: Path, subject: str) -> Path:
+    return data / f"{subject}.withdrawal.json"
+
+
+class SessionWithdrawnError(StudyError):
+    """No data any more, whether or not all of it is erased already."""
+
+    def __init__(self, folder: SessionFolder) -> None:
+        super().__init__(
+            "This session was withdrawn",
+            f"The participant of {folder.name} withdrew; the data were erased.",
+            f"Nothing can be done with it; hapteq validate {folder.path} says whether anything is left.",
+        )
+
+
+def check_subject(code: str) -> str:
+    """A participant appears by a code only: letters and digits, nothing that could be a name with an address."""
+    if not is_code(code):
+        raise WrongUseError(
+            "This is no participant code",
+            f"'{code}' was given; {ALLOWED}.",
+            "Use the code from your list; names, initials with dots and e-mail addresses stay off this computer.",
+        )
+    return code
+
+
+def new_session_folder(data: Path, subject: str) -> SessionFolder:
+    """Make the participant's next folder. Never touches an existing one, also when two programs race."""
+    check_subject(subject)
+    try:
+        made = not data.exists()
+        make_folder(data, private=True)
+        close_data_folder(data)
+        for _ in range(1000):
+            taken = [folder_number(f.name) for f in session_folders(data) if f.subject == subject]
+            path = data / f"{subject}_{max(taken, default=0) + 1:03d}"
+            try:
+                path.mkdir(mode=PRIVATE_FOLDER)
+            except FileExistsError:
+                continue
+            (path / "recordings").mkdir(mode=PRIVATE_FOLDER)
+            for folder in (path, data):
+                sync_folder(folder)
+            if made:
+                with contextlib.suppress(OSError):  # not every parent may be read
+                    sync_folder(data.absolute().parent)
+            return SessionFolder(path)
+    except OSError as problem:
+        raise StudyError(
+            "The session folder cannot be made",
+            f"In {data}: {problem.strerror}.",
+            "Choose another folder with --data, or make room and check its permissions.",
+        ) from problem
+    raise StudyError("The session folder cannot be made", f"{data} is changing all the time.", "Try again.")
+
+
+def session_folders(data: Path) -> tuple[SessionFolder, ...]:
+    """All session folders below `data`, withdrawn ones included, in the order of their names."""
+    if not data.is_dir():
+        return ()
+    return tuple(SessionFolder(p) for p in sorted(data.iterdir()) if p.is_dir() and FOLDER.fullmatch(p.name))
+
+
+def folder_number(name: str) -> int:
+    match = FOLDER.fullmatch(name)
+    return int(match["number"]) if match else 0
+
+
+def find_session(session: str, data: Path) -> SessionFolder:
+    """A session by its folder or, within `data`, by its name."""
+    for path in (Path(session), data / session):
+        folder = SessionFolder(path.resolve())
+        if folder.withdrawn:
+            raise SessionWithdrawnError(folder)
+        if folder.log.exists():
+            return folder
+    known = ", ".join(f.name for f in session_folders(data) if not f.withdrawn) or "none"
+    raise WrongUseError(
+        "There is no such session",
+        f"'{session}' is neither a session folder nor the name of one in {data}. Sessions there: {known}.",
+        "Give the folder, or its name together with --data.",
+    )

@@ -1,0 +1,219 @@
+"""The log of a session: append one line, fsync, and only then act. Never rewritten, never opened over another."""
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from study.errors import StudyError
+from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
+from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained, write_chained
+from study.store.disk.atomic_write import sync_folder
+from study.store.disk.privacy import PRIVATE_FILE
+from study.store.disk.regular_file import DOCUMENT_BYTES, open_regular, read_regular
+
+LOG_NAME = "events.jsonl"
+NO_LINES = Chain()
+
+
+class EventLog:
+    """An open log. One writer at a time: hold the session's lock while one of these is open."""
+
+    def __init__(self, path: Path, descriptor: int, chain: Chain | None = NO_LINES) -> None:
+        """chain: of the lines that are there; None reads them before the first line is added."""
+        self._path = path
+        self._descriptor = descriptor
+        self._chain = chain
+
+    @classmethod
+    def create(cls, path: Path) -> "EventLog":
+        """Raises FileExistsError rather than touch an existing log."""
+        descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
+        sync_folder(path.parent)
+        _own(descriptor, path)
+        return cls(path, descriptor)
+
+    @classmethod
+    def reopen(cls, path: Path) -> "EventLog":
+        """Raises StudyError where it cannot be written to."""
+        try:
+            open_regular(path).close()  # a pipe would wait for its other end
+            descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
+        except OSError as problem:
+            raise StudyError(
+                "The session log cannot be written to",
+                f"{path.name} in {path.parent.name}: {problem.strerror}.",
+                "Check the permissions of the session's folder.",
+                saved="Nothing was changed.",
+            ) from problem
+        _own(descriptor, path)
+        return cls(path, descriptor, chain=None)
+
+    def append(self, event: Event) -> None:
+        """On return the line is on the disk. Raises StudyError, leaving the log as it was, where it is not."""
+        before = os.fstat(self._descriptor).st_size
+        if self._chain is None:
+            self._chain = read_log(self._path).chain
+        after, line = write_chained(self._chain, event_line(event).removesuffix(b"\n"))
+        try:
+            _write_all(self._descriptor, line)
+            os.fsync(self._descriptor)
+        except BaseException as problem:
+            # Also on Ctrl-C: half a line would spoil the one that comes after it.
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._descriptor, before)
+            if isinstance(problem, OSError):
+                raise _not_saved(self._path, event, problem) from problem
+            raise
+        self._chain = after
+
+    def close(self) -> None:
+        os.close(self._descriptor)
+
+
+@dataclass(frozen=True, slots=True)
+class LogContents:
+    events: tuple[Event, ...]
+    torn: str
+    """A last line that a crash left incomplete; empty where there is none."""
+    torn_bytes: int
+    chain: Chain
+    whole: bytes = field(repr=False)
+    """All whole lines, as they lie on the disk."""
+
+
+def read_log(path: Path) -> LogContents:
+    """All whole events. Only the last line may be torn; a broken line before it is an error, not a loss."""
+    try:
+        data = read_regular(path)
+    except OSError as problem:
+        raise StudyError(
+            "The session log cannot be read",
+            f"{path.name} in {path.parent.name}: {problem.strerror}.",
+            "Check the folder's name and permissions.",
+        ) from problem
+    *lines, tail = data.split(b"\n")
+    chain, events = Chain(), []
+    for line in lines:
+        chain, event = _next(path, chain, line)
+        events.append(event)
+    whole = data[: len(data) - len(tail)]
+    return LogContents(tuple(events), tail.decode("utf-8", errors="replace"), len(tail), chain, whole)
+
+
+def read_opening(path: Path) -> Event | None:
+    """The first line alone, whatever comes after it; None where it is not whole. Raises StudyError, OSError."""
+    if not path.exists():
+        return None
+    with open_regular(path) as file:
+        line = file.readline(DOCUMENT_BYTES)
+    return _next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
+
+
+def readable_events(path: Path) -> tuple[Event, ...]:
+    """The events before the first damage, for whoever wants to look at a log that cannot be used. Raises nothing."""
+    chain, events = Chain(), list[Event]()
+    try:
+        for line in read_regular(path).split(b"\n")[:-1]:
+            chain, event = read_chained(chain, line)
+            events.append(parse_event(event))
+    except (OSError, ValueError):
+        pass  # here the damage begins; whoever reads this knows of it
+    return tuple(events)
+
+
+def mend(path: Path, contents: LogContents) -> None:
+    """Cut off a torn last line, so that the next fact starts on a line of its own."""
+    if not contents.torn_bytes:
+        return
+    descriptor = os.open(path, os.O_WRONLY)
+    try:
+        os.ftruncate(descriptor, os.fstat(descriptor).st_size - contents.torn_bytes)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _own(descriptor: int, path: Path) -> None:
+    """A second lock, on the log itself: the lock file might be deleted while its holder still writes."""
+    try:
+        import fcntl
+    except ImportError:  # Windows; the lock file is all there is
+        return
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as problem:
+        os.close(descriptor)
+        raise StudyError(
+            "This session is running elsewhere",
+            f"Another program is writing to {path.parent.name}.",
+            "Close it there first.",
+            saved="Nothing was changed.",
+        ) from problem
+    except OSError:
+        return  # a network folder without such locks: the lock file has to do
+
+
+@contextlib.contextmanager
+def nobody_writes(path: Path) -> Iterator[None]:
+    """Hold the lock of a log that is to be erased, where there is one. Raises StudyError while somebody writes it."""
+    if not path.exists():
+        yield
+        return
+    log = EventLog.reopen(path)
+    try:
+        yield
+    finally:
+        log.close()
+
+
+def _next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
+    """The event of the line that follows, without its line end. Raises StudyError."""
+    try:
+        after, event = read_chained(chain, line)
+        return after, parse_event(event)
+    except ValueError as problem:
+        number = chain.lines + 1
+        if number == 1 and _is_newer(line):
+            raise StudyError(
+                "This session was written by a newer hapteq",
+                f"The log of {path.parent.name} is of a version that this program does not know.",
+                "Use the hapteq that began it, or a newer one.",
+                saved="Nothing was changed.",
+            ) from problem
+        wrong, whole = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
+        if isinstance(problem, ChainBrokenError):
+            wrong = f"{problem}"
+            if number > 1 and not chain.since:  # what came before has its first checksum here
+                wrong, whole = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
+        raise StudyError(
+            "The session log is damaged",
+            f"Line {number} of {path.name} in {path.parent.name} {wrong}.",
+            "Keep the folder as it is and restore the file from a copy; nothing was changed.",
+            saved=whole,
+        ) from problem
+
+
+def _is_newer(line: bytes) -> bool:
+    try:
+        opening = json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    known = isinstance(opening, dict) and opening.get("format") == SESSION_FORMAT
+    return known and opening.get("version") != SESSION_VERSION
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    while data:
+        data = data[os.write(descriptor, data) :]
+
+
+def _not_saved(path: Path, event: Event, problem: OSError) -> StudyError:
+    return StudyError(
+        "The session cannot be written to disk",
+        f"Writing '{event.event.replace('_', ' ')}' to {path.name} of {path.parent.name} failed: {problem.strerror}.",
+        "Make room or mend the disk.",
+        saved="Everything logged before is on disk.",
+    )

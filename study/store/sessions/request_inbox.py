@@ -1,0 +1,170 @@
+"""What reaches a running session from beside it: one small file per request, in a folder of the session.
+
+Whoever asks writes a file under a name of its own and renames it into place; the session looks, reads, removes.
+A name begins with what is asked, so that a stop is a stop even where its content cannot be read.
+"""
+
+import errno
+import itertools
+import json
+import os
+import secrets
+import stat
+import time
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, get_args
+
+from study.errors import StudyError
+from study.session.watching.requests import NoteAsked, PauseAsked, Request, StopAsked, Who
+from study.store.disk.privacy import PRIVATE_FOLDER, write_private
+from study.store.disk.real_folder import is_real_folder
+from study.store.disk.strict_json import load_json
+
+REQUESTS_NAME = "requests"
+REQUEST_FORMAT = "hapteq-request"
+REQUEST_VERSION = 1
+
+KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
+_STOP = "stop"
+_NOTE = "note-"
+_WHO = get_args(Who)
+_LARGEST = 1 << 16
+"""Bytes of a request that are read; a note is a sentence or two."""
+_AT_ONCE = 50
+"""Requests taken in one look: the session's own loop must not wait for a flood."""
+_counter = itertools.count()
+
+
+class RequestInbox:
+    """Implements `study.workflows.trial.requests_port.Requests`. Any number may send; one session takes."""
+
+    def __init__(self, session: Path) -> None:
+        self._folder = session / REQUESTS_NAME
+        self._passed_over: set[str] = set()
+        """Names that could be neither used nor removed: looked at once, not twenty times a second."""
+
+    def send(self, request: Request) -> str:
+        """Returns the request's name, for `unread` and `take_back`. Raises StudyError where it cannot be written."""
+        kind = next(word for word, known in KINDS.items() if isinstance(request, known))
+        key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
+        name = f"{kind}-{key}.json"
+        document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
+        part = self._folder / f".{name}.part"
+        try:
+            self._make_folder()
+            # No fsync: a request is for now, and nobody wants it after a power cut.
+            write_private(part, f"{json.dumps(document)}\n".encode())
+            part.replace(self._folder / name)
+        except OSError as problem:
+            raise StudyError(
+                "The session could not be reached",
+                f"A {kind} could not be put into {self._folder}: {problem.strerror}.",
+                "Use the keys of the participant's screen, or switch the device off.",
+            ) from problem
+        return name
+
+    def unread(self, name: str) -> bool:
+        """Whether the session has not taken this request yet."""
+        return (self._folder / name).exists()
+
+    def take_back(self, name: str) -> bool:
+        """Remove a request that nobody took. False where it was taken after all."""
+        try:
+            (self._folder / name).unlink()
+        except OSError:
+            return False
+        return True
+
+    def clear(self) -> None:
+        """At the start of a sitting: yesterday's stop must not end today's. Notes that nobody took any more are kept:
+        they are still for the log. Never raises."""
+        try:
+            self._make_folder()
+            names = os.listdir(self._folder)  # noqa: PTH208
+        except OSError:
+            return
+        for name in names:
+            if not name.startswith(_NOTE):
+                self._remove(name)
+
+    def take(self) -> tuple[Request, ...]:
+        """Stops first, then the oldest first; what was taken is removed. Never raises."""
+        try:
+            # listdir takes half the time of Path.iterdir, twenty times a second.
+            present = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
+        except OSError:
+            return ()
+        names = sorted((n for n in present if n[0] != "." and n not in self._passed_over), key=_stops_then_oldest)
+        return tuple(request for name in names[:_AT_ONCE] if (request := self._take_one(name)) is not None)
+
+    def _make_folder(self) -> None:
+        """Raises OSError; also where it is a link: what that leads to is not the session's, and would be removed."""
+        self._folder.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
+        if not is_real_folder(self._folder):
+            raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
+
+    def _take_one(self, name: str) -> Request | None:
+        request = _parsed(_content(self._folder / name))
+        if request is None and name.startswith(_STOP):
+            request = StopAsked("experimenter")
+        if request is None:
+            self._set_aside(name)
+        else:
+            self._remove(name)
+        return request
+
+    def _remove(self, name: str) -> None:
+        try:
+            (self._folder / name).unlink()
+        except OSError:
+            self._passed_over.add(name)
+
+    def _set_aside(self, name: str) -> None:
+        """Under a hidden name, for whoever wants to know what it was."""
+        try:
+            (self._folder / name).rename(self._folder / f".unusable-{name}")
+        except OSError:
+            self._passed_over.add(name)
+
+
+def _stops_then_oldest(name: str) -> tuple[bool, str]:
+    return not name.startswith(_STOP), name.partition("-")[2]
+
+
+def _content(path: Path) -> bytes:
+    """Empty where it is no plain file: opening a pipe would wait for its other end."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+    except OSError:
+        return b""
+    try:
+        plain = stat.S_ISREG(os.fstat(descriptor).st_mode)
+        return os.read(descriptor, _LARGEST) if plain else b""
+    except OSError:
+        return b""
+    finally:
+        os.close(descriptor)
+
+
+def _parsed(content: bytes) -> Request | None:
+    try:
+        document = load_json(content)
+    except ValueError:
+        return None
+    if not isinstance(document, dict) or document.pop("format", None) != REQUEST_FORMAT:
+        return None
+    kind = KINDS.get(str(document.pop("request", None)))
+    if document.pop("version", None) != REQUEST_VERSION or kind is None or not _fits(kind, document):
+        return None
+    return kind(**document)
+
+
+def _fits(kind: type[Request], values: dict[str, Any]) -> bool:
+    known = {"who": str, "text": str, "adverse": bool}
+    wanted = {field.name for field in fields(kind)}
+    return (
+        values.keys() == wanted
+        and all(isinstance(value, known[name]) for name, value in values.items())
+        and values["who"] in _WHO
+    )

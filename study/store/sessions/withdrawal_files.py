@@ -1,0 +1,117 @@
+"""What stands for a participant's sessions from the moment of withdrawal: first the intent, then a tombstone each.
+
+The intent is one file in the data folder. As long as it is there, erasing is not finished, and no session of the
+participant counts as data any more, whatever is still there of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from study.errors import StudyError
+from study.store.disk.json_document import read_json, write_json
+from study.store.disk.real_folder import is_real_file, is_real_folder, opened_folder
+from study.store.sessions.archive import FOLDER, SessionFolder, withdrawal_file
+from study.store.sessions.session_lock import LOCK_NAME
+
+TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
+WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """What a session folder says of the participant who began it: nothing measured."""
+
+    protocol: str
+    simulated: bool
+    number: int | None
+    """The place in the balanced order; None where none was taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Intent:
+    """What is about to be erased, as it was proved before anything was."""
+
+    subject: str
+    withdrawn_utc: str
+    sessions: Mapping[str, Begun | None]
+    derived: tuple[str, ...]
+    """Files and folders beside the sessions, relative to the data folder."""
+
+
+def write_intent(data: Path, intent: Intent) -> None:
+    """On return it is on the disk."""
+    path = withdrawal_file(data, intent.subject)
+    write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
+
+
+def read_intent(data: Path, subject: str) -> Intent | None:
+    """None where there is none, or none that can be used: what it would name is then found anew. Raises nothing."""
+    path = withdrawal_file(data, subject)
+    if not is_real_file(path):
+        return None
+    try:
+        left = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
+        sessions = {str(name): _begun(begun) for name, begun in left["sessions"].items() if _of(name, subject)}
+        derived = tuple(str(name) for name in left["derived"] if _inside(str(name)))
+        return Intent(subject, str(left["withdrawn_utc"]), sessions, derived)
+    except (StudyError, AttributeError, KeyError, TypeError):
+        return None
+
+
+def write_tombstone(folder: SessionFolder, withdrawn_utc: str, begun: Begun | None) -> None:
+    """In the place of all else. One that is there stays as it is."""
+    if not is_real_file(folder.tombstone):
+        left = {"session": folder.name, "withdrawn_utc": withdrawn_utc, "begun": asdict(begun) if begun else None}
+        write_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION, left, overwrite=True)
+
+
+def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
+    """Empty where there is none, or none that can be read. Raises nothing."""
+    try:
+        return read_json(folder.tombstone, TOMBSTONE_FORMAT, TOMBSTONE_VERSION)
+    except StudyError:
+        return {}
+
+
+def begun_of_tombstone(folder: SessionFolder) -> Begun | None:
+    return _begun(read_tombstone(folder).get("begun"))
+
+
+def not_erased(folder: SessionFolder) -> tuple[str, ...]:
+    """What is still there in the folder of a session that was withdrawn; folders end in a slash. Raises nothing."""
+    try:
+        with opened_folder(folder.path) as place:
+            names = [name for name in place.names() if name not in (folder.tombstone.name, LOCK_NAME)]
+    except OSError:
+        return ()
+    return tuple(f"{name}/" if is_real_folder(folder.path / name) else name for name in names)
+
+
+def how_to_finish(folder: SessionFolder) -> str:
+    """Empty where a withdrawal left nothing; else what is still there, and the command that goes on."""
+    left = not_erased(folder)
+    if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
+        return ""
+    still = f"Still there: {', '.join(left)}. " if left else ""
+    return f"{still}Go on with: hapteq withdraw {folder.name} --data {folder.path.parent}"
+
+
+def _begun(left: Any) -> Begun | None:
+    try:
+        return Begun(**left) if left else None
+    except TypeError:
+        return None
+
+
+def _of(name: Any, subject: str) -> bool:
+    match = FOLDER.fullmatch(str(name))
+    return match is not None and match["subject"] == subject
+
+
+def _inside(name: str) -> bool:
+    path = PurePosixPath(name)
+    if not path.parts or path.is_absolute() or ".." in path.parts:
+        return False
+    return FOLDER.fullmatch(path.parts[0]) is None  # what is in a session goes with it, or is another's

@@ -1,0 +1,41 @@
+"""Which folders outside a data folder hold numbers of its participants: noted, so that a withdrawal can name them."""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from study.store.disk.atomic_write import write_atomically
+from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.real_folder import is_real_file
+from study.store.disk.regular_file import DOCUMENT_BYTES, read_regular
+from study.store.sessions.archive import FOLDER
+
+WRITTEN_ELSEWHERE = "written_elsewhere.txt"
+
+
+def note_written(source: Path, out: Path) -> None:
+    """A line with the absolute path of `out`, where a withdrawal would not find it by itself.
+
+    source: a data folder, or a session's in it. Data that may only be read are left alone.
+    """
+    out, source = out.resolve(), source.resolve()
+    data = source.parent if FOLDER.fullmatch(source.name) else source
+    known = written_elsewhere(data)
+    beside = out.relative_to(data).parts if out.is_relative_to(data) else None
+    found = beside is not None and (len(beside) < 2 or FOLDER.fullmatch(beside[0]) is not None)
+    if found or out in known:
+        return
+    text = "".join(f"{path}\n" for path in (*known, out))
+    with suppress(CannotWriteError):  # names as the system has them, which need not be UTF-8
+        write_atomically(data / WRITTEN_ELSEWHERE, os.fsencode(text), overwrite=True)
+
+
+def written_elsewhere(data: Path) -> tuple[Path, ...]:
+    """Empty where nothing was noted, or the note cannot be read."""
+    note = data / WRITTEN_ELSEWHERE
+    if not is_real_file(note):
+        return ()
+    try:
+        return tuple(Path(line) for line in os.fsdecode(read_regular(note, DOCUMENT_BYTES)).split("\n") if line)
+    except OSError:
+        return ()

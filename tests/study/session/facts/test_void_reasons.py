@@ -1,0 +1,66 @@
+"""Which void trials the computer is to blame for, and what people read of them."""
+
+import pytest
+
+from study.devices.device import Fault, Health
+from study.session.facts.void_reasons import (
+    SCREEN_LATE,
+    SCREEN_SILENT,
+    busy_sentence,
+    computer_too_busy,
+    void_for_participant,
+    why_screen_silent,
+    why_too_many,
+)
+from study.workflows.trial.judge_trial import judge
+
+MISSED = "12.0 % of the 1 kHz ticks were missed"
+
+
+@pytest.mark.parametrize(
+    ("engine_late_s", "load", "why"),
+    [
+        (0.0, 0.1, SCREEN_SILENT),
+        (0.0, None, SCREEN_SILENT),
+        (0.0, 2.0, SCREEN_LATE),
+        (0.3, 0.1, SCREEN_LATE),
+        (0.3, None, SCREEN_LATE),
+    ],
+)
+def test_a_silent_screen_is_put_down_to_the_computer_only_where_something_shows_it(engine_late_s, load, why):
+    assert why_screen_silent(engine_late_s, load) == why
+
+
+def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol):
+    late = judge(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), small_protocol.measurement, True)
+    assert late.spoiled == MISSED
+    for reason in (SCREEN_LATE, Fault.STALLED.value, late.spoiled):
+        assert computer_too_busy(reason)
+        words = void_for_participant(reason)
+        assert words.startswith("The computer was too busy for a moment")
+        assert words.endswith("This was not your fault, and the trial is repeated.")
+    for reason in (SCREEN_SILENT, Fault.LOST.value, "the participant asked for it again", ""):
+        assert not computer_too_busy(reason)
+
+
+def test_a_silent_screen_is_not_the_participants_fault_either():
+    words = void_for_participant(SCREEN_SILENT)
+    assert "it was stopped, or the computer was too busy" in words
+    assert words.endswith("This was not your fault, and the trial is repeated.")
+    assert void_for_participant("the handle was let go") == "It is void: the handle was let go."
+
+
+def test_three_void_trials_end_a_sitting_for_the_reason_that_they_had():
+    busy = "the computer is too busy: 3 trials in a row were void because of it, not because of the participant"
+    assert why_too_many((SCREEN_LATE, SCREEN_LATE, MISSED)) == f"{busy} (the last because {MISSED})"
+    assert why_too_many((SCREEN_LATE, MISSED, Fault.STALLED.value)).startswith(busy)
+    mixed = why_too_many((SCREEN_LATE, SCREEN_LATE, SCREEN_SILENT))
+    assert mixed.endswith("the last because the screen gave no sign of life: the computer may be too busy")
+    away = why_too_many((SCREEN_LATE, MISSED, "no answer within the time limit"))
+    assert away == "3 trials in a row were void, the last because no answer within the time limit"
+
+
+def test_the_experimenter_reads_how_many():
+    assert busy_sentence(1).startswith("The computer was too busy: 1 trial was void because of it in this sitting")
+    assert "3 trials were void" in busy_sentence(3)
+    assert busy_sentence(3).endswith("hapteq doctor measures how late it is.")

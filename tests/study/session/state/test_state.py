@@ -1,0 +1,295 @@
+"""The fold of a session, driven by hand-made facts."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from protocols.hashing import protocol_hash
+from protocols.staircase import begin, level_n, step
+from protocols.trial import Phase, TrialStatus
+from study.session.facts.events import (
+    AnswerGiven,
+    DeviceFacts,
+    RestTaken,
+    SessionClosed,
+    SessionInterrupted,
+    SessionOpened,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+    event_line,
+    parse_event,
+)
+from study.session.state.draw_check import LogContradiction
+from study.session.state.fold import apply, begin_session
+from study.session.state.machine import Finish, Present, Rest, next_action
+
+UTC = "2026-01-01T00:00:00.000+00:00"
+
+
+def opened(protocol, text, **changes):
+    facts = {
+        "utc": UTC,
+        "format": "hapteq-session",
+        "version": 1,
+        "session": "P01_001",
+        "subject": "P01",
+        "participant_number": 0,
+        "observer": None,
+        "protocol_text": text,
+        "protocol_hash": protocol_hash(protocol),
+        "protocol_locked": False,
+        "seed": 7,
+        "device": DeviceFacts("a device", simulated=False, sample_rate_hz=1000.0),
+        "equalizer": "none",
+        "versions": {"hapteq": "0"},
+    }
+    return SessionOpened(**(facts | changes))
+
+
+def presented(action: Present) -> TrialPresented:
+    return TrialPresented(
+        utc=UTC,
+        run=action.run,
+        trial=action.trial,
+        attempt=action.attempt,
+        phase=action.phase,
+        frequency_hz=action.frequency_hz,
+        level_db=action.level_db,
+        level_n=action.level_n,
+        direction=action.label,
+        angle_deg=action.angle_deg,
+        polarity=action.polarity,
+    )
+
+
+def answered(action: Present, correct: bool) -> AnswerGiven:
+    answer = action.label if correct else 3 - action.label
+    return AnswerGiven(UTC, action.run, action.trial, action.attempt, answer, response_time_s=1.0)
+
+
+def measured(action: Present) -> TrialMeasured:
+    return TrialMeasured(UTC, action.run, action.trial, action.attempt, "ok", missed_ticks=0)
+
+
+def one_trial(state, correct: bool):
+    """Present, answer, measure; rests on the way."""
+    action = next_action(state)
+    if isinstance(action, Rest):
+        state = apply(state, RestTaken(UTC, state.run, state.trial, rested_s=action.seconds))
+        action = next_action(state)
+    for event in (presented(action), answered(action, correct), measured(action)):
+        state = apply(state, event)
+    return state
+
+
+@pytest.fixture
+def fresh(small_protocol, small_text):
+    return begin_session(opened(small_protocol, small_text), small_protocol)
+
+
+def test_training_comes_first_and_ends_at_its_trial_limit(fresh):
+    state = fresh
+    for _ in range(4):
+        assert next_action(state).phase is Phase.TRAINING
+        state = one_trial(state, correct=True)
+    assert next_action(state) == Rest(2.0)
+
+
+def test_a_session_of_right_and_wrong_answers_comes_to_its_end(fresh):
+    state = fresh
+    answers = iter([True, True, True, False] * 100)
+    while not isinstance(next_action(state), Finish):
+        state = one_trial(state, next(answers))
+    assert {t.phase for t in state.trials} == {Phase.TRAINING, Phase.TEST}
+    assert {t.frequency_hz for t in state.trials if t.phase is Phase.TEST} == {25.0, 35.0}
+    assert apply(state, SessionClosed(UTC, "completed")).closed
+
+
+def test_a_spoiled_trial_is_drawn_again_at_the_same_level_and_moves_nothing(fresh):
+    action = next_action(fresh)
+    state = apply(fresh, presented(action))
+    state = apply(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault"))
+    again = next_action(state)
+    assert (again.trial, again.attempt, again.level_n) == (action.trial, action.attempt + 1, action.level_n)
+    assert state.trials[0].status is TrialStatus.SPOILED
+    assert state.staircase == fresh.staircase
+
+
+def test_an_answer_moves_the_staircase_only_when_the_trial_is_closed(fresh):
+    action = next_action(fresh)
+    state = apply(apply(fresh, presented(action)), answered(action, correct=False))
+    assert state.staircase == fresh.staircase
+    assert state.answers == 1
+    closed = apply(state, measured(action))
+    assert closed.staircase.level_db == pytest.approx(4.0)
+
+
+def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fresh):
+    action = next_action(fresh)
+    state = apply(apply(fresh, presented(action)), answered(action, correct=False))
+    state = apply(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "the device let go"))
+    assert state.answers == 0
+    assert state.staircase == fresh.staircase
+    assert state.trials[0].answer is not None
+
+
+def test_a_level_that_the_rules_do_not_give_is_a_contradiction(fresh):
+    wrong = replace(presented(next_action(fresh)), level_n=1.1)
+    with pytest.raises(LogContradiction, match=r"level_n 1\.1 where 1\.0 is due: .*different rules"):
+        apply(fresh, wrong)
+
+
+@pytest.mark.parametrize("field", ["direction", "angle_deg", "polarity", "level_db", "frequency_hz", "phase"])
+def test_no_part_of_a_draw_can_be_changed_in_the_log(fresh, field):
+    right = presented(next_action(fresh))
+    other = {
+        "direction": 3 - right.direction,
+        "angle_deg": right.angle_deg + 90.0,
+        "polarity": -right.polarity,
+        "level_db": right.level_db + 1.0,
+        "frequency_hz": 25.0,
+        "phase": Phase.TEST,
+    }
+    with pytest.raises(LogContradiction, match=f"presented with {field} "):
+        apply(fresh, replace(right, **{field: other[field]}))
+
+
+def test_the_last_bit_of_a_level_may_differ_between_machines(fresh):
+    right = presented(next_action(fresh))
+    assert apply(fresh, replace(right, level_n=right.level_n * (1 + 1e-15))).presented is not None
+
+
+def test_a_session_cannot_be_closed_before_its_last_run(fresh):
+    with pytest.raises(LogContradiction, match="before its last run was finished"):
+        apply(fresh, SessionClosed(UTC, "completed"))
+
+
+def test_a_rest_that_was_not_due_is_a_contradiction(fresh):
+    with pytest.raises(LogContradiction, match="none was due"):
+        apply(fresh, RestTaken(UTC, 0, 0, rested_s=5.0))
+
+
+@pytest.mark.parametrize("change", [{"run": 1}, {"trial": 1}, {"attempt": 1}])
+def test_a_trial_out_of_turn_is_a_contradiction(fresh, change):
+    with pytest.raises(LogContradiction, match="was due"):
+        apply(fresh, replace(presented(next_action(fresh)), **change))
+
+
+def test_an_answer_without_a_trial_is_a_contradiction(fresh):
+    with pytest.raises(LogContradiction, match="which is not open"):
+        apply(fresh, answered(next_action(fresh), correct=True))
+
+
+def test_a_second_answer_to_a_trial_is_a_contradiction(fresh):
+    action = next_action(fresh)
+    state = apply(apply(fresh, presented(action)), answered(action, correct=True))
+    with pytest.raises(LogContradiction, match="answered twice"):
+        apply(state, answered(action, correct=False))
+
+
+def test_a_measurement_before_the_answer_is_a_contradiction(fresh):
+    action = next_action(fresh)
+    with pytest.raises(LogContradiction, match="measured before it was answered"):
+        apply(apply(fresh, presented(action)), measured(action))
+
+
+def finished_session(fresh):
+    state = fresh
+    answers = iter([True, True, True, False] * 100)
+    while not isinstance(next_action(state), Finish):
+        state = one_trial(state, next(answers))
+    return apply(state, SessionClosed(UTC, "completed"))
+
+
+def test_an_interruption_at_the_very_end_does_not_spoil_a_finished_session(fresh):
+    """As a Ctrl-C right after the last line left it."""
+    closed = finished_session(fresh)
+    assert apply(closed, SessionInterrupted(UTC, "interrupted at the keyboard")).closed
+
+
+def test_nothing_else_follows_the_closing(fresh):
+    closed = finished_session(fresh)
+    with pytest.raises(LogContradiction, match="after the session was closed"):
+        apply(closed, SessionClosed(UTC, "completed"))
+
+
+def test_a_session_is_opened_once(fresh):
+    with pytest.raises(LogContradiction, match="opened twice"):
+        apply(fresh, fresh.opened)
+
+
+def test_an_open_trial_must_be_closed_before_the_next_action(fresh):
+    with pytest.raises(ValueError, match="a trial is open"):
+        next_action(apply(fresh, presented(next_action(fresh))))
+
+
+def test_swapped_labels_change_the_number_and_not_the_device(small_protocol, small_text):
+    swapping = replace(small_protocol, schedule=replace(small_protocol.schedule, labels="swapped_for_half"))
+    first = next_action(begin_session(opened(swapping, small_text, participant_number=0), swapping))
+    second = next_action(begin_session(opened(swapping, small_text, participant_number=1), swapping))
+    assert first.direction == second.direction
+    assert {first.label, second.label} == {1, 2}
+
+
+def test_who_felt_what(small_protocol, small_text):
+    simulated = DeviceFacts("sim", simulated=True, sample_rate_hz=1000.0)
+    cases = {
+        True: opened(small_protocol, small_text),
+        False: opened(small_protocol, small_text, device=simulated),
+        None: opened(small_protocol, small_text, device=simulated, observer="ideal"),
+    }
+    for expected, line in cases.items():
+        state = begin_session(line, small_protocol)
+        assert apply(state, presented(next_action(state))).trials[0].felt is expected
+
+
+def test_every_event_survives_its_line(fresh):
+    action = next_action(fresh)
+    events = [
+        fresh.opened,
+        presented(action),
+        answered(action, correct=True),
+        measured(action),
+        TrialSpoiled(UTC, 0, 0, 0, "a fault", missed_ticks=3),
+        RestTaken(UTC, 1, 0, rested_s=61.5),
+        SessionClosed(UTC, "completed"),
+    ]
+    for event in events:
+        line = event_line(event)
+        assert line.endswith(b"\n")
+        assert line.count(b"\n") == 1
+        assert parse_event(line) == event
+
+
+@given(st.lists(st.booleans(), max_size=60))
+@settings(max_examples=30, deadline=None)
+def test_folding_gives_the_levels_of_the_staircase_alone(answers):
+    protocol, text = _small()
+    state = begin_session(opened(protocol, text), protocol)
+    while state.run == 0:
+        state = one_trial(state, correct=True)
+    expected = begin(protocol.staircase)
+    for correct in answers:
+        if state.run != 1:
+            break
+        before = next_action(state) if not isinstance(next_action(state), Rest) else None
+        if before is not None:
+            assert before.level_n == level_n(protocol.staircase, expected)
+        state = one_trial(state, correct)
+        expected = step(protocol.staircase, expected, correct)
+
+
+def _small():
+    from protocols.loading import load_protocol
+
+    text = (
+        'name = "small"\nkind = "study"\ntitle = "t"\n[stimulus]\nfrequencies_hz = [25.0]\n'
+        "[staircase]\nstart_n = 1.0\ncap_n = 3.0\nup_after_wrong = 1\ndown_after_right = 3\n"
+        "steps = [{ step_db = 4.0, reversals = 3 }, { step_db = 1.0, reversals = 10 }]\n"
+        "reversals = 13\naveraged_reversals = 10\n[directions]\n"
+        "[safety]\nstimulus_cap_n = 3.0\ntotal_cap_n = 4.5\n[training]\nfrequencies_hz = [5.0]\ntrial_limit = 1\n"
+    )
+    return load_protocol(text, "small"), text

@@ -1,0 +1,73 @@
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study.session.state.vibration_dose import (
+    NO_DOSE,
+    Dose,
+    a8_mps2,
+    add,
+    amplitude_that_fits_mps2,
+    hand_arm_weight,
+)
+
+ISO_5349_1 = {
+    6.3: 0.727, 8: 0.873, 10: 0.951, 12.5: 0.958, 16: 0.896, 20: 0.782, 25: 0.647, 31.5: 0.519, 40: 0.411, 50: 0.324,
+    63: 0.256, 80: 0.202, 100: 0.160, 125: 0.127, 160: 0.101, 200: 0.0799, 250: 0.0634, 315: 0.0503, 400: 0.0398,
+    500: 0.0314, 630: 0.0245, 800: 0.0186, 1000: 0.0135, 1250: 0.00894,
+}  # fmt: skip
+"""Factors of the standard, table A.2, by nominal one-third-octave frequency."""
+
+
+@pytest.mark.parametrize(("nominal_hz", "factor"), ISO_5349_1.items())
+def test_the_filter_gives_the_tabulated_factor_of_each_third_octave(nominal_hz: float, factor: float) -> None:
+    exact_hz = 10 ** (round(10 * math.log10(nominal_hz)) / 10)
+    assert hand_arm_weight(exact_hz) == pytest.approx(factor, rel=0.005)
+
+
+def test_below_the_standard_the_filter_goes_on_falling() -> None:
+    assert hand_arm_weight(5.0) == pytest.approx(0.545, abs=0.01)
+    assert hand_arm_weight(2.0) < hand_arm_weight(4.0) / 3.5
+
+
+@pytest.mark.parametrize("frequency_hz", [0.0, -5.0])
+def test_without_a_frequency_there_is_no_weight(frequency_hz: float) -> None:
+    with pytest.raises(ValueError, match="above 0 Hz"):
+        hand_arm_weight(frequency_hz)
+
+
+def test_eight_hours_give_the_weighted_rms_itself() -> None:
+    dose = add(NO_DOSE, 12.5, 4.0, 8 * 3600.0)
+    assert a8_mps2(dose) == pytest.approx(hand_arm_weight(12.5) * 4.0 / math.sqrt(2))
+
+
+def test_a_quarter_of_the_time_halves_the_exposure() -> None:
+    whole, quarter = (add(NO_DOSE, 35.0, 10.0, seconds) for seconds in (1200.0, 300.0))
+    assert a8_mps2(quarter) == pytest.approx(a8_mps2(whole) / 2)
+
+
+def test_time_without_a_measured_amplitude_is_told_apart() -> None:
+    dose = add(add(NO_DOSE, 25.0, None, 7.0), 25.0, 0.0, 3.0)
+    assert dose == Dose(squared_s=0.0, vibrated_s=10.0, unmeasured_s=7.0)
+
+
+def test_a_negative_time_is_refused() -> None:
+    with pytest.raises(ValueError, match="0 s or longer"):
+        add(NO_DOSE, 25.0, 1.0, -1.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(5, 60), st.floats(0, 30), st.floats(1, 3600))
+def test_what_still_fits_reaches_the_limit_and_not_more(frequency_hz: float, before: float, seconds: float) -> None:
+    dose = add(NO_DOSE, 15.0, before, 600.0)
+    fits = amplitude_that_fits_mps2(dose, 5.0, frequency_hz, seconds)
+    assert a8_mps2(add(dose, frequency_hz, fits, seconds)) == pytest.approx(5.0)
+
+
+def test_nothing_fits_where_the_limit_is_reached() -> None:
+    dose = add(NO_DOSE, 15.0, 100.0, 3600.0)
+    assert amplitude_that_fits_mps2(dose, 2.5, 15.0, 1.0) == 0.0
+    with pytest.raises(ValueError, match="must be above 0"):
+        amplitude_that_fits_mps2(dose, 2.5, 15.0, 0.0)

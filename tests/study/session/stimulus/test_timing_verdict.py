@@ -1,0 +1,62 @@
+"""The verdict on a computer's timing: it follows from the figures, and never says fine beside too late."""
+
+import random
+
+import numpy as np
+import pytest
+
+from study.session.stimulus.timing_verdict import judge_lateness, judge_load, judge_missed, lateness_of
+
+
+def finding(late_ms, simulated: bool, rate_hz: float = 1000.0):
+    return judge_lateness(lateness_of(np.asarray(late_ms) / 1000.0, rate_hz), simulated)
+
+
+def test_the_figures_are_those_of_the_measurement():
+    lateness = lateness_of(np.arange(101) / 1000.0 / 100.0, 1000.0)
+    assert (lateness.median_ms, lateness.p99_ms, lateness.longest_ms) == pytest.approx((0.5, 0.99, 1.0))
+    assert lateness.missing_a_tick == 0.0
+    assert not lateness.too_late
+    with pytest.raises(ValueError, match="no wake-up"):
+        lateness_of(np.array([]), 1000.0)
+
+
+def test_99_of_100_wake_ups_must_come_within_a_tick():
+    assert finding([0.1] * 995 + [60.0] * 5, simulated=False).fine
+    late = finding([0.1] * 985 + [60.0] * 15, simulated=False)
+    assert late.wrong and late.advice.startswith("Close other programs")
+    assert finding([1.5] * 100, simulated=False, rate_hz=500.0).fine
+    assert finding([2.5] * 100, simulated=False, rate_hz=500.0).wrong
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_no_verdict_says_fine_of_what_is_too_late(seed):
+    draw = random.Random(seed)
+    scale_ms = 10 ** draw.uniform(-2, 2.5)
+    late_ms = [draw.choice((0.0, draw.expovariate(1 / scale_ms))) for _ in range(draw.randint(1, 300))]
+    for simulated in (True, False):
+        said = finding(late_ms, simulated)
+        too_late = bool(np.percentile(late_ms, 99) >= 1.0)
+        assert said.fine is not too_late, f"seed {seed}"
+        assert ("too late" in said.value) is too_late
+        assert said.warning is (too_late and simulated)
+        assert bool(said.advice) is too_late
+        assert said.verdict == (("warn" if simulated else "look") if too_late else "ok")
+
+
+def test_a_measurement_that_is_no_number_is_not_fine():
+    assert not finding([float("nan")] * 5, simulated=True).fine
+    assert not judge_load(float("nan")).fine
+
+
+def test_load_is_a_warning_and_never_more():
+    assert judge_load(0.75).fine
+    assert judge_load(None).fine
+    busy = judge_load(3.36)
+    assert (busy.fine, busy.warning) == (False, True)
+    assert busy.value == "336% of what its processors can do, over the last minute; above 75% trials may be cut short"
+
+
+def test_missed_ticks_of_a_real_loop():
+    assert judge_missed(1, 1000, simulated=False).fine
+    assert judge_missed(2, 1000, simulated=False).wrong

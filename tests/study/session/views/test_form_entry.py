@@ -1,0 +1,92 @@
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study.session.views.form_entry import (
+    MOST_CHARACTERS,
+    FormEntry,
+    blank_entry,
+    click_choice,
+    click_continue,
+    paste,
+    press,
+    reply_of,
+)
+from study.session.views.form_views import Form, FormField, FormKind, missing
+
+YES_NO = ("yes", "no")
+EXCLUSION = Form(FormKind.EXCLUSION, "T", "", tuple(FormField(f"q{i}", f"Question {i}", YES_NO) for i in range(3)))
+TEXT = Form(FormKind.DEBRIEF, "T", "", (FormField("free", "Free?", needed=False), FormField("grip", "Grip?")))
+LONG = ("ear plugs", "ear muffs", "masking noise")
+SETUP = Form(FormKind.SETUP, "T", "", (FormField("hearing", "What?", LONG), FormField("hand", "Which?", YES_NO)))
+
+
+def typed(form: Form, *keys: str, stacked: bool = False, entry: FormEntry | None = None) -> FormEntry:
+    entry = blank_entry(form) if entry is None else entry
+    for key in keys:
+        entry = press(entry, key, key if len(key) == 1 else None, stacked) or entry
+    return entry
+
+
+def test_each_answer_belongs_to_the_question_at_which_its_key_came():
+    entry = typed(EXCLUSION, "1", "enter", "2", "enter", "1", "enter", "enter")
+    assert entry.sent
+    assert reply_of(entry).answers == {"q0": "yes", "q1": "no", "q2": "yes"}
+
+
+def test_enter_alone_answers_nothing_and_sends_nothing():
+    assert typed(EXCLUSION, *["enter"] * 9) == blank_entry(EXCLUSION)
+
+
+def test_it_is_not_sent_while_an_answer_is_missing():
+    entry = typed(EXCLUSION, "1", "down", "down", "2", "down", "enter")
+    assert (entry.sent, entry.at, entry.open) == (False, 1, (1,))
+    assert typed(EXCLUSION, "n", entry=entry).open == ()
+
+
+def test_a_changed_choice_is_looked_at_once_more_before_an_exclusion_is_sent():
+    entry = typed(EXCLUSION, "1", "2", "enter", "2", "enter", "2", "enter", "enter")
+    assert (entry.sent, entry.at, entry.check) == (False, 0, (0,))
+    again = typed(EXCLUSION, "down", "down", "down", "enter", entry=entry)
+    assert again.sent and reply_of(again).answers == {"q0": "no", "q1": "no", "q2": "no"}
+    assert typed(SETUP, "1", "2", "enter", "1", "enter", "enter").sent
+
+
+def test_up_and_down_go_through_choices_below_each_other_first():
+    entry = typed(SETUP, "down", "down", stacked=True)
+    assert (entry.at, entry.given[0].marked) == (0, 1)
+    assert typed(SETUP, "down", "down", stacked=True, entry=entry).at == 1
+    assert typed(SETUP, "up", stacked=True, entry=entry).given[0].marked == 0
+    assert typed(SETUP, "down", "down").at == 2
+
+
+def test_free_text_is_edited_at_its_caret():
+    entry = typed(TEXT, *"pan", "left", "e", "left", "left", "home", "delete", "end", "s", "backspace", "t")
+    assert entry.given[0].answer == "aent"
+    assert len(typed(TEXT, *["x"] * (MOST_CHARACTERS + 5)).given[0].answer) == MOST_CHARACTERS
+
+
+def test_a_paste_is_text_and_never_keys():
+    assert paste(blank_entry(EXCLUSION), "1\n1\n1\n\n") == blank_entry(EXCLUSION)
+    assert paste(blank_entry(TEXT), "two\nlines\x07").given[0].answer == "two lines"
+
+
+def test_the_mouse_chooses_where_it_clicks_and_the_cursor_follows():
+    entry = click_choice(blank_entry(EXCLUSION), 2, 1)
+    assert entry.at == 2 and entry.given[2].answer == "no"
+    assert click_continue(entry).open == (0, 1)
+
+
+KEYS = st.lists(st.sampled_from(["1", "2", "y", "n", "enter", "tab", "shift+tab", "up", "down", "left", "space", "x"]))
+
+
+@given(KEYS, st.booleans())
+@settings(max_examples=200)
+def test_no_key_touches_an_answer_other_than_that_under_the_cursor(keys, stacked):
+    entry = blank_entry(EXCLUSION)
+    for key in keys:
+        after = typed(EXCLUSION, key, stacked=stacked, entry=entry)
+        changed = [i for i in range(3) if after.given[i] != entry.given[i]]
+        assert changed in ([], [entry.at])
+        assert not after.sent or missing(EXCLUSION, reply_of(after)) == ()
+        assert not entry.sent or after == entry
+        entry = after

@@ -1,0 +1,151 @@
+import os
+
+import pytest
+
+from study.errors import StudyError
+from study.session.facts.events import NoteTaken
+from study.store.sessions.event_log import EventLog, mend, read_log
+
+
+def note(text: str) -> NoteTaken:
+    return NoteTaken(utc="2026-01-01T00:00:00+00:00", who="program", text=text)
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A log of two facts, closed."""
+    path = tmp_path / "P01_001" / "events.jsonl"
+    path.parent.mkdir()
+    log = EventLog.create(path)
+    log.append(note("first"))
+    log.append(note("second"))
+    log.close()
+    return path
+
+
+def test_what_was_appended_is_read_back(written):
+    contents = read_log(written)
+    assert [event.text for event in contents.events] == ["first", "second"]
+    assert contents.torn == ""
+
+
+def test_an_existing_log_is_never_opened_anew(written):
+    before = written.read_bytes()
+    with pytest.raises(FileExistsError):
+        EventLog.create(written)
+    assert written.read_bytes() == before
+
+
+@pytest.mark.parametrize("cut", [1, 2, 10, 40])
+def test_a_torn_last_line_is_told_apart_and_mended(written, cut):
+    whole = written.read_bytes()
+    written.write_bytes(whole[:-cut])
+    contents = read_log(written)
+    assert [event.text for event in contents.events] == ["first"]
+    assert contents.torn
+    mend(written, contents)
+    assert whole.startswith(written.read_bytes())
+    log = EventLog.reopen(written)
+    log.append(note("third"))
+    log.close()
+    assert [event.text for event in read_log(written).events] == ["first", "third"]
+
+
+def test_a_broken_line_in_the_middle_is_an_error_that_changes_nothing(written):
+    first, second, _ = written.read_bytes().split(b"\n")
+    damaged = first[:-5] + b"\n" + second + b"\n"
+    written.write_bytes(damaged)
+    with pytest.raises(StudyError) as error:
+        read_log(written)
+    assert error.value.happened == "Line 1 of events.jsonl in P01_001 is not an event that this version knows."
+    assert error.value.saved == "The 0 lines before it are whole."
+    assert written.read_bytes() == damaged
+
+
+def test_a_log_of_a_newer_version_is_called_newer_and_not_damaged(tmp_path):
+    path = tmp_path / "P01_001" / "events.jsonl"
+    path.parent.mkdir()
+    path.write_text('{"event": "session_opened", "format": "hapteq-session", "version": 2}\n')
+    with pytest.raises(StudyError, match="written by a newer hapteq"):
+        read_log(path)
+
+
+def test_ctrl_c_in_the_middle_of_a_write_leaves_no_half_line(written, monkeypatch):
+    before = written.read_bytes()
+    real = os.write
+
+    def interrupted(descriptor: int, data: bytes) -> int:
+        real(descriptor, data[:10])
+        raise KeyboardInterrupt
+
+    log = EventLog.reopen(written)
+    monkeypatch.setattr("study.store.sessions.event_log.os.write", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        log.append(note("half"))
+    log.close()
+    assert written.read_bytes() == before
+
+
+def test_a_log_has_one_writer_even_when_the_lock_file_is_gone(written):
+    log = EventLog.reopen(written)
+    with pytest.raises(StudyError, match="Another program is writing to P01_001"):
+        EventLog.reopen(written)
+    log.close()
+    EventLog.reopen(written).close()
+
+
+def test_a_log_that_cannot_be_opened_for_writing_is_said_so(tmp_path):
+    """A folder in its place: refused by the system for everybody, root included."""
+    (tmp_path / "events.jsonl").mkdir()
+    with pytest.raises(StudyError, match="cannot be written to.*Is a directory") as error:
+        EventLog.reopen(tmp_path / "events.jsonl")
+    assert error.value.saved == "Nothing was changed."
+
+
+def test_a_missing_log_is_said_so(tmp_path):
+    with pytest.raises(StudyError, match="cannot be read.*No such file"):
+        read_log(tmp_path / "events.jsonl")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")  # noqa: PTH110
+def test_a_full_disk_is_an_error_that_says_what_is_safe():
+    log = EventLog(_NamedLike("P01_001"), os.open("/dev/full", os.O_WRONLY))
+    with pytest.raises(StudyError) as error:
+        log.append(note("lost"))
+    log.close()
+    assert "No space left on device" in error.value.happened
+    assert error.value.saved == "Everything logged before is on disk."
+
+
+def test_a_write_that_fails_half_way_leaves_no_half_line(written):
+    """The file's size limit tears the line; the log takes the torn part back."""
+    script = f"""
+import resource, signal
+from pathlib import Path
+from study.errors import StudyError
+from study.session.facts.events import NoteTaken
+from study.store.sessions.event_log import EventLog
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+path = Path({str(written)!r})
+log = EventLog.reopen(path)
+resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 20,) * 2)
+try:
+    log.append(NoteTaken(utc="2026-01-01T00:00:00+00:00", who="program", text="x" * 100))
+except StudyError as error:
+    print(error.title)
+"""
+    import subprocess
+    import sys
+
+    before = written.read_bytes()
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "The session cannot be written to disk", done.stderr
+    assert written.read_bytes() == before
+
+
+class _NamedLike:
+    """Stands for a path in messages alone."""
+
+    def __init__(self, folder: str) -> None:
+        self.name = "events.jsonl"
+        self.parent = type("Folder", (), {"name": folder})()
