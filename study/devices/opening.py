@@ -7,7 +7,7 @@ from study.devices.clock import Clock
 from study.devices.device import Device, DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.errors import DeviceError
-from study.session.views import DeviceFinding
+from study.session.views.views import DeviceFinding
 
 SIMULATED = "simulated"
 

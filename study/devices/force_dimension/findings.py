@@ -11,7 +11,7 @@ from study.devices.force_dimension.rigs import info_of
 from study.devices.force_dimension.usb import ADVICE, plugged_in
 from study.devices.force_dimension.watchdog_proof import prove_watchdog
 from study.errors import DeviceError
-from study.session.views import DeviceFinding
+from study.session.views.views import DeviceFinding
 
 CAP_N = 1.0
 """While it is looked at no force is sent; if one were, the library would cut it here."""
