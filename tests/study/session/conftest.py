@@ -10,7 +10,7 @@ import pytest
 @pytest.fixture(scope="session")
 def facts() -> ModuleType:
     """The builders of `test_state.py`."""
-    spec = importlib.util.spec_from_file_location("state_facts", Path(__file__).with_name("test_state.py"))
+    spec = importlib.util.spec_from_file_location("state_facts", Path(__file__).parent / "state" / "test_state.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
