@@ -11,8 +11,8 @@ from types import ModuleType
 import pytest
 from hypothesis import settings
 
-from protocols.loading import load_protocol
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.loading import load_protocol
 
 # The same examples each time: what fails, fails for everybody. `--hypothesis-profile explore` draws new ones.
 settings.register_profile("repeatable", derandomize=True)

@@ -19,7 +19,7 @@ from analysis.figures.style import (
 )
 from analysis.psychophysics.runs import Run
 from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
-from protocols.staircase_rule import StaircaseRule
+from protocols.definition.staircase_rule import StaircaseRule
 
 _COLUMNS = 3
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from analysis.psychophysics.runs import recompute_runs
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import Threshold, threshold_of
-from protocols.run_rules import staircase_rule
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.run_rules import staircase_rule
 from protocols.trial import Phase, Trial
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from protocols.practice import PracticeState, practice_over, practice_passed, right_of_last
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.practice import PracticeState, practice_over, practice_passed, right_of_last
 from protocols.trial import Phase, Trial
 
 

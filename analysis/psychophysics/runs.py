@@ -5,8 +5,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from protocols.staircase import StaircaseState, begin, finished, level_n, step
-from protocols.staircase_rule import StaircaseRule
+from protocols.definition.staircase_rule import StaircaseRule
+from protocols.procedure.staircase import StaircaseState, begin, finished, level_n, step
 from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4

@@ -19,7 +19,7 @@ from analysis.psychophysics.study_warnings import side_warnings, study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 from analysis.psychophysics.thresholds import Threshold, threshold_of
 from analysis.wording import f_text, p_text
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Phase, Trial
 
 CONFIDENCE = 0.95

@@ -9,8 +9,8 @@ from analysis.psychophysics.detection import directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.wording import listed, signed
-from protocols.staircase_rule import StaircaseRule
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.staircase_rule import StaircaseRule
+from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
 
 FEW_PARTICIPANTS = 5

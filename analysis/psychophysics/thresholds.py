@@ -8,8 +8,8 @@ from statistics import fmean
 from analysis.psychophysics.bias import response_bias
 from analysis.psychophysics.repeated_trials import is_often
 from analysis.psychophysics.runs import Run, recompute_runs
-from protocols.staircase import finished, to_newton
-from protocols.staircase_rule import StaircaseRule
+from protocols.definition.staircase_rule import StaircaseRule
+from protocols.procedure.staircase import finished, to_newton
 from protocols.trial import Phase, Trial
 
 

@@ -1,9 +1,9 @@
 """The methods of a study in words, with the numbers of its protocol."""
 
 from analysis.wording import listed, typeset
-from protocols.preparation import DemoSettings, PracticeSettings
-from protocols.staircase_rule import StaircaseRule, StepChange
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.preparation import DemoSettings, PracticeSettings
+from protocols.definition.staircase_rule import StaircaseRule, StepChange
+from protocols.definition.study_protocol import StudyProtocol
 
 _ORDERS = {
     "random": "in random order",

@@ -8,7 +8,7 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
 from analysis.wording import CUT_NOTE, NONE, marked_if_cut, number, signed
-from protocols.staircase import to_db
+from protocols.procedure.staircase import to_db
 
 
 def detection_table(analysis: StudyAnalysis) -> Table:

@@ -15,9 +15,9 @@ from study.devices.opening import needs_real_time
 from study.errors import WrongUseError
 from study.store.disk.privacy import left_open
 from study.store.sessions.archive import check_subject, find_session
-from study.tui.answer_keys import DIGITS, AnswerKeys
-from study.tui.line_input import LineInput
-from study.tui.plain import PlainDisplay
+from study.tui.keys.answer_keys import DIGITS, AnswerKeys
+from study.tui.line_mode.line_input import LineInput
+from study.tui.line_mode.plain import PlainDisplay
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed

@@ -27,7 +27,7 @@ def import_recording(
     that one map of ours fits, and recordings of ours; for other files a map to be completed is printed.
     """
     from study.cli.progress import late_bar
-    from study.importing.map_errors import MapNeededError
+    from study.importing.map_format.map_errors import MapNeededError
     from study.workflows.recording.import_recording import ImportPlan, check_free
     from study.workflows.recording.import_recording import import_recording as run
 

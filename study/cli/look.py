@@ -54,7 +54,7 @@ def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
 
 def recording_lines(found: "Overview") -> Iterable[str]:
     """Courses, spectra, and tables of channels and segments."""
-    from study.tui.recording_drawing import course_lines, spectrum_lines
+    from study.tui.drawing.recording_drawing import course_lines, spectrum_lines
 
     yield ""
     for channel in found.channels:

@@ -31,8 +31,8 @@ def show(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
 ) -> None:
     """Every key of a protocol with its value, its default and the reason for it."""
-    from protocols.explain import explain
-    from protocols.hashing import protocol_hash
+    from protocols.document.explain import explain
+    from protocols.document.hashing import protocol_hash
     from study.session.stimulus.limits import forces_in_words
     from study.store.formats.protocol_files import read_protocol
 

@@ -8,7 +8,7 @@ import typer
 
 from study.cli.results import JsonOption
 from study.cli.study import DataOption, DeviceOption, KeysOption, PlainOption
-from study.tui.answer_keys import parse_keys
+from study.tui.keys.answer_keys import parse_keys
 
 LOG_NAME = "events.jsonl"
 """As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
@@ -27,8 +27,8 @@ def resume(
 
     answer_keys = parse_keys(keys)
     if not plain and has_screen() and not _simulated(session, data):
-        from study.tui.app_start import AppStart
-        from study.tui.link.to_engine import Resume
+        from study.tui.app.app_start import AppStart
+        from study.tui.engine.to_engine import Resume
 
         open_screen(AppStart(str(data), device, answer_keys, Resume(session, device, str(data))), as_json)
         return

@@ -10,8 +10,8 @@ import typer
 from study.errors import DeviceError, ExitCode, LeftError, StudyError, WrongUseError
 
 if TYPE_CHECKING:
-    from study.tui.app_start import AppStart
-    from study.tui.link.from_engine import Failed, Finished
+    from study.tui.app.app_start import AppStart
+    from study.tui.engine.from_engine import Failed, Finished
 
 KINDS: dict[int, type[StudyError]] = {
     ExitCode.WRONG_USE: WrongUseError,
@@ -39,7 +39,7 @@ def columns() -> int | None:
 
 def open_screen(start: "AppStart", as_json: bool) -> None:
     """Raises StudyError for a sitting that was not finished."""
-    from study.tui.app import HapteqApp
+    from study.tui.app.app import HapteqApp
 
     app = HapteqApp(start)
     try:
@@ -52,7 +52,7 @@ def open_screen(start: "AppStart", as_json: bool) -> None:
 
 
 def _say(outcome: "Finished | Failed | None", as_json: bool) -> None:
-    from study.tui.link.from_engine import Failed
+    from study.tui.engine.from_engine import Failed
 
     if outcome is None:
         return

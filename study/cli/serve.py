@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from study.errors import StudyError, WrongUseError
-from study.tui.answer_keys import parse_keys
+from study.tui.keys.answer_keys import parse_keys
 
 PASSES_OPTIONS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 """What serve does not know are options of `hapteq study`."""

@@ -72,7 +72,7 @@ def _folder(what: str, data: Path) -> Path:
 
 
 def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
-    from study.tui.staircase_drawing import LEGEND
+    from study.tui.drawing.staircase_drawing import LEGEND
     from study.tui.standing_words import describe
     from study.tui.text_rows import aligned
 
@@ -94,7 +94,7 @@ def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
 
 
 def _plot(staircase: "Staircase") -> Iterable[str]:
-    from study.tui.staircase_drawing import staircase_lines, summary
+    from study.tui.drawing.staircase_drawing import staircase_lines, summary
 
     yield f"\n{staircase.title}"
     yield from staircase_lines(staircase, PLOT_COLUMNS, PLOT_ROWS)

@@ -7,7 +7,7 @@ import typer
 
 from study.cli.results import JsonOption
 from study.cli.seed import checked_seed
-from study.tui.answer_keys import parse_keys
+from study.tui.keys.answer_keys import parse_keys
 
 DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
 DeviceOption = Annotated[str, typer.Option("--device", help="simulated, omega3, omega6, omega7, delta3 or sigma7.")]
@@ -53,8 +53,8 @@ def study(
 
     answer_keys, protocol = parse_keys(keys), protocol_or_default(protocol, model)
     if observer is None and not plain and has_screen():
-        from study.tui.app_start import AppStart
-        from study.tui.link.to_engine import Begin, SessionOrder
+        from study.tui.app.app_start import AppStart
+        from study.tui.engine.to_engine import Begin, SessionOrder
 
         equalizer = "" if model is None else str(model)
         order = None if subject is None else SessionOrder(protocol, device, subject, str(data), seed, equalizer)

@@ -66,8 +66,8 @@ def _last_changed(data: Path) -> str:
 
 def _screen(folder: Path) -> None:
     from study.store.sessions.request_inbox import RequestInbox
-    from study.tui.link.watch_feed import WatchFeed
-    from study.tui.watch_app import WatchApp
+    from study.tui.engine.watch_feed import WatchFeed
+    from study.tui.watch.watch_app import WatchApp
 
     feed = WatchFeed(str(folder))
     try:
@@ -83,7 +83,7 @@ def _once(folder: Path, as_json: bool) -> None:
     from study.devices.clock import RealClock
     from study.errors import StudyError
     from study.tui.text_rows import hanging
-    from study.tui.watch_lines import LABEL_CELLS, changes
+    from study.tui.watch.watch_lines import LABEL_CELLS, changes
     from study.workflows.views.watch_session import follow
 
     view = follow(folder).look(RealClock().utc())
@@ -101,7 +101,7 @@ def _plain(folder: Path) -> None:
     """Until the sitting is over."""
     from study.devices.clock import RealClock
     from study.session.watching.watch_view import ON
-    from study.tui.watch_lines import changes
+    from study.tui.watch.watch_lines import changes
     from study.workflows.views.watch_session import follow
 
     clock, follower, before = RealClock(), follow(folder), None

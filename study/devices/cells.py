@@ -3,7 +3,7 @@
 (
     TICK_S, STIFFNESS, DAMPING, VELOCITY_SHARE, CENTRE_X, CENTRE_Y, CENTRE_Z,
     STIMULUS_CAP, FEEDBACK_CAP, TOTAL_CAP, SLEW_STEP, WATCHDOG_TICKS, LET_GO_TICKS,
-    # What a reading may be: see `protocols.plausibility`.
+    # What a reading may be: see `protocols.definition.plausibility`.
     WORKSPACE, LONGEST_JUMP, FASTEST_STEP, ACCELERATION, ACCELERATION_SHARE, RESOLUTION, FRICTION,
     STALE_TICKS, EASE_TICKS, SETTINGS_SIZE,
 ) = range(23)  # fmt: skip

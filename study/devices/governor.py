@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
-from protocols.plausibility import PlausibilitySettings
+from protocols.definition.plausibility import PlausibilitySettings
 from study.devices import cells, govern
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health
 from study.devices.rig import READING_SIZE

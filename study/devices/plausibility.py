@@ -1,7 +1,7 @@
 """Whether a reading of the position can be a handle's: where it is, how it got there, and whether it follows the force.
 
-The bounds and their reasons: `protocols.plausibility`. What passes may still be wrong; then it pulls with the
-feedback's cap at the most.
+The bounds and their reasons: `protocols.definition.plausibility`. What passes may still be wrong; then it pulls with
+the feedback's cap at the most.
 """
 
 import math

@@ -8,10 +8,10 @@ import numpy as np
 
 from analysis.wording import number, typeset
 from equalizer.signals.clock_offset import NoOffsetError, offset_by_correlation
-from study.importing.functions import Value
-from study.importing.import_map import ClockMap
-from study.importing.map_errors import ImportProblemError
-from study.importing.namespace import Namespace
+from study.importing.expressions.functions import Value
+from study.importing.expressions.namespace import Namespace
+from study.importing.map_format.import_map import ClockMap
+from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.time_base import TimeBase
 
 

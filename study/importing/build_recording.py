@@ -12,13 +12,13 @@ from equalizer.signals.recording_checks import recording_problems
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.alignment import Logger, aligned
-from study.importing.arrays import Arrays, read_arrays
-from study.importing.budget import Budget
-from study.importing.import_map import ChannelMap, ComputedMap, ImportMap
-from study.importing.map_errors import ImportProblemError, ImportRefusedError
-from study.importing.map_files import PartFiles, part_files
-from study.importing.map_segments import segments_of
-from study.importing.namespace import of_file
+from study.importing.arrays.arrays import Arrays, read_arrays
+from study.importing.expressions.budget import Budget
+from study.importing.expressions.namespace import of_file
+from study.importing.map_format.import_map import ChannelMap, ComputedMap, ImportMap
+from study.importing.map_format.map_errors import ImportProblemError, ImportRefusedError
+from study.importing.map_format.map_files import PartFiles, part_files
+from study.importing.map_format.map_segments import segments_of
 from study.importing.part_signals import Key, PartSignals, part_signals
 from study.importing.said import Said
 from study.importing.time_base import NUMBERED_HZ, time_base

@@ -3,9 +3,9 @@ units: `time [s], force [N], displacement_mm`."""
 
 import re
 
-from study.importing.arrays import Arrays
-from study.importing.import_map import ChannelMap, ClockMap, ImportMap
-from study.importing.signal_words import named, roles_of
+from study.importing.arrays.arrays import Arrays
+from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
+from study.importing.map_format.signal_words import named, roles_of
 
 _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 

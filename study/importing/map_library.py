@@ -8,14 +8,14 @@ from importlib.resources import files as resources
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.importing.arrays import read_arrays
-from study.importing.budget import Budget
-from study.importing.expression import names_in
-from study.importing.import_map import ImportMap
-from study.importing.map_errors import ImportProblemError, suggestion
-from study.importing.map_files import part_files
-from study.importing.map_toml import KIND, is_map, parse_map
-from study.importing.namespace import of_file
+from study.importing.arrays.arrays import read_arrays
+from study.importing.expressions.budget import Budget
+from study.importing.expressions.expression import names_in
+from study.importing.expressions.namespace import of_file
+from study.importing.map_format.import_map import ImportMap
+from study.importing.map_format.map_errors import ImportProblemError, suggestion
+from study.importing.map_format.map_files import part_files
+from study.importing.map_format.map_toml import KIND, is_map, parse_map
 from study.store.disk.toml_text import read_toml_text
 
 NO_DATA = (".toml", ".md")

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.array_groups import groups_in
-from study.importing.arrays import Arrays
-from study.importing.signal_words import named, proposed_roles, unit_in
+from study.importing.arrays.array_groups import groups_in
+from study.importing.arrays.arrays import Arrays
+from study.importing.map_format.signal_words import named, proposed_roles, unit_in
 
 _LEAST_SAMPLES = 16
 _CLOCK_WORDS = {"t", "time", "timestamp", "timestamps", "zeit", "temps"}

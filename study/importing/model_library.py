@@ -4,7 +4,7 @@ from importlib.resources import files as resources
 from pathlib import Path
 
 from study.errors import WrongUseError
-from study.importing.map_errors import suggestion
+from study.importing.map_format.map_errors import suggestion
 
 
 def shipped_models() -> tuple[str, ...]:

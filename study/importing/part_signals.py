@@ -8,10 +8,10 @@ import numpy as np
 from equalizer.signals.resampling import FLAT_TO, SAME_INSTANT, Grid, Method, Samples, resampled
 from equalizer.signals.signal import FloatArray
 from study.importing.alignment import Logger
-from study.importing.functions import Value
-from study.importing.import_map import ChannelMap, ImportMap, PartMap
-from study.importing.map_errors import ImportProblemError
-from study.importing.namespace import Namespace
+from study.importing.expressions.functions import Value
+from study.importing.expressions.namespace import Namespace
+from study.importing.map_format.import_map import ChannelMap, ImportMap, PartMap
+from study.importing.map_format.map_errors import ImportProblemError
 from study.importing.time_base import MOST_SAMPLES
 
 Key = tuple[str, str]

@@ -7,10 +7,10 @@ import numpy.typing as npt
 
 from equalizer.signals.resampling import Samples
 from equalizer.signals.units import UnknownUnitError, parse_unit
-from study.importing.functions import Value
-from study.importing.import_map import ClockMap
-from study.importing.map_errors import ImportProblemError
-from study.importing.namespace import Namespace, NoTime
+from study.importing.expressions.functions import Value
+from study.importing.expressions.namespace import Namespace, NoTime
+from study.importing.map_format.import_map import ClockMap
+from study.importing.map_format.map_errors import ImportProblemError
 
 IntArray = npt.NDArray[np.int64]
 

@@ -1,6 +1,6 @@
 """What a study protocol asks of the device: limits, spring, what is kept of each recording."""
 
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
 from study.session.stimulus.limits import limits_of_study
 

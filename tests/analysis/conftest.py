@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from analysis.figures.diagnosis_pictures import diagnosis_pictures
-from protocols.apparatus import SafetySettings, TestDirections
-from protocols.exposure import CatchSettings, DetectionSettings
-from protocols.preparation import PracticeSettings
-from protocols.run_rules import staircase_rule
-from protocols.staircase import StaircaseState, begin, finished, level_n, step
-from protocols.staircase_rule import StaircaseRule, StepPhase
-from protocols.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
+from protocols.definition.apparatus import SafetySettings, TestDirections
+from protocols.definition.exposure import CatchSettings, DetectionSettings
+from protocols.definition.preparation import PracticeSettings
+from protocols.definition.staircase_rule import StaircaseRule, StepPhase
+from protocols.definition.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
+from protocols.procedure.run_rules import staircase_rule
+from protocols.procedure.staircase import StaircaseState, begin, finished, level_n, step
 from protocols.trial import Phase, Trial, TrialStatus
 
 PUBLISHED = StaircaseRule(

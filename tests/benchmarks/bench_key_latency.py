@@ -136,9 +136,9 @@ def terminal(command: list[str], pass_fds: tuple[int, ...] = ()) -> Iterator[Pty
 
 def watched_screen(protocol: str, data: str, news: int) -> None:
     """The application itself, with a task in its event loop that measures how late it comes."""
-    from study.tui.app import HapteqApp
-    from study.tui.app_start import AppStart
-    from study.tui.link.to_engine import Begin, SessionOrder
+    from study.tui.app.app import HapteqApp
+    from study.tui.app.app_start import AppStart
+    from study.tui.engine.to_engine import Begin, SessionOrder
 
     class Watched(HapteqApp):
         async def on_mount(self) -> None:

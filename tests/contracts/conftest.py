@@ -17,8 +17,8 @@ from study.devices.clock import Clock, RealClock, VirtualClock
 from study.participants.observers import observer_named
 from study.session.state.due_trial import Present
 from study.session.views.form_views import Form
-from study.tui.line_input import LineInput
-from study.tui.plain import PlainDisplay
+from study.tui.line_mode.line_input import LineInput
+from study.tui.line_mode.plain import PlainDisplay
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.trial.display import Display
 

@@ -38,7 +38,7 @@ def test_headless_packages_load_no_screen_and_no_plots(package):
 
 def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
     loaded = loaded_by(
-        "import study.tui.link.desk, study.workflows.session.end_sitting, study.workflows.files.validate_apart"
+        "import study.tui.engine.desk, study.workflows.session.end_sitting, study.workflows.files.validate_apart"
     )
     assert "numba" in loaded
     slow = {"scipy.stats", "statsmodels", "pandas", "matplotlib"}
@@ -48,7 +48,7 @@ def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
 def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():
     screens = sorted((ROOT / "study" / "tui" / "screens").glob("*.py"))
     names = [f"study.tui.screens.{module.stem}" for module in screens if module.stem != "__init__"]
-    apps = ("study.cli.main", "study.tui.app", "study.tui.asked_screens", "study.tui.watch_app")
+    apps = ("study.cli.main", "study.tui.app.app", "study.tui.app.asked_screens", "study.tui.watch.watch_app")
     everything = ", ".join((*apps, *names))
     loaded = loaded_by(f"import {everything}")
     assert "textual" in loaded

@@ -4,9 +4,9 @@ from importlib.resources import files
 
 import pytest
 
-from protocols.loading import load_protocol
-from protocols.staircase_rule import StaircaseRule, StepPhase
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.staircase_rule import StaircaseRule, StepPhase
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.loading import load_protocol
 
 
 @pytest.fixture(scope="session")

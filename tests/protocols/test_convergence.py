@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from protocols.staircase import begin, finished, level_n, step, to_newton
-from protocols.staircase_rule import StaircaseRule, StepPhase
+from protocols.definition.staircase_rule import StaircaseRule, StepPhase
+from protocols.procedure.staircase import begin, finished, level_n, step, to_newton
 
 TARGET = 0.5 ** (1 / 3)
 RUNS = 250

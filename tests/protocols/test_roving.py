@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from protocols.loading import ProtocolError, load_protocol
-from protocols.preparation import DemoSettings, PracticeSettings
-from protocols.schedule import demo_level_n, draw_trial, practice_level_n
-from protocols.staircase import to_db
+from protocols.definition.preparation import DemoSettings, PracticeSettings
+from protocols.document.loading import ProtocolError, load_protocol
+from protocols.procedure.schedule import demo_level_n, draw_trial, practice_level_n
+from protocols.procedure.staircase import to_db
 
 ROVED = PracticeSettings(frequencies_hz=(25.0,), level_n=2.0, rove_db=6.0)
 TRIALS = [(seed, trial) for seed in range(40) for trial in range(50)]

@@ -4,11 +4,11 @@ from importlib.resources import files
 
 import pytest
 
-from protocols.explain import explain
-from protocols.loading import load_protocol
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import MultisineSegment, SineSegment, SweepSegment
-from protocols.staircase_rule import StepChange, StepPhase
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
+from protocols.definition.staircase_rule import StepChange, StepPhase
+from protocols.document.explain import explain
+from protocols.document.loading import load_protocol
 
 NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
 

@@ -1,7 +1,7 @@
 """What the open choices of the staircase do to a threshold. `python tests/references/staircase_variants.py` prints it.
 
 Simulated Weibull observers, far below the cap, start 10 dB above their threshold; bias against the level at which
-79.4 % are right. The numbers in the protocol files and in `protocols.staircase_rule` are from this table.
+79.4 % are right. The numbers in the protocol files and in `protocols.definition.staircase_rule` are from this table.
 """
 
 import math
@@ -9,8 +9,8 @@ import sys
 
 import numpy as np
 
-from protocols.staircase import begin, finished, level_n, step, to_newton
-from protocols.staircase_rule import StaircaseRule, StepChange, StepPhase
+from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
+from protocols.procedure.staircase import begin, finished, level_n, step, to_newton
 
 TRUE_DB = -10.0
 TARGET = 0.5 ** (1 / 3)

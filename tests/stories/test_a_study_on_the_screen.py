@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
 from study.session.views.views import Answered

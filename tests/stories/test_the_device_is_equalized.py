@@ -15,7 +15,7 @@ from equalizer.identification.state_space.identify import identify
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from equalizer.tracking.feedforward.quality import quality
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.rig import CompiledRig

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
-from protocols.staircase_rule import STRICT
+from protocols.definition.staircase_rule import STRICT
 from study.errors import DeviceError
 
 FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from equalizer.signals.recording import Recording
-from protocols.hashing import protocol_hash
-from protocols.recording_protocol import RecordingProtocol
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.document.hashing import protocol_hash
 from study.devices.opening import SIMULATED
 from study.errors import StudyError
 from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan

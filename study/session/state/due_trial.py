@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from protocols.schedule import (
+from protocols.definition.staircase_rule import StaircaseRule
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.schedule import (
     Run,
     detection_direction,
     draw_trial,
@@ -11,9 +13,7 @@ from protocols.schedule import (
     labels_swapped,
     practice_level_n,
 )
-from protocols.staircase import StaircaseState, level_n, to_db
-from protocols.staircase_rule import StaircaseRule
-from protocols.study_protocol import StudyProtocol
+from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
 from study.session.facts.level_scale import wanted_mps2

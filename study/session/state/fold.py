@@ -3,9 +3,9 @@
 import math
 from dataclasses import replace
 
-from protocols.practice import PracticeState, practice_over, practised
-from protocols.staircase import begin, finished, step
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.practice import PracticeState, practice_over, practised
+from protocols.procedure.staircase import begin, finished, step
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.session.facts.events import (
     AnswerGiven,

@@ -3,7 +3,7 @@
 import math
 from statistics import median
 
-from protocols.schedule import Run
+from protocols.procedure.schedule import Run
 from protocols.trial import Phase
 from study.session.state.state import SessionState
 from study.session.views.views import Progress

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, field, replace
 
-from protocols.practice import PracticeState
-from protocols.run_rules import staircase_rule
-from protocols.schedule import Run, runs
-from protocols.staircase import StaircaseState, begin
-from protocols.staircase_rule import StaircaseRule
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.staircase_rule import StaircaseRule
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.practice import PracticeState
+from protocols.procedure.run_rules import staircase_rule
+from protocols.procedure.schedule import Run, runs
+from protocols.procedure.staircase import StaircaseState, begin
 from protocols.trial import Trial, VoidCause
 from study.session.facts.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.facts.log_time import Moment

@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass, field
 
-from protocols.apparatus import SafetySettings
-from protocols.plausibility import PlausibilitySettings
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import MultisineSegment, highest_hz
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.apparatus import SafetySettings
+from protocols.definition.plausibility import PlausibilitySettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import MultisineSegment, highest_hz
+from protocols.definition.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
 """Room for the centring spring: 150 N/m pulled away at 0.6 m/s, faster than a hand moves in a trial."""

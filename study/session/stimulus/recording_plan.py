@@ -8,9 +8,9 @@ from equalizer.signals.excitation import faded, log_sweep, sine
 from equalizer.signals.multisine import lines_between, multisines
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
-from protocols.apparatus import TestDirections
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import MultisineSegment, SineSegment, SweepSegment
+from protocols.definition.apparatus import TestDirections
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
 from study.session.stimulus.stimulus import direction_vector, loop_length
 
 

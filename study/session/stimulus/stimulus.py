@@ -7,8 +7,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.equalizer import Equalizer
-from protocols.apparatus import TestDirections
-from protocols.study_protocol import StimulusSettings
+from protocols.definition.apparatus import TestDirections
+from protocols.definition.study_protocol import StimulusSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}

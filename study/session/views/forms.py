@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from protocols.preparation import ConsentSettings, DebriefQuestion, SetupSettings
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.preparation import ConsentSettings, DebriefQuestion, SetupSettings
+from protocols.definition.study_protocol import StudyProtocol
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 
 YES_NO = ("yes", "no")

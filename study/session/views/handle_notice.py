@@ -1,6 +1,6 @@
 """What has to be said before a real device moves by itself: who may touch it, and who must not."""
 
-from protocols.recording_protocol import RecordingProtocol
+from protocols.definition.recording_protocol import RecordingProtocol
 
 
 def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:

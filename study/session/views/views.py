@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from protocols.trial import Phase, VoidCause
 
 if TYPE_CHECKING:
-    from protocols.apparatus import TestDirections
+    from protocols.definition.apparatus import TestDirections
 
 
 class Task(Enum):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from study.session.facts.events import (
     Event,
     SessionInterrupted,

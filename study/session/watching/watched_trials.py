@@ -1,9 +1,9 @@
 """Trials and runs of a followed session, in the words of its watcher. A part of `study.session.watching.watching`."""
 
-from protocols.practice import PracticeState, practice_passed, right_of_last
-from protocols.run_rules import staircase_rule
-from protocols.schedule import Run
-from protocols.staircase import level_n
+from protocols.procedure.practice import PracticeState, practice_passed, right_of_last
+from protocols.procedure.run_rules import staircase_rule
+from protocols.procedure.schedule import Run
+from protocols.procedure.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.state.state import SessionState, current_rule, due
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun

@@ -7,11 +7,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from protocols.loading import Protocol, ProtocolError, load_protocol
-from protocols.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
-from protocols.problem import Problem
-from protocols.recording_protocol import RecordingProtocol
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.problem import Problem
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.loading import Protocol, ProtocolError, load_protocol
+from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_time

@@ -11,7 +11,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
-from study.tui.answer_keys import DIGITS, AnswerKeys
+from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.take_off import take_off
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.said import Said

@@ -10,7 +10,7 @@ from textual.widgets import Footer
 
 from study.session.views.counted import answers_are
 from study.session.views.views import Welcome
-from study.tui.answer_keys import DIGITS, AnswerKeys
+from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.take_off import take_off
 from study.tui.trial_words import plan
 from study.tui.widgets.card import Sheet

@@ -13,10 +13,10 @@ from textual.screen import Screen
 from textual.widgets import Footer, Static, TabbedContent, TabPane
 
 from study.session.views.archive_views import SessionView
+from study.tui.drawing.staircase_drawing import LEGEND
 from study.tui.home_messages import AnalyzeWanted, HomeWanted, ResumeWanted, WatchWanted, WithdrawWanted
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt
-from study.tui.staircase_drawing import LEGEND
 from study.tui.standing_words import STYLES, describe, standing_words
 from study.tui.widgets.long_text import LongText
 from study.tui.widgets.staircase_plot import StaircasePlot

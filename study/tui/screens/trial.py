@@ -14,8 +14,8 @@ from textual.timer import Timer
 from textual.widgets import Footer
 
 from study.session.views.views import Answered, Question, Reply, Task, Unanswered
-from study.tui.answer_keys import DIGITS, AnswerKeys
-from study.tui.key_presses import KeyPresses, arrival_s
+from study.tui.keys.answer_keys import DIGITS, AnswerKeys
+from study.tui.keys.key_presses import KeyPresses, arrival_s
 from study.tui.trial_replies import LEAVING, NO_REPEATS, PAUSE, REPEAT, TIME_OVER, repeat_words
 from study.tui.trial_words import heading, run_name
 from study.tui.widgets.direction_panel import DirectionPanel, Mark

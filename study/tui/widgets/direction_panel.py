@@ -10,8 +10,8 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from study.session.views.views import DirectionPicture
-from study.tui.direction_picture import large_drawing, sentence
-from study.tui.number_picture import large_number
+from study.tui.drawing.direction_picture import large_drawing, sentence
+from study.tui.drawing.number_picture import large_number
 
 NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
 BESIDE = 5

@@ -9,7 +9,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from study.session.views.views import HandleView
-from study.tui.braille import Canvas
+from study.tui.drawing.braille import Canvas
 
 
 class HandleTarget(Widget):

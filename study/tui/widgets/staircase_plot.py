@@ -6,7 +6,7 @@ from textual.content import Content
 from textual.widget import Widget
 
 from study.session.views.archive_views import Staircase
-from study.tui.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
+from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}
 MUTED = "$foreground 65%"

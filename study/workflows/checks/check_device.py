@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from protocols.apparatus import SafetySettings
+from protocols.definition.apparatus import SafetySettings
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Look
 from study.session.stimulus.limits import forces_in_words

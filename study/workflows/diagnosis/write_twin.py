@@ -17,7 +17,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
 from equalizer.identification.mechanical.mechanical_level import AsOnePiece, as_one_piece, without_friction
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
-from protocols.recording_protocol import RecordingProtocol
+from protocols.definition.recording_protocol import RecordingProtocol
 from study.errors import StudyError, WrongUseError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model

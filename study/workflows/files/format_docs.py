@@ -19,7 +19,7 @@ from analysis.psychophysics.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
 from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE, TABLE_KINDS
-from protocols.schema import protocol_schema
+from protocols.document.schema import protocol_schema
 from protocols.trial import Trial
 from study.session.watching.live import Live
 from study.store.disk.csv_rows import columns, in_words

@@ -4,12 +4,12 @@ from collections.abc import Iterable
 
 from equalizer.signals.resampling import FLAT_TO
 from equalizer.signals.units import ALLOWED
-from protocols.schema import Node, resolved
-from study.importing.budget import DEEPEST, LARGEST, NUMBERS, WORK
-from study.importing.csv_arrays import MOST_ROWS
-from study.importing.functions import FUNCTIONS
+from protocols.document.schema import Node, resolved
+from study.importing.arrays.csv_arrays import MOST_ROWS
+from study.importing.expressions.budget import DEEPEST, LARGEST, NUMBERS, WORK
+from study.importing.expressions.functions import FUNCTIONS
+from study.importing.map_format.map_toml import MAP_SCHEMA, allowed_in_map
 from study.importing.map_library import read_map, shipped_maps
-from study.importing.map_toml import MAP_SCHEMA, allowed_in_map
 from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
 from study.store.disk.regular_file import TABLE_BYTES
 

@@ -9,12 +9,12 @@ from analysis.look.driven_band import silent_segments
 from equalizer.plant.model_quality import quality_brief
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY
-from protocols.loading import ProtocolError, load_protocol
-from protocols.recording_protocol import RecordingProtocol
-from protocols.schema import ADAPTERS, protocol_schema
-from study.importing.import_map import ChannelMap, ComputedMap
-from study.importing.map_toml import KIND as MAP_KIND
-from study.importing.map_toml import is_map, parse_map
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.document.loading import ProtocolError, load_protocol
+from protocols.document.schema import ADAPTERS, protocol_schema
+from study.importing.map_format.import_map import ChannelMap, ComputedMap
+from study.importing.map_format.map_toml import KIND as MAP_KIND
+from study.importing.map_format.map_toml import is_map, parse_map
 from study.store.disk.csv_rows import header_problem
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats import identified_model_file, recording_layout

@@ -3,8 +3,8 @@
 from dataclasses import MISSING, fields
 from pathlib import Path
 
-from protocols.lock import FORMAT as LOCK_FORMAT
-from protocols.lock import LockError, lock_from_json
+from protocols.document.lock import FORMAT as LOCK_FORMAT
+from protocols.document.lock import LockError, lock_from_json
 from study.errors import StudyError
 from study.local_clock import machine_zone
 from study.session.facts.events import SESSION_FORMAT, TrialMeasured

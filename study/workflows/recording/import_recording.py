@@ -10,11 +10,11 @@ from typing import Any
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
-from study.importing.arrays import read_arrays
+from study.importing.arrays.arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map
-from study.importing.import_map import CsvMap, ImportMap
-from study.importing.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
+from study.importing.map_format.import_map import CsvMap, ImportMap
+from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.hdf5_file import format_of, is_hdf5

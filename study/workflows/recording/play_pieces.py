@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from equalizer.signals.recording import Recording
-from protocols.recording_protocol import RecordingProtocol
+from protocols.definition.recording_protocol import RecordingProtocol
 from study.devices.device import Device, Fault, Health
 from study.errors import DeviceError
 from study.session.stimulus.recording_plan import Piece, pieces

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from equalizer.signals.joining import join
-from protocols.hashing import protocol_hash
-from protocols.recording_protocol import RecordingProtocol
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.document.hashing import protocol_hash
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from protocols.apparatus import SpringSettings
+from protocols.definition.apparatus import SpringSettings
 from study.workflows.recording.play_pieces import Take, along_in_words
 
 

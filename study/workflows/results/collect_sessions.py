@@ -7,7 +7,7 @@ from pathlib import Path
 from analysis.psychophysics.population import Population, split_by_population
 from analysis.wording import listed
 from equalizer.plant.model_quality import NOT_STORED
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial
 from study.errors import StudyError, WrongUseError
 from study.session.state.state import SessionState

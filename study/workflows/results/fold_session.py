@@ -5,9 +5,9 @@ Changes nothing. Everything that reads a session begins here, so that damage is 
 
 from dataclasses import dataclass
 
-from protocols.hashing import protocol_hash
-from protocols.loading import ProtocolError, load_protocol
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.hashing import protocol_hash
+from protocols.document.loading import ProtocolError, load_protocol
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
 from study.session.state.draw_check import LogContradiction

@@ -14,7 +14,7 @@ from equalizer.tracking.feedforward.equalizer import Equalizer, Identity
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from equalizer.tracking.feedforward.periodic_inverse import inverse_response
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceInfo
 from study.errors import StudyError
 from study.session.facts.level_scale import EqualizedFacts, LevelScale

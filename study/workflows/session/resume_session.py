@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from protocols.schedule import label_of
+from protocols.procedure.schedule import label_of
 from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo

@@ -3,7 +3,7 @@
 import contextlib
 from dataclasses import dataclass, replace
 
-from protocols.practice import practice_passed, practised, right_of_last
+from protocols.procedure.practice import practice_passed, practised, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
 from study.errors import DeviceError, LeftError, StudyError

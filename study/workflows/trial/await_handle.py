@@ -3,8 +3,8 @@
 import math
 from collections.abc import Callable
 
-from protocols.apparatus import Plane
-from protocols.exposure import GateSettings
+from protocols.definition.apparatus import Plane
+from protocols.definition.exposure import GateSettings
 from study.session.state.state import SessionState
 from study.session.stimulus.stimulus import AXES
 from study.session.views.views import HandleView, Unanswered

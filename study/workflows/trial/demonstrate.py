@@ -1,6 +1,6 @@
 """The labelled demonstration: each direction at each frequency, as often as the participant wants."""
 
-from protocols.schedule import demo_level_n, label_of
+from protocols.procedure.schedule import demo_level_n, label_of
 from study.devices.device import Fault
 from study.session.facts.events import DemoFinished, DemoPlayed
 from study.session.facts.level_scale import amplitude

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from protocols.study_protocol import MeasurementSettings
+from protocols.definition.study_protocol import MeasurementSettings
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
 from study.session.facts.void_reasons import TICKS_MISSED

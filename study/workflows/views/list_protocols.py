@@ -3,7 +3,7 @@
 import tomllib
 from pathlib import Path
 
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from study.errors import StudyError
 from study.session.views.archive_views import ProtocolLine
 from study.store.disk.toml_text import read_toml_text

@@ -8,9 +8,9 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
 
-from protocols.loading import ProtocolError, load_protocol
-from protocols.schedule import runs
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.loading import ProtocolError, load_protocol
+from protocols.procedure.schedule import runs
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
 from study.session.state.state import SessionState

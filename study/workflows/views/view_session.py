@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.wording import NONE, number
-from protocols.schedule import Run
+from protocols.procedure.schedule import Run
 from protocols.trial import Phase
 from study.errors import StudyError
 from study.session.facts.event_words import log_in_words

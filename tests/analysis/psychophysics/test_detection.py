@@ -7,8 +7,8 @@ from analysis.psychophysics.detection import Below, detection_thresholds, direct
 from analysis.psychophysics.runs import InconsistentTrialsError
 from analysis.psychophysics.threshold_table import threshold_table
 from analysis.psychophysics.thresholds import thresholds
-from protocols.exposure import DetectionSettings
-from protocols.run_rules import staircase_rule
+from protocols.definition.exposure import DetectionSettings
+from protocols.procedure.run_rules import staircase_rule
 from protocols.trial import Phase
 
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import pytest
 
 from analysis.psychophysics.practice import practice_runs
-from protocols.preparation import PracticeSettings
-from protocols.study_protocol import TrainingSettings
+from protocols.definition.preparation import PracticeSettings
+from protocols.definition.study_protocol import TrainingSettings
 from protocols.trial import Phase, TrialStatus
 
 

@@ -6,7 +6,7 @@ import pytest
 from analysis.psychophysics.anova import one_way
 from analysis.psychophysics.repeated_measures import repeated_measures
 from analysis.psychophysics.study_analysis import analyse_study, design_difference
-from protocols.run_rules import staircase_rule
+from protocols.procedure.run_rules import staircase_rule
 from protocols.trial import Phase, TrialStatus
 
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.reports.methods_text import methods_text
-from protocols.staircase_rule import StepChange
+from protocols.definition.staircase_rule import StepChange
 
 
 def said(protocol):

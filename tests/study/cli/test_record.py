@@ -57,7 +57,7 @@ def test_a_late_bar_draws_nothing_before_there_is_progress(monkeypatch):
 
 
 def test_every_shipped_recording_is_named_in_the_help(capsys):
-    from protocols.recording_protocol import RecordingProtocol
+    from protocols.definition.recording_protocol import RecordingProtocol
     from study.cli.main import main
     from study.store.formats.protocol_files import read_protocol, shipped_protocols
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from protocols.plausibility import PlausibilitySettings
+from protocols.definition.plausibility import PlausibilitySettings
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceSettings
 from study.devices.opening import DEVICES, FRICTIONLESS, REAL, SIMULATIONS, open_device

@@ -8,8 +8,8 @@ from scipy import signal as sg
 
 from equalizer.signals.recording import Hold
 from study.importing.build_recording import build_recording
-from study.importing.map_errors import ImportRefusedError
-from study.importing.map_toml import parse_map
+from study.importing.map_format.map_errors import ImportRefusedError
+from study.importing.map_format.map_toml import parse_map
 
 N = 400
 U = np.random.default_rng(1).standard_normal(N)

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from study.importing.arrays import Arrays, read_arrays
+from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map
-from study.importing.import_map import CsvMap
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_toml import parse_map
+from study.importing.map_format.signal_words import named, proposed_roles, unit_in
 from study.importing.map_skeleton import map_skeleton
-from study.importing.map_toml import parse_map
-from study.importing.signal_words import named, proposed_roles, unit_in
 from study.store.disk.file_errors import UnusableFileError
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from protocols.schedule import draw_trial
-from protocols.study_protocol import ScheduleSettings
+from protocols.definition.study_protocol import ScheduleSettings
+from protocols.procedure.schedule import draw_trial
 from protocols.trial import Phase
 from study.errors import WrongUseError
 from study.participants.detection import TYPICAL_DETECTION_N

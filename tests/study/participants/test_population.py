@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import tukey_hsd
 
-from protocols.loading import load_protocol
-from protocols.schedule import draw_trial, runs
-from protocols.staircase import begin, finished, level_n, step, to_newton
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.loading import load_protocol
+from protocols.procedure.schedule import draw_trial, runs
+from protocols.procedure.staircase import begin, finished, level_n, step, to_newton
 from protocols.trial import Phase
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.observer import Felt, Observer

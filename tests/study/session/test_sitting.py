@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from protocols.exposure import CatchSettings, DetectionSettings, SittingLimits
-from protocols.preparation import (
+from protocols.definition.exposure import CatchSettings, DetectionSettings, SittingLimits
+from protocols.definition.preparation import (
     ConsentSettings,
     DebriefQuestion,
     DemoSettings,

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays import read_arrays
-from study.importing.import_map import CsvMap
-from study.importing.map_errors import ImportRefusedError
+from study.importing.arrays.arrays import read_arrays
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
 from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES, SizeLimit
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
@@ -243,7 +243,8 @@ def test_memory_is_taken_for_nothing_that_is_only_declared(tmp_path, recording):
     (tmp_path / "a.npy").write_bytes(header("(536870912,)"))
     script = (
         "import resource, sys\nfrom pathlib import Path\nfrom study.workflows.files.validate import validate_file\n"
-        "from study.importing.arrays import read_arrays\nfrom study.importing.import_map import CsvMap\n"
+        "from study.importing.arrays.arrays import read_arrays\n"
+        "from study.importing.map_format.import_map import CsvMap\n"
         "from study.errors import StudyError\nresource.setrlimit(resource.RLIMIT_AS, (2**31, 2**31))\n"
         "print(validate_file(Path(sys.argv[1])).problems[0])\n"
         "try: read_arrays(Path(sys.argv[2]), CsvMap())\nexcept StudyError as refused: print(refused.happened)"

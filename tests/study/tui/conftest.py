@@ -15,9 +15,9 @@ from textual.dom import DOMNode
 from textual.screen import Screen
 
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.tui.answer_keys import DIGITS, AnswerKeys
-from study.tui.line_input import LineInput
-from study.tui.plain import PlainDisplay
+from study.tui.keys.answer_keys import DIGITS, AnswerKeys
+from study.tui.line_mode.line_input import LineInput
+from study.tui.line_mode.plain import PlainDisplay
 
 SETTLED_S = 30.0
 """Longer than any machine takes; an application that never settles fails here."""

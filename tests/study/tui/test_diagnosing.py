@@ -8,8 +8,8 @@ import pytest
 
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
-from study.tui.app import HapteqApp
-from study.tui.app_start import AppStart
+from study.tui.app.app import HapteqApp
+from study.tui.app.app_start import AppStart
 from study.tui.home_messages import DiagnoseWanted
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from study.session.views.views import DirectionPicture
-from study.tui.braille import Canvas
-from study.tui.direction_picture import large_drawing
-from study.tui.number_picture import large_number
+from study.tui.drawing.braille import Canvas
+from study.tui.drawing.direction_picture import large_drawing
+from study.tui.drawing.number_picture import large_number
 
 DIAGONAL = DirectionPicture("yz", (135.0, 45.0))
 

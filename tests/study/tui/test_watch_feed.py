@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from study.session.facts.events import DeviceFacts, SessionOpened, event_line
-from study.tui.link.watch_feed import WatchFeed
+from study.tui.engine.watch_feed import WatchFeed
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture
 def session(tmp_path, small_protocol, small_text) -> Path:
     """A session that was just opened."""
-    from protocols.hashing import protocol_hash
+    from protocols.document.hashing import protocol_hash
 
     folder = tmp_path / "P01_001"
     folder.mkdir()
@@ -88,7 +88,7 @@ def test_the_child_dies_with_a_killed_parent(session, tmp_path):
     script = tmp_path / "parent.py"
     script.write_text(
         "import sys, time\n"
-        "from study.tui.link.watch_feed import WatchFeed\n"
+        "from study.tui.engine.watch_feed import WatchFeed\n"
         "if __name__ == '__main__':\n"
         "    feed = WatchFeed(sys.argv[1])\n"
         "    while feed.latest() is None: time.sleep(0.02)\n"
@@ -107,7 +107,8 @@ def test_the_child_dies_with_a_killed_parent(session, tmp_path):
 def test_the_screens_process_loads_neither_numpy_nor_pydantic():
     script = (
         "import sys\n"
-        "import study.cli.watch, study.tui.watch_app, study.tui.link.watch_feed, study.store.sessions.request_inbox\n"
+        "import study.cli.watch, study.tui.watch.watch_app, study.tui.engine.watch_feed\n"
+        "import study.store.sessions.request_inbox\n"
         "print(*sys.modules)"
     )
     done = subprocess.run(

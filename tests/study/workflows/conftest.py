@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from protocols.study_protocol import StudyProtocol
+from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
 from study.participants.observers import observer_named
 from study.session.views.views import Answered, Reply, Unanswered

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from protocols.exposure import SittingLimits
+from protocols.definition.exposure import SittingLimits
 from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted, SessionResumed
 from study.session.facts.log_time import ClockStep, Moment, clock_step, passed_s
 from study.session.state.fold import apply, begin_session

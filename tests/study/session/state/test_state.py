@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.hashing import protocol_hash
-from protocols.staircase import begin, level_n, step
+from protocols.document.hashing import protocol_hash
+from protocols.procedure.staircase import begin, level_n, step
 from protocols.trial import Phase, TrialStatus
 from study.session.facts.events import (
     AnswerGiven,
@@ -283,7 +283,7 @@ def test_folding_gives_the_levels_of_the_staircase_alone(answers):
 
 
 def _small():
-    from protocols.loading import load_protocol
+    from protocols.document.loading import load_protocol
 
     text = (
         'name = "small"\nkind = "study"\ntitle = "t"\n[stimulus]\nfrequencies_hz = [25.0]\n'

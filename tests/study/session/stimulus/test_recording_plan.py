@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.apparatus import SafetySettings
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import MultisineSegment, SineSegment, SweepSegment
+from protocols.definition.apparatus import SafetySettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, limits_of_recording
 from study.session.stimulus.recording_plan import pieces
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.equalizer import Identity
-from protocols.apparatus import TestDirections
+from protocols.definition.apparatus import TestDirections
 from study.session.stimulus.limits import limits_of_study
 from study.session.stimulus.stimulus import direction_vector, held_stimulus, loop_length
 

@@ -3,7 +3,7 @@ from importlib.resources import files
 
 import pytest
 
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.session.views.handle_notice import handle_notice
 
 

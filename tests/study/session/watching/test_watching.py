@@ -6,8 +6,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from protocols.hashing import protocol_hash
-from protocols.loading import load_protocol
+from protocols.document.hashing import protocol_hash
+from protocols.document.loading import load_protocol
 from protocols.trial import Phase
 from study.session.facts.events import (
     AnswerGiven,

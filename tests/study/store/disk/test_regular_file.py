@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from study.cli.main import app
 from study.errors import StudyError
-from study.importing.arrays import read_arrays
-from study.importing.import_map import CsvMap
+from study.importing.arrays.arrays import read_arrays
+from study.importing.map_format.import_map import CsvMap
 from study.importing.map_library import find_map, read_map
 from study.store.disk.file_errors import CannotReadError
 from study.store.disk.provenance import sha256_of

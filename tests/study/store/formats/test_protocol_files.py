@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from protocols.hashing import protocol_hash
-from protocols.lock import lock_from_json
+from protocols.document.hashing import protocol_hash
+from protocols.document.lock import lock_from_json
 from study.errors import ExitCode, StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_time

@@ -17,7 +17,7 @@ from textual.screen import Screen
 
 from study.session.views.archive_views import DiagnosisView, HomeView, ProtocolLine, SessionLine, SessionView, Staircase
 from study.tui import home_messages
-from study.tui.keys_in_order import KeysInOrder
+from study.tui.keys.keys_in_order import KeysInOrder
 from study.tui.screens.help import HelpScreen
 from study.tui.themes import register_themes
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from study.session.views.archive_views import SessionView
-from study.tui.app_start import AppStart
-from study.tui.archive_screens import ArchiveScreens
-from study.tui.link.from_engine import Session
+from study.tui.app.app_start import AppStart
+from study.tui.app.archive_screens import ArchiveScreens
+from study.tui.engine.from_engine import Session
 from study.tui.screens.confirm_view import ConfirmView
 from study.tui.screens.home import HomeScreen
 from study.tui.screens.session import SessionScreen

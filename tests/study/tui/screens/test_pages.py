@@ -19,7 +19,7 @@ from study.session.views.views import (
     RestNotice,
     Welcome,
 )
-from study.tui.answer_keys import parse_keys
+from study.tui.keys.answer_keys import parse_keys
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.demo import DemoScreen
 from study.tui.screens.device_check import DeviceCheckScreen

@@ -8,8 +8,8 @@ from textual import events
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.session.views.views import Answered, DirectionPicture, Progress, Question, Task
-from study.tui import key_presses
-from study.tui.answer_keys import parse_keys
+from study.tui.keys import key_presses
+from study.tui.keys.answer_keys import parse_keys
 from study.tui.screens import trial
 from study.tui.screens.trial import TrialScreen
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from protocols.apparatus import SafetySettings
+from protocols.definition.apparatus import SafetySettings
 from study.devices.clock import VirtualClock
 from study.devices.opening import open_device
 from study.devices.rig import READING_SIZE

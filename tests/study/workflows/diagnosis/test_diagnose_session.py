@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.mechanical_model import MechanicalModel
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings

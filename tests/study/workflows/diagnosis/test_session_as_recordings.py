@@ -20,7 +20,7 @@ RATE_HZ = 1000
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory, small_text):
-    from protocols.loading import load_protocol
+    from protocols.document.loading import load_protocol
 
     data = tmp_path_factory.mktemp("data")
     plan = SessionPlan(

@@ -15,9 +15,9 @@ from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Verdict, rms
 from equalizer.tracking.learning.model_inverse import inverse_of
-from protocols.apparatus import SafetySettings
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import SweepSegment
+from protocols.definition.apparatus import SafetySettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import SweepSegment
 from study.devices.device import DeviceSettings
 from study.errors import DeviceError, LeftError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits

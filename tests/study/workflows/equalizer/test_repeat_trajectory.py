@@ -13,9 +13,9 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from protocols.apparatus import SafetySettings
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import SweepSegment
+from protocols.definition.apparatus import SafetySettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import SweepSegment
 from study.errors import DeviceError, LeftError, StudyError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model

@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 
 from study.cli.main import app
 from study.errors import StudyError
-from study.importing.arrays import read_arrays
-from study.importing.import_map import CsvMap
+from study.importing.arrays.arrays import read_arrays
+from study.importing.map_format.import_map import CsvMap
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.protocol_files import read_protocol

@@ -5,7 +5,7 @@ from scipy.io import savemat
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
-from study.importing.map_errors import ImportRefusedError, MapNeededError
+from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.import_recording import ImportPlan, import_recording
 

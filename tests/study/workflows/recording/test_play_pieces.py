@@ -7,10 +7,10 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from protocols.apparatus import SafetySettings, SpringSettings
-from protocols.loading import load_protocol
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import MultisineSegment, SweepSegment
+from protocols.definition.apparatus import SafetySettings, SpringSettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import MultisineSegment, SweepSegment
+from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError, LeftError

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from protocols.apparatus import SafetySettings
-from protocols.recording_protocol import RecordingProtocol
-from protocols.recording_segments import SineSegment, SweepSegment
+from protocols.definition.apparatus import SafetySettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.recording_segments import SineSegment, SweepSegment
 from study.errors import LeftError, StudyError
 from study.store.formats.recording_file import read_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device

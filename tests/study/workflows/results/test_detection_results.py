@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.store.formats.thresholds_file import read_thresholds
 from study.workflows.files.validate import validate_file
 from study.workflows.results.analysis_files import written_by_analysis

@@ -8,7 +8,7 @@ import pytest
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import NOT_STORED, ModelQuality, quality_sentence
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.store.formats.identified_model_file import write_identified_model

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from protocols.dumping import dump_protocol
-from protocols.preparation import ConsentSettings
-from protocols.williams import williams_rows
+from protocols.definition.preparation import ConsentSettings
+from protocols.document.dumping import dump_protocol
+from protocols.procedure.williams import williams_rows
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.participants.observers import observer_named

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from protocols.loading import load_protocol
+from protocols.document.loading import load_protocol
 from study.errors import StudyError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.sessions.archive import session_folders

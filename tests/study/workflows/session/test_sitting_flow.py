@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import pytest
 
-from protocols.dumping import dump_protocol
-from protocols.exposure import CatchSettings, DetectionSettings, GateSettings
-from protocols.loading import load_protocol
-from protocols.preparation import (
+from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings
+from protocols.definition.preparation import (
     ConsentSettings,
     DebriefQuestion,
     DemoSettings,
     PracticeSettings,
     SetupSettings,
 )
+from protocols.document.dumping import dump_protocol
+from protocols.document.loading import load_protocol
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault

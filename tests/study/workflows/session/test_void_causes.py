@@ -13,7 +13,7 @@ from study.store.formats.trials_file import TRIALS_NAME, read_trials
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_log
 from study.store.sessions.log_seal import seal_paths
-from study.tui.link.remote_display import silent
+from study.tui.engine.remote_display import silent
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
 from study.workflows.files.validate import validate_file
 from study.workflows.results.session_results import write_tables

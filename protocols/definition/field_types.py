@@ -1,0 +1,31 @@
+"""Kinds of values that several tables of a protocol share."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from protocols.definition.problem import Problem, refuse
+
+
+def _whole_tenths(frequency_hz: float) -> float:
+    if abs(frequency_hz * 10 - round(frequency_hz * 10)) > 1e-9:
+        allowed = "whole tenths of a hertz, so that whole periods can be looped"
+        refuse([Problem("", f"is {frequency_hz} Hz", allowed)])
+    return frequency_hz
+
+
+Name = Annotated[
+    str,
+    Field(
+        pattern=r"^[a-z][a-z0-9_]{0,63}$",
+        description="Names the protocol in files and logs: lower-case letters, digits and underscores.",
+    ),
+]
+Title = Annotated[str, Field(min_length=1, max_length=200, description="What reports and lists call it.")]
+Source = Annotated[
+    str,
+    Field(max_length=1000, description="Where the numbers come from. Default: empty, for numbers of one's own."),
+]
+Frequency = Annotated[float, Field(ge=0.5, le=500.0)]
+StimulusFrequency = Annotated[float, Field(ge=0.5, le=250.0), AfterValidator(_whole_tenths)]
+"""Up to 250 Hz, so that a period has four samples at 1 kHz at the least."""

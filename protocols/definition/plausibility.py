@@ -1,0 +1,94 @@
+"""What a reading of the handle's position may be. What is beyond is no handle: the force is let go."""
+
+from dataclasses import asdict
+from typing import Annotated
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.staircase_rule import STRICT
+
+
+@dataclass(frozen=True, config=STRICT)
+class PlausibilitySettings:
+    """Bounds of the position's readings. Each is several times what a hand and the shipped forces do: measured maxima
+    of the simulated omega.3 over all shipped protocols, with and without a hand, stand beside the defaults."""
+
+    workspace_m: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=0.5,
+            description="Largest distance from the device's origin. Default 0.12: an omega.3 reaches 0.08 m, and a "
+            "larger device needs more.",
+        ),
+    ] = 0.12
+    fastest_m_per_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=20,
+            description="Fastest motion from one reading to the next. Default 3: 6 N, the highest cap, throw a bare "
+            "0.25 kg to 2.7 m/s over the whole workspace, friction aside; fingers reach some 1 m/s. Measured: 0.3.",
+        ),
+    ] = 3.0
+    longest_jump_m: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=0.5,
+            description="Longest way from one reading to the next, however late that comes. Default 0.05: half a metre "
+            "per second over 0.1 s, the longest gap that a loop survives. Measured: 0.0003 per tick.",
+        ),
+    ] = 0.05
+    acceleration_mps2: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=10000,
+            description="Largest acceleration of the readings, averaged over 20 ms so that a bump against a stop is "
+            "none. Default 500: twice what 50 N of a hand give to 0.2 kg. Measured: 60, of encoders' steps too.",
+        ),
+    ] = 500.0
+    resolution_m: Annotated[
+        float,
+        Field(
+            ge=1e-7,
+            le=0.001,
+            description="Resolution of the encoders at the handle; less than half of it is no change. Default 0.00001, "
+            "as the omega.3's data sheet says.",
+        ),
+    ] = 1e-5
+    friction_n: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=3,
+            description="Forces that change by less than twice this need not move the handle. Default 0.5: more than "
+            "twice the friction of the simulated omega.3, and more than that of such devices.",
+        ),
+    ] = 0.5
+    stale_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=5,
+            description="A position that has not changed for so long, while the force must have moved even a handle "
+            "that is gripped hard (1 kg, 60 N s/m, 3000 N/m) by twice the resolution, is stale. Default 0.1: a "
+            "handle that sticks at its turning points does so for less, from 2 Hz on.",
+        ),
+    ] = 0.1
+    still_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=60,
+            description="Where the spring pulls with more than friction_n at a position that does not change, half of "
+            "this later the pull is taken back within the other half. A hand that rests on the spring then gives way; "
+            "a position that has not changed even so is stale. Default 1.",
+        ),
+    ] = 1.0
+
+
+UNTOUCHED = asdict(PlausibilitySettings())
+"""The table as it is where nothing of it is written."""

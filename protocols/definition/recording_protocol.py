@@ -1,0 +1,88 @@
+"""A recording as data: which excitations are played, where, and what holds the handle meanwhile."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.apparatus import SafetySettings, SpringSettings, TestDirections
+from protocols.definition.field_types import Name, Source, Title
+from protocols.definition.problem import Problem, refuse
+from protocols.definition.recording_segments import Segment
+from protocols.definition.staircase_rule import STRICT
+
+
+@dataclass(frozen=True, config=STRICT)
+class RecordingProtocol:
+    """Excitations that `hapteq record` plays one after another into one recording."""
+
+    name: Name
+    kind: Annotated[Literal["recording"], Field(description="Played by `hapteq record`.")]
+    title: Title
+    segments: Annotated[
+        tuple[Segment, ...], Field(min_length=1, max_length=200, description="Excitations, played in this order.")
+    ]
+    safety: SafetySettings
+    source: Source = ""
+    directions: TestDirections = Field(default_factory=TestDirections)
+    spring: SpringSettings = Field(default_factory=SpringSettings)
+    hand: Annotated[
+        Literal["none", "held"],
+        Field(
+            description="Whether a person holds the handle. Default 'none', because a spring repeats and a grip does "
+            "not; only a protocol that says 'held' is ever played into a hand."
+        ),
+    ] = "none"
+    rest_s: Annotated[
+        float,
+        Field(
+            ge=0.1,
+            le=60,
+            description="Rest before, between and after the excitations. Default 1: vibrations have died by then, and "
+            "the sensor's noise is on record.",
+        ),
+    ] = 1.0
+    repeats: Annotated[
+        int,
+        Field(
+            ge=1,
+            le=100,
+            description="How often the whole list is played. Default 1; more tell repeat noise from the device.",
+        ),
+    ] = 1
+    fade_s: Annotated[
+        float,
+        Field(gt=0, le=5, description="Every excitation rises and falls over this time. Default 0.1: no click."),
+    ] = 0.1
+    lower_on_clip: Annotated[
+        bool,
+        Field(
+            description="Whether an excitation at which the accelerometer or the total force reaches its limit is "
+            "played again with less. Default true: what was cut off tells nothing about the device."
+        ),
+    ] = True
+    least_amplitude_n: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=3.0,
+            description="No excitation is lowered below this. Default 0.2: about the friction of such a device, below "
+            "which it hardly moves.",
+        ),
+    ] = 0.2
+
+    @model_validator(mode="after")
+    def _within_caps(self) -> Self:
+        cap_n = self.safety.stimulus_cap_n
+        refuse(
+            [
+                Problem(
+                    f"segments[{number}].amplitude_n",
+                    f"is {segment.amplitude_n} N, above safety.stimulus_cap_n",
+                    f"above 0 and at most {cap_n} N, the cap",
+                )
+                for number, segment in enumerate(self.segments, start=1)
+                if segment.amplitude_n > cap_n
+            ]
+        )
+        return self

@@ -1,0 +1,142 @@
+"""The excitations of a recording protocol: sinusoids, swept sines, multisines."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.field_types import Frequency
+from protocols.definition.problem import Problem, refuse
+from protocols.definition.staircase_rule import STRICT
+
+Amplitude = Annotated[float, Field(gt=0, le=3.0, description="Peak of the force, in newtons.")]
+Along = Annotated[
+    Literal["x", "y", "z", "direction_1", "direction_2"],
+    Field(description="A device axis, or one of the two test directions."),
+]
+Period = Annotated[float, Field(gt=0, le=600, description="One period.")]
+Periods = Annotated[
+    int,
+    Field(
+        ge=1,
+        le=100,
+        description="Periods played, the transient's included. Default 2: one for the transient, one to count.",
+    ),
+]
+Role = Annotated[
+    Literal["fit", "test", ""],
+    Field(
+        description="What the excitation is for: 'fit' a model, or 'test' it on what it has not seen. Default: empty, "
+        "decided when the recording is used."
+    ),
+]
+
+
+@dataclass(frozen=True, config=STRICT)
+class SineSegment:
+    """Sinusoids one after another, each long enough to be steady before it counts."""
+
+    kind: Annotated[Literal["sine"], Field(description="Sinusoids, one after another.")]
+    frequencies_hz: Annotated[
+        tuple[Frequency, ...], Field(min_length=1, max_length=100, description="Played in this order.")
+    ]
+    amplitude_n: Amplitude
+    along: Along
+    duration_s: Annotated[float, Field(gt=0, le=600, description="Counted part of every sinusoid, whole periods.")]
+    settle_s: Annotated[
+        float,
+        Field(ge=0, le=60, description="Played before it and not counted. Default 1: resonances have died by then."),
+    ] = 1.0
+    role: Role = ""
+
+
+@dataclass(frozen=True, config=STRICT)
+class SweepSegment:
+    """A periodic logarithmic swept sine; the first period is there to let the transient die."""
+
+    kind: Annotated[Literal["sweep"], Field(description="A logarithmic swept sine.")]
+    from_hz: Annotated[Frequency, Field(description="Lowest frequency, where every period begins.")]
+    to_hz: Annotated[Frequency, Field(description="Highest frequency, where every period ends.")]
+    amplitude_n: Amplitude
+    along: Along
+    duration_s: Period
+    periods: Periods = 2
+    role: Role = ""
+
+    @model_validator(mode="after")
+    def _upwards(self) -> Self:
+        _refuse_downwards(self.from_hz, self.to_hz)
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class MultisineSegment:
+    """A periodic sum of sinusoids of equal size and random phases: all frequencies at once, on whole lines.
+
+    Odd lines leave the even ones empty: what the device answers there is noise and even distortion, not the signal.
+    Periods tell noise, because they differ in nothing else; realisations tell odd distortion, because only that
+    changes with the phases.
+    """
+
+    kind: Annotated[Literal["multisine"], Field(description="A sum of sinusoids with random phases.")]
+    from_hz: Annotated[Frequency, Field(description="No line lies below.")]
+    to_hz: Annotated[Frequency, Field(description="No line lies above.")]
+    amplitude_n: Annotated[
+        float, Field(gt=0, le=3.0, description="Peak of the force, in newtons; along all axes, peak of its norm.")
+    ]
+    along: Annotated[
+        Literal["x", "y", "z", "direction_1", "direction_2", "all"],
+        Field(
+            description="A device axis, a test direction, or 'all' three axes at once, each with phases of its own; "
+            "three realisations along all axes are orthogonal, so that axes can be told apart at every line."
+        ),
+    ]
+    duration_s: Annotated[float, Field(gt=0, le=600, description="One period: lines lie 1 / duration_s apart.")]
+    periods: Periods = 2
+    odd_only: Annotated[
+        bool,
+        Field(
+            description="Only odd multiples of 1 / duration_s. Default true: even distortion then falls between lines."
+        ),
+    ] = True
+    seed: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=2**53,
+            description="Of the phases. Default 1: any number will do, and the same one gives the same excitation.",
+        ),
+    ] = 1
+    realisations: Annotated[
+        int,
+        Field(
+            ge=1,
+            le=50,
+            description="How many excitations with phases of their own are played. Default 1; more tell distortion "
+            "from the linear device.",
+        ),
+    ] = 1
+    role: Role = ""
+
+    @model_validator(mode="after")
+    def _has_lines(self) -> Self:
+        _refuse_downwards(self.from_hz, self.to_hz)
+        first, last = math.ceil(self.from_hz * self.duration_s - 1e-9), math.floor(self.to_hz * self.duration_s + 1e-9)
+        lines = [line for line in range(first, min(last, first + 1) + 1) if line % 2 or not self.odd_only]
+        apart_hz = (2 if self.odd_only else 1) / self.duration_s
+        allowed = f"a period with lines between from_hz and to_hz, which lie {apart_hz:g} Hz apart here"
+        refuse([] if lines else [Problem("duration_s", f"is {self.duration_s} s, too short for the band", allowed)])
+        return self
+
+
+Segment = Annotated[SineSegment | SweepSegment | MultisineSegment, Field(discriminator="kind")]
+
+
+def highest_hz(segment: SineSegment | SweepSegment | MultisineSegment) -> float:
+    return max(segment.frequencies_hz) if isinstance(segment, SineSegment) else segment.to_hz
+
+
+def _refuse_downwards(from_hz: float, to_hz: float) -> None:
+    if to_hz <= from_hz:
+        refuse([Problem("to_hz", f"is {to_hz} Hz, not above from_hz", f"above {from_hz} Hz, the from_hz")])

@@ -1,0 +1,67 @@
+"""What no single table of a study protocol can see: values that contradict each other across tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from protocols.definition.problem import Problem
+
+if TYPE_CHECKING:
+    from protocols.definition.preparation import DemoSettings, PracticeSettings
+    from protocols.definition.study_protocol import StudyProtocol
+
+
+def contradictions(protocol: StudyProtocol) -> list[Problem]:
+    return [*_levels(protocol), *_times(protocol), *_names(protocol)]
+
+
+def _levels(protocol: StudyProtocol) -> list[Problem]:
+    problems, cap_n = [], protocol.staircase.cap_n
+    if protocol.safety.stimulus_cap_n < cap_n:
+        wrong = f"is {protocol.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
+        problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
+    levels = {
+        "demo.level_n": _highest_n(protocol.demo),
+        "practice.level_n": _highest_n(protocol.practice) if protocol.practice.frequencies_hz else 0.0,
+        "detection.start_n": protocol.detection.start_n if protocol.detection.frequencies_hz else 0.0,
+    }
+    for key, level_n in levels.items():
+        if level_n > cap_n:
+            wrong = f"is {level_n:g} N, with its rove_db, above staircase.cap_n"
+            problems.append(Problem(key, wrong, f"at most {cap_n} N, the cap"))
+    return problems
+
+
+def _highest_n(settings: DemoSettings | PracticeSettings) -> float:
+    """Half of the range lies above its middle."""
+    return settings.level_n * float(10.0 ** (settings.rove_db / 40.0))
+
+
+def _times(protocol: StudyProtocol) -> list[Problem]:
+    problems, limit_s = [], protocol.trial.time_limit_s
+    if limit_s >= protocol.safety.longest_trial_s:
+        wrong = f"is {limit_s} s, not below safety.longest_trial_s, which releases the device"
+        allowed = f"below {protocol.safety.longest_trial_s} s, or 0 for none"
+        problems.append(Problem("trial.time_limit_s", wrong, allowed))
+    if frequencies := protocol.all_frequencies_hz:
+        period_s = 1 / min(frequencies)
+        if protocol.measurement.keep_s < period_s:
+            wrong = f"is {protocol.measurement.keep_s} s, less than one period of the lowest frequency"
+            problems.append(Problem("measurement.keep_s", wrong, f"at least {period_s:g} s"))
+    else:
+        wrong = "is empty, and so are training, practice and detection: nothing would be played"
+        problems.append(Problem("stimulus.frequencies_hz", wrong, "at least one frequency in one of them"))
+    detection, fades_s = protocol.detection, protocol.stimulus.fade_in_s + protocol.stimulus.fade_out_s
+    if detection.frequencies_hz and detection.interval_s <= fades_s:
+        wrong = f"is {detection.interval_s} s, no longer than the fades together"
+        problems.append(Problem("detection.interval_s", wrong, f"more than {fades_s:g} s"))
+    return problems
+
+
+def _names(protocol: StudyProtocol) -> list[Problem]:
+    problems, buttons = [], protocol.trial.device_buttons
+    if len(set(buttons)) not in (0, 2):
+        problems.append(Problem("trial.device_buttons", f"is {list(buttons)}", "two different button numbers, or none"))
+    if len({question.key for question in protocol.debrief}) < len(protocol.debrief):
+        problems.append(Problem("debrief", "uses a key twice", "a key of its own for every question"))
+    return problems

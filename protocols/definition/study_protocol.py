@@ -1,0 +1,252 @@
+"""A study as data: every number that a session needs, each with its unit, bounds and reason."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.apparatus import SafetySettings, SpringSettings, TestDirections
+from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
+from protocols.definition.field_types import Name, Source, StimulusFrequency, Title
+from protocols.definition.preparation import (
+    ConsentSettings,
+    DebriefQuestion,
+    DemoSettings,
+    PracticeSettings,
+    SetupSettings,
+)
+from protocols.definition.problem import Problem, refuse
+from protocols.definition.staircase_rule import STRICT, StaircaseRule
+from protocols.definition.study_contradictions import contradictions
+
+
+@dataclass(frozen=True, config=STRICT)
+class StimulusSettings:
+    """One sinusoidal force along one of two directions, held until the answer."""
+
+    frequencies_hz: Annotated[
+        tuple[StimulusFrequency, ...],
+        Field(max_length=20, description="One staircase each, in hertz. Empty for a session of training alone."),
+    ]
+    quantity: Annotated[
+        Literal["commanded_force", "delivered_acceleration"],
+        Field(
+            description="What the staircase moves. Default: the commanded force, as published. "
+            "'delivered_acceleration' needs an equalizer model and is refused without one."
+        ),
+    ] = "commanded_force"
+    fade_in_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=5,
+            description="The amplitude rises over this time. Default 0.5: two and a half periods at 5 Hz, so that "
+            "no onset tells the direction.",
+        ),
+    ] = 0.5
+    fade_out_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=5,
+            description="The amplitude falls over this time after the answer. Default 0.25: no jerk, no waiting.",
+        ),
+    ] = 0.25
+    fade_shape: Annotated[
+        Literal["raised_cosine", "linear"],
+        Field(description="Default: raised cosine, because it has no corner at either end, hence no click."),
+    ] = "raised_cosine"
+    onset_polarity: Annotated[
+        Literal["random", "positive"],
+        Field(
+            description="Sign of the first half-wave. Default: random, so that the first push does not "
+            "tell the direction."
+        ),
+    ] = "random"
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        if len(set(self.frequencies_hz)) != len(self.frequencies_hz):
+            refuse([Problem("frequencies_hz", "names a frequency twice", "every frequency once")])
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class ScheduleSettings:
+    """In which order things come, and what is drawn by lot."""
+
+    order: Annotated[
+        Literal["random", "williams", "as_listed"],
+        Field(
+            description="Order of the frequencies. Default: random, as published; 'williams' balances "
+            "position and first-order carry-over over participants."
+        ),
+    ] = "random"
+    directions: Annotated[
+        Literal["independent", "balanced"],
+        Field(
+            description="How directions are drawn. Default: independently, because then no run of equal directions "
+            "tells the next one. 'balanced' shows both equally often within every eight trials."
+        ),
+    ] = "independent"
+    labels: Annotated[
+        Literal["fixed", "swapped_for_half"],
+        Field(
+            description="Whether the numbers 1 and 2 change places for every second participant. Default: "
+            "fixed, as published; swapping separates a liking for a key from a direction."
+        ),
+    ] = "fixed"
+
+
+@dataclass(frozen=True, config=STRICT)
+class TrialSettings:
+    """One presentation and its answer."""
+
+    device_buttons: Annotated[
+        tuple[int, ...],
+        Field(
+            max_length=2,
+            description="Numbers of the device's buttons that answer 1 and 2, beside the keys. Default: none.",
+        ),
+    ] = ()
+
+    feedback: Annotated[
+        Literal["none", "after_answer"],
+        Field(
+            description="Whether the participant learns if the answer was right. Default: none, because none is "
+            "published and it would teach cues other than direction."
+        ),
+    ] = "none"
+    repeats_per_run: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=100,
+            description="How often in a run the participant may ask for the same stimulus again. Default 3: for a "
+            "cough or a noise in some 60 trials. 0: never.",
+        ),
+    ] = 3
+    time_limit_s: Annotated[
+        float,
+        Field(ge=0, le=600, description="Longest time to answer. Default 0: as long as wanted, as published."),
+    ] = 0.0
+    pause_between_s: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=60,
+            description="Still time between an answer and the next stimulus. Default 0.5: the hand feels the next "
+            "onset as new.",
+        ),
+    ] = 0.5
+
+
+@dataclass(frozen=True, config=STRICT)
+class TrainingSettings:
+    """Runs before the study proper. They follow the same rule and enter no result."""
+
+    frequencies_hz: Annotated[
+        tuple[StimulusFrequency, ...],
+        Field(max_length=20, description="One training run each, in this order. Default: no training."),
+    ] = ()
+    trial_limit: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=1000,
+            description="A training run ends after this many trials at the latest. Default 0: a whole staircase, "
+            "so that no participant starts untrained.",
+        ),
+    ] = 0
+    feedback: Annotated[
+        Literal["none", "after_answer"],
+        Field(description="As trial.feedback, for the training alone. Default: none, like the trials it prepares."),
+    ] = "none"
+
+
+@dataclass(frozen=True, config=STRICT)
+class RestSettings:
+    """Enforced pauses: vibration numbs the hand."""
+
+    after_run_s: Annotated[
+        float,
+        Field(ge=0, le=3600, description="Shortest rest between two runs. Default 60: numbness fades in a minute."),
+    ] = 60.0
+    after_trials: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=1000,
+            description="A rest within a run after this many trials. Default 0: none, because a run takes minutes.",
+        ),
+    ] = 0
+    within_run_s: Annotated[
+        float,
+        Field(ge=0, le=3600, description="Shortest rest within a run. Default 30; idle while after_trials is 0."),
+    ] = 30.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class MeasurementSettings:
+    """What is kept of every trial, and when a trial is void because of the device."""
+
+    keep_s: Annotated[
+        float,
+        Field(
+            gt=0,
+            le=60,
+            description="The last whole periods of the steady part, this long at the most, are kept as a recording. "
+            "Default 1: five periods at 5 Hz.",
+        ),
+    ] = 1.0
+    missed_ticks_limit: Annotated[
+        float,
+        Field(
+            ge=0,
+            le=1,
+            description="A trial with a larger share of missed 1 kHz ticks is void and comes again. Default 0.02: "
+            "fewer cannot be felt.",
+        ),
+    ] = 0.02
+
+
+@dataclass(frozen=True, config=STRICT)
+class StudyProtocol:
+    """A forced-choice staircase study on two directions."""
+
+    name: Name
+    kind: Annotated[Literal["study"], Field(description="Taken by a participant with `hapteq study`.")]
+    title: Title
+    stimulus: StimulusSettings
+    staircase: StaircaseRule
+    directions: TestDirections
+    safety: SafetySettings
+    source: Source = ""
+    schedule: ScheduleSettings = Field(default_factory=ScheduleSettings)
+    trial: TrialSettings = Field(default_factory=TrialSettings)
+    training: TrainingSettings = Field(default_factory=TrainingSettings)
+    rests: RestSettings = Field(default_factory=RestSettings)
+    spring: SpringSettings = Field(default_factory=SpringSettings)
+    measurement: MeasurementSettings = Field(default_factory=MeasurementSettings)
+    consent: ConsentSettings = Field(default_factory=ConsentSettings)
+    setup: SetupSettings = Field(default_factory=SetupSettings)
+    demo: DemoSettings = Field(default_factory=DemoSettings)
+    practice: PracticeSettings = Field(default_factory=PracticeSettings)
+    detection: DetectionSettings = Field(default_factory=DetectionSettings)
+    catch: CatchSettings = Field(default_factory=CatchSettings)
+    gate: GateSettings = Field(default_factory=GateSettings)
+    limits: SittingLimits = Field(default_factory=SittingLimits)
+    debrief: Annotated[
+        tuple[DebriefQuestion, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")
+    ] = ()
+
+    @property
+    def all_frequencies_hz(self) -> tuple[float, ...]:
+        """Everything that may be played, each once, ascending."""
+        parts = (self.stimulus, self.training, self.practice, self.detection)
+        return tuple(sorted({frequency_hz for part in parts for frequency_hz in part.frequencies_hz}))
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        refuse(contradictions(self))
+        return self

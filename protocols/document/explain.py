@@ -1,0 +1,51 @@
+"""Every number and choice of a protocol with its default and the reason for it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.dumping import protocol_values
+from protocols.document.refusals import key_path
+from protocols.document.schema import Node, Place, allowed, node_at, protocol_schema, resolved
+
+Plain = str | int | float | bool | list[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedField:
+    key: str
+    """Dotted path; entries of lists of tables count from 1: `staircase.steps[2].step_db`."""
+    value: Plain
+    default: Plain | None
+    """None where every protocol must state the value itself."""
+    description: str
+    """What it is, and why the default is what it is."""
+    allowed: str
+
+
+def explain(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
+    """All fields in the order of the schema, tables flattened."""
+    root = protocol_schema(protocol.kind)
+    return tuple(_fields(root, protocol_values(protocol), ()))
+
+
+def _fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
+    node = resolved(root, node_at(root, place) or {})
+    if isinstance(value, dict):
+        # An entry of a mixed list: its kind picks the schema.
+        tag = (value[node["discriminator"]["propertyName"]],) if "oneOf" in node else ()
+        for key, inner in value.items():
+            yield from _fields(root, inner, (*place, *tag, key))
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for index, inner in enumerate(value):
+            yield from _fields(root, inner, (*place, index))
+    else:
+        yield ExplainedField(
+            key=key_path(root, place),
+            value=value,
+            default=node.get("default"),
+            description=node.get("description", ""),
+            allowed=allowed(root, node, str(place[-1])),
+        )

@@ -1,0 +1,70 @@
+"""The fingerprint of a protocol: equal for equal values, whatever the file looks like."""
+
+import hashlib
+import json
+from typing import Any
+
+from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
+from protocols.definition.plausibility import UNTOUCHED
+from protocols.definition.preparation import ConsentSettings, DemoSettings, PracticeSettings, SetupSettings
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.dumping import protocol_values
+
+Untouched = str | float | bool | list[Any] | dict[str, Any]
+
+TABLES_SINCE = {
+    "consent": ConsentSettings(),
+    "setup": SetupSettings(),
+    "demo": DemoSettings(),
+    "practice": PracticeSettings(),
+    "detection": DetectionSettings(),
+    "catch": CatchSettings(),
+    "gate": GateSettings(),
+    "limits": SittingLimits(),
+    "debrief": (),
+}
+"""Tables that came after the first locks and sessions, as they are where no file writes them: then they do not count,
+or an old fingerprint would fit no more."""
+
+SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
+
+ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0}
+
+FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
+    "study": {"trial.device_buttons": [], "trial.repeats_per_run": 3, **ROVE_SINCE, **SAFETY_SINCE},
+    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
+}
+"""Likewise single fields, for each kind of protocol; `segments.role` is that of every segment."""
+
+
+def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
+    """SHA-256, 64 hexadecimal digits, of all values, defaults included.
+
+    Comments, the order of keys, and whether a default is written out make no difference. The title and the source
+    count: they, too, are what was fixed before data came in.
+    """
+    values = protocol_values(protocol)
+    if isinstance(protocol, StudyProtocol):
+        for name, untouched in TABLES_SINCE.items():
+            if getattr(protocol, name) == untouched:
+                del values[name]
+    for path, untouched in FIELDS_SINCE[protocol.kind].items():
+        _leave_out(values, path.split("."), untouched)
+    # JSON writes 0.0 and -0.0 apart, though the values are equal.
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    plain = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
+    canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def _leave_out(values: Any, path: list[str], untouched: Untouched) -> None:
+    """Remove the field, in all entries of a list, where it is as it is without being written."""
+    if isinstance(values, list):
+        for entry in values:
+            _leave_out(entry, path, untouched)
+    elif len(path) > 1:
+        if path[0] in values:
+            _leave_out(values[path[0]], path[1:], untouched)
+    elif values.get(path[0]) == untouched:
+        del values[path[0]]

@@ -1,0 +1,74 @@
+"""A protocol that is fixed before data come in: its fingerprint, and the check against it."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.hashing import protocol_hash
+
+FORMAT = "hapteq-protocol-lock"
+VERSION = 1
+
+
+class LockError(ValueError):
+    """A lock that cannot be read, or a protocol that is no longer the locked one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolLock:
+    name: str
+    hash: str
+    """As `protocol_hash` gives it."""
+    locked_utc: str
+    """ISO 8601."""
+    hapteq: str
+    """Version of hapteq that locked it."""
+
+
+def lock_of(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq: str) -> ProtocolLock:
+    return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq)
+
+
+def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked: str) -> None:
+    """Raise LockError unless `protocol` is, value by value, the one that was locked.
+
+    locked: when, as the reader's clock has it.
+    """
+    if protocol.name != lock.name:
+        raise LockError(f"the lock is that of protocol {lock.name}, not of {protocol.name}")
+    now = protocol_hash(protocol)
+    if now != lock.hash:
+        raise LockError(
+            f"protocol {lock.name} was locked on {locked} and has changed since: "
+            f"its fingerprint is {now[:12]}…, the locked one {lock.hash[:12]}…"
+        )
+
+
+def lock_to_json(lock: ProtocolLock) -> str:
+    document = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": lock.name,
+        "hash": lock.hash,
+        "locked_utc": lock.locked_utc,
+        "hapteq": lock.hapteq,
+    }
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def lock_from_json(text: str) -> ProtocolLock:
+    """Raises LockError that says what is wrong with the document."""
+    try:
+        document: Any = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise LockError(f"a lock is a JSON document, but this is none: {error}") from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise LockError(f'a lock says "format": "{FORMAT}", and this document does not')
+    if document.get("version") != VERSION:
+        raise LockError(f"the lock is of version {document.get('version')}, and this hapteq knows version {VERSION}")
+    wrong = [key for key in ("name", "hash", "locked_utc", "hapteq") if not isinstance(document.get(key), str)]
+    if wrong:
+        raise LockError(f"the lock lacks the text {', '.join(wrong)}")
+    return ProtocolLock(document["name"], document["hash"], document["locked_utc"], document["hapteq"])

@@ -1,0 +1,130 @@
+"""The published schema of protocol files, and what it allows at any place of one.
+
+The schema is made from the code: key names, bounds, defaults and reasons are written once, in the dataclasses.
+"""
+
+from functools import cache
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.study_protocol import StudyProtocol
+
+Node = dict[str, Any]
+"""A JSON Schema, or a part of one."""
+Place = tuple[str | int, ...]
+"""The way from the top of a protocol to one value: names of keys and indexes of list entries, from 0."""
+
+ADAPTERS: dict[str, TypeAdapter[Any]] = {
+    "study": TypeAdapter(StudyProtocol),
+    "recording": TypeAdapter(RecordingProtocol),
+}
+"""One for each `kind` of protocol."""
+
+UNITS = {
+    "n": "newtons",
+    "db": "decibels",
+    "s": "seconds",
+    "hz": "hertz",
+    "deg": "degrees",
+    "n_s_per_m": "N s/m",
+    "m": "metres",
+    "m_per_s": "m/s",
+    "mps2": "m/s²",
+}
+"""What the suffix of a key says about its value."""
+
+
+@cache
+def protocol_schema(kind: str) -> Node:
+    """JSON Schema of a protocol of this kind, "study" or "recording"."""
+    return ADAPTERS[kind].json_schema()
+
+
+def node_at(root: Node, place: Place) -> Node | None:
+    """The schema of one value; None where the schema knows nothing of the kind."""
+    node: Node | None = root
+    for part in place:
+        node = _below(root, node, part) if node is not None else None
+    return node
+
+
+def keys_of(root: Node, node: Node) -> tuple[str, ...]:
+    """The keys of a table, in the order in which they are documented."""
+    return tuple(resolved(root, node).get("properties", {}))
+
+
+def resolved(root: Node, node: Node) -> Node:
+    """The node, with what it refers to."""
+    if "$ref" not in node:
+        return node
+    target: Node = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+    return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+
+
+def allowed(root: Node, node: Node, key: str = "") -> str:
+    """In words, what a value may be. The key's suffix tells the unit."""
+    node = resolved(root, node)
+    if "oneOf" in node:
+        return f"a table whose {node['discriminator']['propertyName']} is {_choices(node['discriminator']['mapping'])}"
+    if "enum" in node or "const" in node:
+        return _choices(node.get("enum", [node.get("const")]))
+    match node.get("type"):
+        case "number" | "integer":
+            return _number(node) + unit_of(key)
+        case "boolean":
+            return "true or false"
+        case "string":
+            return _text(node)
+        case "array":
+            return _list(root, node, key)
+        case _:
+            return f"a table with the keys {', '.join(keys_of(root, node))}"
+
+
+def unit_of(key: str) -> str:
+    """ ", in newtons" for `start_n`; nothing for a key without a unit."""
+    for suffix, unit in sorted(UNITS.items(), key=lambda item: -len(item[0])):
+        if key.endswith(f"_{suffix}"):
+            return f", in {unit}"
+    return ""
+
+
+def _below(root: Node, node: Node, part: str | int) -> Node | None:
+    node = resolved(root, node)
+    if isinstance(part, int):
+        return node.get("items")
+    if "oneOf" in node:
+        reference = node["discriminator"]["mapping"].get(part)
+        return {"$ref": reference} if reference else None
+    child: Node | None = node.get("properties", {}).get(part)
+    return child
+
+
+def _choices(values: Any) -> str:
+    names = [f'"{value}"' for value in values]
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def _number(node: Node) -> str:
+    kind = "a whole number" if node["type"] == "integer" else "a number"
+    bounds = [
+        f"{word} {node[bound]:g}"
+        for bound, word in (("exclusiveMinimum", "above"), ("minimum", "from"), ("maximum", "up to"))
+        if bound in node
+    ]
+    return " ".join([kind, *bounds])
+
+
+def _text(node: Node) -> str:
+    if "pattern" in node:
+        return "text in quotes: a lower-case letter, then up to 63 lower-case letters, digits and underscores"
+    shortest, longest = node.get("minLength", 0), node.get("maxLength")
+    return f"text in quotes, {shortest} to {longest} characters long" if longest else "text in quotes"
+
+
+def _list(root: Node, node: Node, key: str) -> str:
+    fewest, most = node.get("minItems", 0), node.get("maxItems")
+    count = f"{fewest} to {most}" if most else f"{fewest} or more"
+    return f"a list of {count} entries, each {allowed(root, node['items'], key)}"

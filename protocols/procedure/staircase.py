@@ -1,0 +1,154 @@
+"""The transformed up-down staircase: which level comes next, and when a run is over.
+
+Read `step` first: it is the whole rule. A run is a value: `begin` makes it, `step` returns the next one.
+Levels are kept in dB re 1 N, because after the first contact with the cap they leave the 1 dB grid.
+
+Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from protocols.definition.staircase_rule import StaircaseRule, StepChange
+
+
+class Heading(Enum):
+    """Which way the level moved last. The first movement of a run has nothing to turn from."""
+
+    NONE = "none"
+    UP = "up"
+    DOWN = "down"
+
+
+@dataclass(frozen=True, slots=True)
+class StaircaseState:
+    """Where one run stands before its next trial."""
+
+    level_db: float
+    right_in_a_row: int = 0
+    wrong_in_a_row: int = 0
+    heading: Heading = Heading.NONE
+    reversal_levels_db: tuple[float, ...] = ()
+    reversal_trials: tuple[int, ...] = ()
+    """Index of the trial whose answer made each turn, from 0."""
+    trials: int = 0
+    trials_at_cap: int = 0
+    pushes_against_cap: int = 0
+    """How often the rule asked for more than the cap."""
+    reversals_at_cap: int = 0
+
+    @property
+    def reversals(self) -> int:
+        return len(self.reversal_levels_db)
+
+
+def begin(rule: StaircaseRule) -> StaircaseState:
+    return StaircaseState(level_db=to_db(rule.start_n))
+
+
+def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
+    """The state after one answer.
+
+    The level goes up after `up_after_wrong` wrong answers in a row and down after `down_after_right` right
+    ones; a turn of the level's direction is a reversal; the run ends with the last reversal at once.
+    """
+    if finished(rule, state):
+        raise ValueError("this run is finished: no answer can follow")
+    counted = _count(rule, state, correct)
+    if counted.wrong_in_a_row >= _wrong_needed(rule, state):
+        return _move(rule, counted, Heading.UP)
+    if counted.right_in_a_row >= _right_needed(rule, state):
+        return _move(rule, counted, Heading.DOWN)
+    return counted
+
+
+def finished(rule: StaircaseRule, state: StaircaseState) -> bool:
+    out_of_trials = rule.trial_limit > 0 and state.trials >= rule.trial_limit
+    return state.reversals >= rule.reversals or out_of_trials
+
+
+def level_n(rule: StaircaseRule, state: StaircaseState) -> float:
+    """The level to present, in newtons: never above the cap, also not by rounding of the dB."""
+    return min(to_newton(state.level_db), rule.cap_n)
+
+
+def to_db(level_n: float) -> float:
+    return 20.0 * math.log10(level_n)
+
+
+def to_newton(level_db: float) -> float:
+    return float(10.0 ** (level_db / 20.0))
+
+
+def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
+    return replace(
+        state,
+        right_in_a_row=state.right_in_a_row + 1 if correct else 0,
+        wrong_in_a_row=0 if correct else state.wrong_in_a_row + 1,
+        trials=state.trials + 1,
+        trials_at_cap=state.trials_at_cap + _at_cap(rule, state.level_db),
+    )
+
+
+def _move(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> StaircaseState:
+    """Move one step. Counters start afresh; a push against the cap moves nothing and turns nothing."""
+    fresh = replace(state, right_in_a_row=0, wrong_in_a_row=0)
+    if heading is Heading.UP and _at_cap(rule, state.level_db):
+        return replace(fresh, pushes_against_cap=state.pushes_against_cap + 1)
+    turned = state.heading is not Heading.NONE and heading is not state.heading
+    size_db = _step_db(rule, state.reversals, turned)
+    wanted_db = state.level_db + (size_db if heading is Heading.UP else -size_db)
+    cap_db = to_db(rule.cap_n)
+    after = replace(
+        fresh,
+        level_db=min(wanted_db, cap_db),
+        heading=heading,
+        pushes_against_cap=state.pushes_against_cap + (wanted_db > cap_db + _SAME_DB),
+    )
+    if not turned:
+        return after
+    return replace(
+        after,
+        reversal_levels_db=(*state.reversal_levels_db, state.level_db),
+        reversal_trials=(*state.reversal_trials, state.trials - 1),
+        reversals_at_cap=state.reversals_at_cap + _at_cap(rule, state.level_db),
+    )
+
+
+def _step_db(rule: StaircaseRule, reversals_before: int, turned: bool) -> float:
+    """Size of the step about to be taken, by how many reversals belong to the schedule's current phase."""
+    reversals_now = reversals_before + turned
+    match rule.step_change:
+        case StepChange.AFTER_REVERSAL:
+            # The reversal that completes a phase is still answered with that phase's step.
+            counted = reversals_before
+        case StepChange.AT_REVERSAL:
+            counted = reversals_now
+        case StepChange.AT_NEXT_REVERSAL:
+            counted = reversals_now - 1
+    for phase in rule.steps:
+        if counted < phase.reversals:
+            return phase.step_db
+        counted -= phase.reversals
+    return rule.steps[-1].step_db
+
+
+def _wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
+    return 1 if _in_initial_phase(rule, state) else rule.up_after_wrong
+
+
+def _right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
+    return 1 if _in_initial_phase(rule, state) else rule.down_after_right
+
+
+def _in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
+    return rule.initial_one_up_one_down and state.reversals == 0
+
+
+_SAME_DB = 1e-9
+"""Levels closer than this are one level; below any step a protocol may ask for."""
+
+
+def _at_cap(rule: StaircaseRule, level_db: float) -> bool:
+    return level_db >= to_db(rule.cap_n) - _SAME_DB

@@ -1,0 +1,66 @@
+"""What a foreign file holds: arrays by name, whatever its kind."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.arrays.csv_arrays import read_csv_arrays
+from study.importing.arrays.mat_arrays import read_mat5_arrays
+from study.importing.arrays.stored_arrays import read_hdf5_arrays, read_npz_arrays
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
+from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileError
+from study.store.disk.hdf5_file import is_hdf5
+from study.store.disk.regular_file import open_regular
+
+Array = npt.NDArray[Any]
+KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
+TABLES = (".csv", ".txt", ".tsv", ".dat")
+
+_CHECK = "Check the file; nothing else can be read from it."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrays:
+    """Of one file. Dimensions of one are gone: a column is (n,), a single number ()."""
+
+    path: Path
+    by_name: Mapping[str, Array]
+
+    @property
+    def name(self) -> str:
+        return self.path.name
+
+
+def read_arrays(path: Path, table: CsvMap) -> Arrays:
+    """Raises CannotReadError, ImportRefusedError."""
+    try:
+        open_regular(path).close()
+    except OSError as problem:
+        raise CannotReadError(path, problem) from problem
+    try:
+        found = _read(path, table)
+    except UnusableFileError as refused:
+        raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
+    except DAMAGED as problem:
+        raise ImportRefusedError(path.name, str(problem) or type(problem).__name__, _CHECK) from problem
+    if not found:
+        raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")
+    return Arrays(path, {name: np.squeeze(array) for name, array in found.items()})
+
+
+def _read(path: Path, table: CsvMap) -> dict[str, Array]:
+    match path.suffix.lower():
+        case ".npz" | ".npy":
+            return read_npz_arrays(path)
+        case ".mat":
+            return read_hdf5_arrays(path, transposed=True) if is_hdf5(path) else read_mat5_arrays(path)
+        case ".h5" | ".hdf5":
+            return read_hdf5_arrays(path, transposed=False)
+        case suffix if suffix in TABLES:
+            return read_csv_arrays(path, table)
+    raise ValueError(f"its kind is not known here; known are {KINDS}")

@@ -1,0 +1,219 @@
+"""Expressions of a map: arithmetic over arrays, and nothing else. Read by Python's parser, never evaluated by it.
+
+What is not in the lists below is refused by name: no attributes, no calls but ours, no comprehensions.
+"""
+
+import ast
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.expressions.budget import Budget
+from study.importing.expressions.functions import FUNCTIONS, Clock, Value
+from study.importing.map_format.map_errors import ImportProblemError, suggestion
+
+Lookup = Callable[[str], Value]
+"""The value of a name. Raises ImportProblemError for one that is not there."""
+
+LONGEST = 2000
+_CALL_COSTS = 20
+"""Times what an addition costs: the slowest functions sort, or compute a sine."""
+
+_OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+    ast.Mod: np.mod,
+}
+_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: np.less,
+    ast.LtE: np.less_equal,
+    ast.Gt: np.greater,
+    ast.GtE: np.greater_equal,
+}
+ALLOWED = "allowed are numbers, names, + - * / ** %, < <= > >=, [ ] and the functions " + ", ".join(sorted(FUNCTIONS))
+
+
+def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:
+    """The value of an expression: an array of float64, or a number as an array of shape ().
+
+    Raises ImportProblemError with the part that is not understood, or that costs more than the budget leaves.
+    """
+    tree = parsed(text)
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, which is told as such later
+            value: Value | str = _Evaluation(text, lookup, clock, budget).of(tree)
+    except (MemoryError, RecursionError) as error:
+        raise ImportProblemError(f"'{text}' needs more memory than there is") from error
+    if isinstance(value, str):
+        raise ImportProblemError(f"'{text}' is a text, not numbers")
+    return value
+
+
+def names_in(text: str) -> set[str]:
+    """Of arrays, channels and definitions that an expression needs. Raises ImportProblemError."""
+    tree = parsed(text)
+    functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    plain = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
+    quoted = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    return (plain | quoted) - {"pi", "clock_s", "rate_hz"}
+
+
+@lru_cache(maxsize=1024)
+def parsed(text: str) -> ast.expr:
+    """Raises ImportProblemError."""
+    if not text.strip():
+        raise ImportProblemError("the expression is empty")
+    if len(text) > LONGEST:
+        raise ImportProblemError(f"the expression has {len(text)} characters; up to {LONGEST} are read")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        raise ImportProblemError(f"'{text}' is not an expression ({_reason(error)}); {ALLOWED}") from error
+
+
+class _Evaluation:
+    def __init__(self, text: str, lookup: Lookup, clock: Clock, budget: Budget) -> None:
+        self.text = text
+        self.lookup = lookup
+        self.clock = clock
+        self.budget = budget
+
+    def of(self, node: ast.expr) -> Any:
+        with self.budget.deeper(self.text):
+            match node:
+                case ast.Constant() | ast.Name():
+                    return self._leaf(node)
+                case ast.UnaryOp(op=ast.USub(), operand=inner):
+                    return self._negative(inner)
+                case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+                    return self._numbers(inner)
+                case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATIONS:
+                    return self._together(_OPERATIONS[type(operator)], left, right)
+                case ast.Compare(left=left, ops=[order], comparators=[right]) if type(order) in _COMPARISONS:
+                    return self._together(_COMPARISONS[type(order)], left, right)
+                case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                    return self._call(name, arguments)
+                case ast.Subscript(value=inner, slice=index):
+                    return self._part(inner, index)
+            raise self._refused(node)
+
+    def _leaf(self, node: ast.Constant | ast.Name) -> Any:
+        self.budget.spend(0, self.text)
+        match node:
+            case ast.Name(id="pi"):
+                return np.float64(np.pi)
+            case ast.Name(id=name):
+                return self.lookup(name)
+            case ast.Constant(value=str() as word):
+                return word
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and abs(number) < 1e300:
+                return np.float64(number)
+        raise self._refused(node)
+
+    def _numbers(self, node: ast.expr) -> Value:
+        value = self.of(node)
+        if isinstance(value, str):
+            raise ImportProblemError(f"in '{self.text}' the text '{value}' stands where numbers are needed")
+        numbers: Value = value
+        return numbers
+
+    def _negative(self, node: ast.expr) -> Value:
+        value = self._numbers(node)
+        self.budget.spend(np.size(value), self.text)
+        return np.negative(value)
+
+    def _together(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
+        one = self._numbers(left)
+        with self.budget.holding(np.size(one)):
+            two = self._numbers(right)
+        try:
+            self._spend_on((one, two), 1)
+            return np.asarray(operation(one, two), dtype=np.float64)
+        except ImportProblemError:
+            raise
+        except ValueError as error:
+            raise ImportProblemError(
+                f"in '{self.text}' arrays of the shapes {np.shape(one)} and {np.shape(two)} do not go together"
+            ) from error
+
+    def _spend_on(self, values: Sequence[Value], times: int) -> None:
+        """Of all values together, which are as large as the largest. Raises ValueError where they do not fit."""
+        size = math.prod(np.broadcast_shapes(*(np.shape(value) for value in values)))
+        with self.budget.holding(sum(np.size(value) for value in values)):
+            self.budget.spend(size, self.text, times)
+
+    def _call(self, name: str, arguments: list[ast.expr]) -> Value:
+        if name == "array":
+            return self._quoted(arguments)
+        if name not in FUNCTIONS:
+            raise ImportProblemError(
+                f"in '{self.text}' there is no function '{name}'{suggestion(name, FUNCTIONS)}; {ALLOWED}"
+            )
+        function = FUNCTIONS[name]
+        if not function.fewest <= len(arguments) <= function.most:
+            raise ImportProblemError(f"in '{self.text}' {function.usage} was given {len(arguments)} values")
+        values: list[Value] = []
+        for argument in arguments:
+            with self.budget.holding(sum(np.size(value) for value in values)):
+                values.append(self._numbers(argument))
+        try:
+            if name == "repeat":
+                self.budget.spend(np.size(values[0]) * float(values[1]), self.text)
+            else:
+                self._spend_on(values, _CALL_COSTS)
+            return np.asarray(function.call(self.clock, *values), dtype=np.float64)
+        except ImportProblemError:
+            raise
+        except (ValueError, IndexError, TypeError, ArithmeticError) as error:
+            raise ImportProblemError(f"in '{self.text}' {function.usage} fails: {error}") from error
+
+    def _quoted(self, arguments: list[ast.expr]) -> Value:
+        match arguments:
+            case [ast.Constant(value=str() as name)]:
+                return self.lookup(name)
+        raise ImportProblemError(f"in '{self.text}' array(\"NAME\") takes one name in quotes")
+
+    def _part(self, inner: ast.expr, index: ast.expr) -> Value:
+        whole = self._numbers(inner)
+        entries = index.elts if isinstance(index, ast.Tuple) else [index]
+        places: list[int | slice] = []
+        with self.budget.holding(np.size(whole)), self.budget.deeper(self.text):
+            for entry in entries:
+                places.append(self._index(entry))
+        try:
+            part: npt.NDArray[np.float64] = np.asarray(whole)[tuple(places)]
+        except IndexError as error:
+            raise ImportProblemError(f"in '{self.text}' the index is outside the shape {np.shape(whole)}") from error
+        return part
+
+    def _index(self, node: ast.expr) -> int | slice:
+        if not isinstance(node, ast.Slice):
+            return self._whole(node)
+        bounds = [None if bound is None else self._whole(bound) for bound in (node.lower, node.upper, node.step)]
+        if bounds[2] == 0:
+            raise ImportProblemError(f"in '{self.text}' a step of 0 leads nowhere")
+        return slice(*bounds)
+
+    def _whole(self, node: ast.expr) -> int:
+        number = self._numbers(node)
+        if np.ndim(number) or not float(number).is_integer():
+            raise ImportProblemError(f"in '{self.text}' an index is not a whole number")
+        return int(number)
+
+    def _refused(self, node: ast.expr) -> ImportProblemError:
+        # As it is written there: to put it together again would need as much room as it is deep.
+        part = ast.get_source_segment(self.text.strip(), node) or self.text
+        return ImportProblemError(f"in '{self.text}' this is not understood: {part}; {ALLOWED}")
+
+
+def _reason(error: BaseException) -> str:
+    return error.msg if isinstance(error, SyntaxError) else type(error).__name__

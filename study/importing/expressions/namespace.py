@@ -1,0 +1,110 @@
+"""What names mean in an expression: arrays of a file, and the map's own definitions over them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.arrays.arrays import Arrays
+from study.importing.expressions.budget import Budget
+from study.importing.expressions.expression import evaluate
+from study.importing.expressions.functions import Clock, Value
+from study.importing.map_format.map_errors import ImportProblemError, suggestion
+from study.importing.map_format.signal_words import unit_in
+
+_SHOWN = 24
+
+
+@dataclass(frozen=True, slots=True)
+class NoTime:
+    """Where no clock is known: expressions for the rate and for the time stamps themselves."""
+
+    def times_s(self, count: int) -> Value:
+        raise ValueError("there is no clock in this place yet")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Namespace:
+    """Names of one file, seen from one part of the map."""
+
+    arrays: Mapping[str, npt.NDArray[Any]]
+    definitions: Mapping[str, str]
+    where: str
+    """The file, for messages."""
+    budget: Budget
+    """What all expressions of the import may cost together."""
+    _open: set[str] = field(default_factory=set)
+    """Definitions that are being evaluated: one that needs itself is refused."""
+
+    def value_of(self, text: str, clock: Clock) -> Value:
+        """Of an array by its name, whatever characters that has, or of an expression. Raises ImportProblemError."""
+        if text in self.arrays:
+            return self._numbers(text)
+        return evaluate(text, lambda name: self.lookup(name, clock), clock, self.budget)
+
+    def number(self, text: str) -> float:
+        """Raises ImportProblemError where it is more than one number, or none."""
+        value = self.value_of(text, NoTime())
+        if np.size(value) != 1 or not np.isfinite(value).all():
+            raise ImportProblemError(f"'{text}' has the shape {np.shape(value)}; it must be one number")
+        return float(np.ravel(value)[0])
+
+    def lookup(self, name: str, clock: Clock) -> Value:
+        if name in self.arrays:
+            return self._numbers(name)
+        if name in self.definitions:
+            return self._defined(name, clock)
+        if name == "clock_s":
+            raise ImportProblemError("clock_s is known in [[computed]] channels only, on the recording's grid")
+        names = [*self.arrays, *self.definitions]
+        raise ImportProblemError(
+            f"there is no array '{name}' in {self.where}{suggestion(name, names)}; there are {self.listed()}"
+        )
+
+    def has(self, name: str) -> bool:
+        return name in self.arrays or name in self.definitions
+
+    def listed(self) -> str:
+        """Names with their shapes, for messages."""
+        shown = [f"{name} {_shape(array)}" for name, array in list(self.arrays.items())[:_SHOWN]]
+        more = len(self.arrays) - _SHOWN
+        return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+    def _defined(self, name: str, clock: Clock) -> Value:
+        if name in self._open:
+            raise ImportProblemError(f"the definition of '{name}' needs itself")
+        self._open.add(name)
+        try:
+            with self.budget.deeper(name, 2):
+                return self.value_of(self.definitions[name], clock)
+        finally:
+            self._open.discard(name)
+
+    def _numbers(self, name: str) -> Value:
+        array = self.arrays[name]
+        if array.dtype.kind not in "fiub":
+            what = "complex numbers" if array.dtype.kind == "c" else "text or objects"
+            raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers")
+        self.budget.spend(array.size, name)
+        with np.errstate(all="ignore"):
+            return np.asarray(array, dtype=np.float64)
+
+
+def of_file(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
+    """Names that begin with the prefix are known without it too, and `fx [N]` as `fx`. Raises ImportProblemError where
+    none begins so."""
+    short = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
+    plain = {unit_in(name)[0]: array for name, array in arrays.by_name.items()}
+    if prefix and not short:
+        listed = Namespace(arrays.by_name, {}, arrays.name, budget).listed()
+        raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {listed}")
+    budget.allow_for(sum(array.size for array in arrays.by_name.values()))
+    return Namespace({**plain, **arrays.by_name, **short}, definitions, arrays.name, budget)
+
+
+def _shape(array: npt.NDArray[Any]) -> str:
+    if array.dtype.kind not in "fiub":
+        return "(no numbers)"
+    return "(a number)" if array.ndim == 0 else f"({' x '.join(str(count) for count in array.shape)})"

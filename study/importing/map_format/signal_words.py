@@ -1,0 +1,133 @@
+"""What a channel's name says of it: quantity and unit, as in `fx [N]`, `displacement_mm`, `motor speed (rpm)`; and what
+the channels of a file are to each other."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, quantity_of
+from study.importing.map_format.import_map import SignalRole
+
+_BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*")
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_WORDS = {
+    "force": ("force", "load", "thrust"),
+    "torque": ("torque", "moment", "tau"),
+    "position": ("position", "pos", "displacement", "disp", "stroke", "travel"),
+    "angle": ("angle", "theta", "phi"),
+    "velocity": ("velocity", "vel", "speed", "omega"),
+    "acceleration": ("acceleration", "accel", "acc"),
+    "voltage": ("voltage", "volt", "volts"),
+    "current": ("current",),
+    "temperature": ("temperature", "temp"),
+}
+_QUANTITY = {word: quantity for quantity, words in _WORDS.items() for word in words}
+_WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
+_SAID: dict[str, SignalRole] = {
+    **dict.fromkeys(("command", "cmd", "commanded"), "command"),
+    **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
+}  # fmt: skip
+_SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
+"""Input and output of a textbook, where both are there and no `x` beside them: then `y` would be an axis."""
+_DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
+_MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """A header or an array's name, understood as far as it goes."""
+
+    header: str
+    name: str
+    unit: str
+    """As in the file; empty where none is stated, or none that is known here."""
+    quantity: str
+    """Empty where neither the unit nor a word says it."""
+    sure: bool
+    """False where a unit was read out of a name that no word supports (`phase_A`), or word and unit disagree."""
+
+
+def unit_in(header: str) -> tuple[str, str]:
+    """Name and unit in brackets; the unit is empty where the header says none."""
+    match = _BRACKETED.fullmatch(header)
+    return (match["name"].strip(), match["unit"].strip()) if match and match["name"].strip() else (header, "")
+
+
+def named(header: str) -> Named:
+    name, unit = unit_in(header)
+    word = next((_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY), "")
+    told = unit or _unit_at_end(name)
+    try:
+        known = parse_unit(told)
+    except UnknownUnitError:
+        return Named(header, name, "", word, not unit)
+    by_unit = "time" if known.si == "s" else quantity_of(known.si)
+    if not word:
+        return Named(header, name, told, by_unit, bool(unit))
+    try:
+        check_quantity(word, known)
+    except UnknownUnitError:
+        return Named(header, name, told, by_unit, False)
+    return Named(header, name, told, word, True)
+
+
+def roles_of(columns: Sequence[Named]) -> Sequence[SignalRole] | None:
+    """By quantity: forces are commands, where there are none voltages or currents; accelerations and velocities are
+    responses, places responses where there are no others. None where something is left open, or a name says else."""
+    by_quantity = _by_quantity(columns)
+    found = [role for column in columns if (role := by_quantity.get(column.quantity)) and role != "helper"]
+    said = [_said_role(column, columns) for column in columns]
+    if len(found) < len(columns) or not {"command", "response"} <= set(found):
+        return None
+    return found if all(name in ("", role) for name, role in zip(said, found, strict=True)) else None
+
+
+def proposed_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
+    """By names, then by quantity; empty where that leaves one open, and all where there would be no command or no
+    response. A reference is a helper, and so are currents and voltages beside a force."""
+    by_quantity = _by_quantity(columns)
+    found: list[SignalRole | Literal[""]] = [
+        _said_role(column, columns) or by_quantity.get(column.quantity, "") for column in columns
+    ]
+    if not {"command", "response"} <= set(found):
+        found = ["" for _ in columns]
+    return found
+
+
+def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
+    words = [part.lower() for part in _WORD.findall(column.name)]
+    said: SignalRole | Literal[""] = next((_SAID[word] for word in words if word in _SAID), "")
+    firsts = {other.name.split("_")[0].lower() for other in columns}
+    if said or not {"u", "y"} <= firsts or "x" in firsts or not words:
+        return said
+    return _SHORT.get(words[0], "")
+
+
+def _by_quantity(columns: Sequence[Named]) -> dict[str, SignalRole]:
+    quantities = {column.quantity for column in columns}
+    answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
+    by_quantity: dict[str, SignalRole] = {"temperature": "condition"}
+    if quantities & set(_DRIVES):
+        by_quantity.update({**dict.fromkeys(_FEEDS, "helper"), **dict.fromkeys(_DRIVES, "command")})
+    elif len(quantities & set(_FEEDS)) == 1:  # which of both would be the command cannot be told
+        by_quantity.update(dict.fromkeys(_FEEDS, "command"))
+    by_quantity.update(dict.fromkeys(_PLACES, "position"))
+    by_quantity.update(dict.fromkeys(answers, "response"))
+    return by_quantity
+
+
+def _unit_at_end(name: str) -> str:
+    """`displacement_mm`, `omega_rad_s`, `a_mps2`: the longest end that is a unit; empty where none is."""
+    parts = name.split("_")
+    for first in range(1, len(parts)):
+        text = "_".join(parts[first:])
+        text = re.sub(r"mps2$", "m/s^2", text)
+        text = _WRITTEN_TOGETHER.get(text, text.replace("_per_", "/").replace("_", "/"))
+        text = re.sub(r"(?<=[a-z])2$", "^2", text)
+        try:
+            parse_unit(text)
+        except UnknownUnitError:
+            continue
+        return text if text != "1" else ""
+    return ""

@@ -1,0 +1,251 @@
+"""`hapteq study` on a screen. This process draws and takes keys, and never waits: all work is done by the engine."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from textual import on
+from textual.app import App, SystemCommand
+from textual.binding import Binding, BindingType
+from textual.events import Event
+from textual.screen import Screen
+
+from study.errors import ExitCode
+from study.session.views.views import Reply as TrialReply
+from study.session.watching.requests import NoteAsked, PauseAsked
+from study.tui import home_messages
+from study.tui.app import outcomes
+from study.tui.app.app_start import AppStart
+from study.tui.app.archive_screens import ArchiveScreens, ArchiveWanted, command_for
+from study.tui.app.engine_line import EngineLine, EngineSaid
+from study.tui.app.everywhere import EVERYWHERE
+from study.tui.app.load_screens import load_screens
+from study.tui.app.sitting_screens import SittingScreens
+from study.tui.departure import leave_with_the_terminal
+from study.tui.engine.from_engine import Failed, Finished
+from study.tui.engine.to_engine import AskBeside, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
+from study.tui.keys.key_names import key_name
+from study.tui.keys.keys_in_order import KeysInOrder
+from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
+from study.tui.themes import NEXT, register_themes
+from study.tui.watch.watching import Watching
+
+
+class HapteqApp(App[None]):
+    TITLE = "hapteq"
+    # At the top: the keys and what to press next stand at the bottom.
+    CSS = "ToastRack { align: right top; } Toast { max-width: 76; }"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f1,question_mark", "help", "Help", key_display="F1"),
+        Binding("f2", "watch", "Watch", show=False),
+        Binding("f4", "note(False)", "Note", show=False),
+        Binding("shift+f4", "note(True)", "Adverse event", show=False),
+        Binding("f7", "pause", "Pause", show=False),
+        Binding("f9", "next_theme", "Light or dark", show=False),
+        Binding("ctrl+z", "suspend_process", "Suspend", show=False, priority=True),
+        Binding("ctrl+c", "let_go", "Force off", show=False, priority=True),
+        Binding("ctrl+q", "quit", "Leave", show=False, priority=True),
+    ]
+
+    def __init__(self, start: AppStart) -> None:
+        super().__init__()
+        self.outcome: Finished | Failed | None = None
+        """Of the last sitting: what the command line prints when the screen is gone."""
+        self._start = start
+        self._direct = start.first is not None
+        self._engine = EngineLine(self)
+        self._archive = ArchiveScreens(self, self._engine.send, start)
+        self._sitting: SittingScreens | None = None
+        self._letting_go: OutcomeScreen | None = None
+        self._watching = Watching(self)
+        self._keys = KeysInOrder(self, super().on_event)
+        if "TEXTUAL_ANIMATIONS" not in os.environ:
+            self.animation_level = "none"
+        register_themes(self)
+
+    async def on_event(self, event: Event) -> None:
+        await self._keys.take(event)
+
+    def get_key_display(self, binding: Binding) -> str:
+        return key_name(super().get_key_display(binding))
+
+    async def on_mount(self) -> None:
+        leave_with_the_terminal(self, lambda: self._leave(ExitCode.INTERRUPTED))
+        if self._start.first is not None:
+            await self._sit(self._start.first)
+        else:
+            await self._archive.home()
+        self.call_after_refresh(self._start_the_rest)
+
+    def _start_the_rest(self) -> None:
+        self._engine.start()
+        load_screens()
+
+    @property
+    def engine_pid(self) -> int | None:
+        return self._engine.pid
+
+    def close_engine(self) -> None:
+        """After `run`: wait until the device has let go and the log is closed."""
+        self._watching.end()
+        self._engine.close()
+        if self._sitting is not None:
+            self.outcome = self._engine.last_end
+
+    async def _sit(self, first: Begin | Resume) -> None:
+        self._direct = self._direct and first is self._start.first
+        self.outcome = self._letting_go = None
+        self._archive.clear()
+        self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.forget_earlier)
+        await self._sitting.prepare()
+        self._engine.send(first)
+
+    async def on_engine_said(self, event: EngineSaid) -> None:
+        said = event.said
+        match said:
+            case Finished():
+                self._end_sitting(outcomes.finished(said), said)
+            case Failed() if self._sitting is None:
+                self._archive.end_diagnosing()
+                self._panel(outcomes.failed(said, at_home=True), said.path)
+            case Failed():
+                self._end_sitting(outcomes.failed(said, at_home=False), said)
+            case _ if self._sitting is not None:
+                await self._sitting.hear(said)
+            case _:
+                await self._archive.hear(said)
+
+    def _end_sitting(self, outcome: Outcome, end: Finished | Failed) -> None:
+        opened = self._sitting is not None and self._sitting.path
+        self._sitting = self._letting_go = None
+        self.outcome = end
+        if self._direct and not opened:
+            # What was typed in the terminal could not be begun: the terminal says why.
+            self.exit()
+            return
+        self._watching.close()
+        self._archive.clear()
+        self._panel(outcome, end.path)
+
+    def _panel(self, outcome: Outcome, path: str) -> OutcomeScreen:
+        async def decided(decision: Decision | None) -> None:
+            match decision:
+                case "resume":
+                    await self._sit(Resume(path, self._start.device, self._start.data))
+                case "look":
+                    self._engine.send(ShowSession(path))
+                case "home":
+                    await self._archive.home()
+                case "quit":
+                    self._leave(ExitCode.DONE)
+
+        panel = OutcomeScreen(outcome)
+        self.push_screen(panel, decided)
+        self._keys.forget_earlier()
+        return panel
+
+    def _leave(self, code: ExitCode) -> None:
+        self.exit(return_code=int(code))
+
+    def action_let_go(self) -> None:
+        """Ctrl-C. Once: force off, and a panel. Once more: leave."""
+        if self._sitting is None or self._letting_go is not None:
+            self._leave(ExitCode.INTERRUPTED)
+            return
+        self._engine.send(LetGo())
+        panel = self._letting_go = self._panel(outcomes.LETTING_GO, "")
+        self.set_timer(outcomes.UNHEARD_AFTER_S, lambda: self._unheard(panel))
+
+    def _unheard(self, panel: OutcomeScreen) -> None:
+        if self._letting_go is panel:
+            panel.tell(outcomes.UNHEARD)
+            self.bell()
+
+    async def action_quit(self) -> None:
+        if self._sitting is not None:
+            self.action_let_go()
+        else:
+            self._leave(ExitCode.DONE)
+
+    def action_help(self) -> None:
+        from study.tui.screens.help import HelpScreen
+
+        about: str = getattr(self.screen, "HELP", "")
+        self.push_screen(HelpScreen(about.rstrip() + EVERYWHERE))
+
+    def action_next_theme(self) -> None:
+        self.theme = NEXT[self.theme]
+
+    def action_watch(self) -> None:
+        if self._sitting is not None and self._sitting.path:
+            self._watching.open_here(self._sitting.path, lambda request: self._engine.send(Relay(request)))
+
+    def action_pause(self) -> None:
+        if self._sitting is not None:
+            self._engine.send(Relay(PauseAsked("participant")))
+
+    def action_note(self, adverse: bool) -> None:
+        if self._sitting is None:
+            return
+        from study.tui.screens.note import NoteScreen
+
+        self.push_screen(NoteScreen(adverse, "experimenter"), self._write)
+
+    def _write(self, note: NoteAsked | None) -> None:
+        if note is not None:
+            self._engine.send(Relay(note))
+            self.notify("Noted: it is written at the next pause or trial.", markup=False)
+
+    def on_pause_screen_note_written(self, event: Any) -> None:
+        self._engine.send(Relay(event.note))
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Of a session only while there is one."""
+        return action not in ("watch", "note", "pause") or self._sitting is not None
+
+    def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
+        from study.tui.app.app_commands import commands
+
+        return commands(self, screen)
+
+    def on_trial_screen_replied(self, event: Any) -> None:
+        reply: TrialReply = event.reply
+        if self._sitting is not None:
+            self._sitting.replied(reply)
+
+    async def on_begin_wanted(self, wanted: home_messages.BeginWanted) -> None:
+        if self._sitting is not None:  # Enter twice: one sitting
+            return
+        start = self._start = replace(self._start, device=wanted.device)
+        order = SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed, wanted.model)
+        await self._sit(Begin(order))
+
+    async def on_resume_wanted(self, wanted: home_messages.ResumeWanted) -> None:
+        if self._sitting is not None:
+            return
+        await self._sit(Resume(wanted.path, self._start.device, self._start.data))
+
+    async def on_home_wanted(self) -> None:
+        await self._archive.home()
+
+    @on(home_messages.SessionWanted)
+    @on(home_messages.DiagnosisWanted)
+    @on(home_messages.AnalyzeWanted)
+    @on(home_messages.WithdrawWanted)
+    def _archive_wanted(self, wanted: ArchiveWanted) -> None:
+        self._engine.send(command_for(wanted))
+
+    async def on_diagnose_wanted(self, wanted: home_messages.DiagnoseWanted) -> None:
+        await self._archive.diagnose(wanted)
+
+    def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
+        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskBeside(wanted.path, request)))
+
+    def on_demo_screen_pause_wanted(self) -> None:
+        self.action_pause()
+
+    def on_watch_screen_left(self) -> None:
+        self._watching.close()

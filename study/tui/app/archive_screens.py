@@ -1,0 +1,141 @@
+"""The screens around sittings: the start, past sessions, diagnoses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from textual.app import App
+
+from study.session.views.archive_views import DiagnosisView, SessionView
+from study.tui.app.app_start import AppStart
+from study.tui.engine.from_engine import (
+    Diagnosis,
+    FromEngine,
+    Home,
+    Preparing,
+    Session,
+    Trouble,
+    Withdrawn,
+    Working,
+)
+from study.tui.engine.to_engine import (
+    Analyze,
+    Command,
+    Diagnose,
+    LetGo,
+    ShowDiagnosis,
+    ShowHome,
+    ShowSession,
+    ToEngine,
+    Withdraw,
+)
+from study.tui.home_messages import AnalyzeWanted, DiagnoseWanted, DiagnosisWanted, SessionWanted, WithdrawWanted
+
+if TYPE_CHECKING:
+    from study.tui.screens.diagnosing import DiagnosingScreen
+    from study.tui.screens.home import HomeScreen
+    from study.tui.screens.session import SessionScreen
+
+
+ArchiveWanted = SessionWanted | DiagnosisWanted | AnalyzeWanted | WithdrawWanted
+"""What these screens ask for, beside sittings."""
+
+
+def command_for(wanted: ArchiveWanted) -> Command:
+    match wanted:
+        case SessionWanted(path=path):
+            return ShowSession(path)
+        case DiagnosisWanted(path=path):
+            return ShowDiagnosis(path)
+        case AnalyzeWanted(path=path):
+            return Analyze(path)
+        case WithdrawWanted(path=path):
+            return Withdraw(path)
+
+
+class ArchiveScreens:
+    def __init__(self, app: App[Any], send: Callable[[ToEngine], None], start: AppStart) -> None:
+        self._app = app
+        self._send = send
+        self._start = start
+        self._home: HomeScreen | None = None
+        self._session: SessionScreen | None = None
+        self._session_path = ""
+        self._diagnosing: DiagnosingScreen | None = None
+
+    async def home(self) -> None:
+        """The start screen at once, and its list when it is read."""
+        from study.tui.screens.home import HomeScreen
+
+        self.clear()
+        if self._home is None:
+            self._home = HomeScreen()
+            await self._app.push_screen(self._home)
+        self._send(ShowHome(self._start.data, self._start.protocol, self._start.device, self._start.model))
+
+    def clear(self) -> None:
+        """Take everything off but the start screen, where there is one."""
+        self._session = None
+        while len(self._app.screen_stack) > 1 and self._app.screen is not self._home:
+            self._app.pop_screen()
+
+    async def hear(self, message: FromEngine) -> None:
+        match message:
+            case Home(view=view) if self._home is not None:
+                self._home.show(view)
+            case Session(view=view):
+                await self._show_session(view)
+            case Working(what=what, share=share) if self._diagnosing is not None:
+                self._diagnosing.show(what, share)
+            case Diagnosis(view=view):
+                self.end_diagnosing()
+                await self._show_diagnosis(view)
+            case Withdrawn(sessions=sessions):
+                self._app.notify(f"Everything of the participant was erased: {', '.join(sessions)}.", markup=False)
+                await self.home()
+            case Trouble(sentence=sentence) | Preparing(sentence=sentence):
+                self._app.notify(sentence, markup=False)
+
+    async def diagnose(self, wanted: DiagnoseWanted) -> None:
+        """The engine works through one at a time; so does this screen, which is taken off when it is over."""
+        from study.tui.screens.diagnosing import DiagnosingScreen
+
+        def stopped(somebody: bool | None) -> None:
+            self._diagnosing = None
+            if somebody:
+                self._send(LetGo())
+
+        self._send(Diagnose(wanted.sources, wanted.model, wanted.out, wanted.clean))
+        self._diagnosing = DiagnosingScreen("Getting ready.")
+        await self._app.push_screen(self._diagnosing, stopped)
+
+    def end_diagnosing(self) -> None:
+        """It is over, one way or another; whatever was opened over its screen goes too."""
+        diagnosing, self._diagnosing = self._diagnosing, None
+        while diagnosing is not None and diagnosing in self._app.screen_stack:
+            self._app.pop_screen()
+
+    async def _show_session(self, view: SessionView) -> None:
+        from study.tui.screens.confirm_view import confirm_view
+        from study.tui.screens.session import SessionScreen
+
+        if (
+            self._session is not None
+            and self._session in self._app.screen_stack
+            and self._session_path == view.line.path
+        ):
+            self._session.show(view)
+            return
+        screen = SessionScreen(view)
+        self._session, self._session_path = screen, view.line.path
+        if view.line.standing == "running" and view.line.observer is None:
+            # Its staircases and its log tell a participant who looks on what was right and wrong.
+            confirm_view(self._app, view.line.name, lambda: self._app.push_screen(screen))
+            return
+        await self._app.push_screen(screen)
+
+    async def _show_diagnosis(self, view: DiagnosisView) -> None:
+        from study.tui.screens.diagnosis import DiagnosisScreen
+
+        await self._app.push_screen(DiagnosisScreen(view))

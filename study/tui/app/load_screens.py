@@ -1,0 +1,28 @@
+"""Screens that are needed later, loaded in a thread once the first one is drawn, so that none is late."""
+
+import gc
+import threading
+from importlib import import_module
+
+NEEDED_LATER = (
+    "study.tui.app.asked_screens",
+    "study.tui.screens.trial",
+    "study.tui.screens.help",
+    "textual.widgets._markdown",
+    "study.tui.screens.session",
+    "study.tui.app.app_commands",
+    "study.tui.watch.watch_screen",
+    "study.tui.engine.watch_feed",
+)
+
+
+def load_screens() -> None:
+    """Returns at once."""
+    threading.Thread(target=_load, name="load-screens", daemon=True).start()
+
+
+def _load() -> None:
+    for name in NEEDED_LATER:
+        import_module(name)
+    # What is loaded stays: searching all of it for garbage held the event loop up for 50 ms now and then.
+    gc.freeze()

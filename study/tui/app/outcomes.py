@@ -1,0 +1,46 @@
+"""What is said when something ended, in words for a panel."""
+
+from study.tui.engine.from_engine import Failed, Finished
+from study.tui.screens.outcome import Decision, Outcome
+
+UNHEARD_AFTER_S = 2.0
+
+LETTING_GO = Outcome(
+    "Letting go",
+    (("", "The device program was told to take the force away and to end the sitting. It answers in a moment."),),
+    ("quit",),
+)
+UNHEARD = Outcome(
+    "The stop was not answered",
+    (
+        ("What happened", f"The device program has not answered for {UNHEARD_AFTER_S:g} s."),
+        ("What is safe", "Every answer that was given is on disk."),
+        (
+            "What to do now",
+            "Take the hand off the handle and switch the device off. Then leave hapteq: that ends the device program. "
+            "The session can be resumed.",
+        ),
+    ),
+    ("quit",),
+)
+
+
+def failed(failure: Failed, at_home: bool) -> Outcome:
+    """at_home: it came up while nothing was going on, and the screen below goes on as before."""
+    error = failure.error
+    parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
+    way_on: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
+    told = tuple((heading, text) for heading, text in parts if text)
+    return Outcome(error.title, told, ("resume", *way_on) if failure.path else way_on)
+
+
+def finished(end: Finished) -> Outcome:
+    results = end.results
+    parts = (
+        ("Thresholds", "\n".join(results.table)),
+        ("To know", "\n".join(f"• {warning}" for warning in results.warnings)),
+        ("Report", results.report),
+    )
+    told = tuple((heading, text) for heading, text in parts if text)
+    title = f"The session is finished: {end.answers} answers"
+    return Outcome(title, told, ("look", "home", "quit"), grave=False)

@@ -1,0 +1,138 @@
+"""The screens of one sitting: the one that the engine asks for now, over the trial's, which stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from textual.app import App
+from textual.screen import Screen
+
+from study.session.views.views import Reply as TrialReply
+from study.tui.app.drawn_before import forget_drawn_before
+from study.tui.engine.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble
+from study.tui.engine.to_engine import Reply, ToEngine
+from study.tui.keys.answer_keys import AnswerKeys
+from study.tui.screens.preparing import PreparingScreen
+
+if TYPE_CHECKING:
+    from study.tui.screens.trial import TrialScreen
+
+OPENING = "Preparing the device: some ten seconds the first time."
+TROUBLE_FOR_S = 8.0
+
+
+class SittingScreens:
+    """One for a sitting. Every reply carries the number of what it replies to, and each is sent once."""
+
+    def __init__(
+        self,
+        app: App[Any],
+        send: Callable[[ToEngine], None],
+        keys: AnswerKeys,
+        forget_earlier: Callable[[], None],
+    ) -> None:
+        """forget_earlier: lets keys that were read before now answer nothing."""
+        self.path = ""
+        """Of the session, once it is opened."""
+        self._app = app
+        self._send = send
+        self._keys = keys
+        self._forget_earlier = forget_earlier
+        self._number = 0
+        """Of what is asked now; 0 while nothing is."""
+        self._shown: Screen[Any] | None = None
+        self._trial: TrialScreen | None = None
+        self._preparing: PreparingScreen | None = None
+
+    async def hear(self, message: FromEngine) -> None:
+        match message:
+            case Ask():
+                await self._ask(message)
+            case Close(number=number) if number == self._number:
+                self._drop()
+            case LookUpdate():
+                self._look(message)
+            case Feedback(correct=correct) if self._trial is not None:
+                self._trial.saved()
+                self._trial.show_feedback(correct)
+            case Trouble(sentence=sentence):
+                self._trouble(sentence)
+            case Opened(path=path):
+                self.path = path
+            case Preparing(sentence=sentence):
+                await self.prepare(sentence)
+
+    def replied(self, reply: TrialReply) -> None:
+        """The trial's screen says so; it disarms itself."""
+        self._reply(reply)
+
+    async def prepare(self, sentence: str = OPENING) -> None:
+        """While nothing is asked, at the beginning and at the end."""
+        self._number, self._shown, self._trial = 0, None, None
+        if self._preparing is None:
+            self._preparing = PreparingScreen(sentence)
+            await self._app.push_screen(self._preparing)
+            return
+        covered = self._app.screen is not self._preparing
+        while self._app.screen is not self._preparing and self._preparing in self._app.screen_stack:
+            self._app.pop_screen()
+        self._preparing.say(sentence, afresh=covered)
+
+    async def _ask(self, ask: Ask) -> None:
+        self._drop()
+        self._number = ask.number
+        if self._preparing is not None and self._app.screen is self._preparing:
+            # Nothing but an empty screen is seen for a moment between two others.
+            await self._app.push_screen(Screen())
+        if ask.call is Call.ASK:
+            trial = self._trial if self._trial is not None else await self._trial_screen()
+            trial.arm(ask.shown)
+            return
+        from study.tui.app.asked_screens import screen_for
+
+        self._shown = screen_for(ask, self._keys)
+        await self._app.push_screen(self._shown, partial(self._dismissed, ask.number))
+        # Typed ahead, before anybody can have read what is asked here.
+        self._forget_earlier()
+
+    async def _trial_screen(self) -> TrialScreen:
+        from study.tui.screens.trial import TrialScreen
+
+        self._trial = TrialScreen(self._keys)
+        await self._app.push_screen(self._trial)
+        return self._trial
+
+    def _look(self, update: LookUpdate) -> None:
+        from study.tui.screens.handle import HandleScreen
+
+        if update.number == self._number and isinstance(self._shown, HandleScreen):
+            self._shown.update_view(update.view)
+
+    def _trouble(self, sentence: str) -> None:
+        if self._trial is not None:
+            self._trial.show_trouble(sentence)
+        if self._trial is None or self._shown is not None:
+            self._app.notify(sentence, severity="warning", timeout=TROUBLE_FOR_S, markup=False)
+
+    def _dismissed(self, number: int, value: Any) -> None:
+        if number == self._number:
+            self._shown = None
+            self._reply(value)
+
+    def _reply(self, value: Any) -> None:
+        if self._number:
+            self._send(Reply(self._number, value))
+        self._number = 0
+
+    def _drop(self) -> None:
+        """Take off what was asked before, and whatever somebody opened over it (help, commands)."""
+        self._number = 0
+        if self._trial is not None:
+            self._trial.saved()  # the engine goes on only when the answer is on the disk
+            self._trial.disarm()
+        shown, self._shown = self._shown, None
+        while shown is not None and shown in self._app.screen_stack:
+            self._app.pop_screen()
+        forget_drawn_before(self._app)

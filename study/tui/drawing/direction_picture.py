@@ -1,0 +1,101 @@
+"""The two directions as oriented segments, told apart by number, place and line style, and in words."""
+
+import math
+from functools import lru_cache
+
+from study.session.views.views import DirectionPicture
+from study.tui.drawing.braille import Canvas
+
+ENDS = {
+    "yz": (("right", "left"), ("up", "down")),
+    "xy": (("toward you", "away from you"), ("right", "left")),
+    "zx": (("up", "down"), ("toward you", "away from you")),
+}
+"""Words for the positive and the negative end of a plane's first and second axis."""
+
+SCREEN = {"yz": ((1, 0), (0, 1)), "xy": ((0, -1), (1, 0)), "zx": ((0, 1), (1, 0))}
+"""Where a plane's first and second axis point on the screen: (right, up). 'xy' is seen from above."""
+
+
+def sentence(picture: DirectionPicture, number: int) -> str:
+    """Such as "1: up-left to down-right"."""
+    angle = picture.angle_deg[number - 1]
+    return f"{number}: {_end(picture.plane, angle)} to {_end(picture.plane, angle + 180)}"
+
+
+def drawing(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
+    """Both directions side by side: 1 solid, 2 dashed, each with its number below."""
+    left = _one(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
+    right = _one(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
+    numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
+    return [f"{a}    {b}".rstrip() for a, b in zip(left, right, strict=True)] + [numbers.rstrip()]
+
+
+@lru_cache(maxsize=64)
+def large_drawing(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
+    """One direction as large as fits: a thick segment with a head at both ends; 1 is solid, 2 is dashed."""
+    canvas = Canvas(columns, rows)
+    right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
+    x, y = canvas.middle
+    reach = _reach(picture, x, y)
+    thick = max(2.5, reach / 8)
+    head = 2.6 * thick
+    shaft = reach - head
+
+    def at(along: float, across: float = 0.0) -> tuple[float, float]:
+        return x + along * right + across * up, y - along * up + across * right
+
+    for side in (-1, 1):
+        base = side * shaft
+        canvas.fill((at(side * reach), at(base, 1.5 * thick), at(base, -1.5 * thick)))
+    for begin, end in ((-shaft, shaft),) if number == 1 else _dashes(shaft, 2.2 * thick, 1.1 * thick):
+        canvas.stroke(at(begin), at(end), thick)
+    return tuple(canvas.lines())
+
+
+def _reach(picture: DirectionPicture, x: float, y: float) -> float:
+    """Half a segment, the same for both: neither may look stronger than the other."""
+    sides = [_on_screen(picture.plane, angle) for angle in picture.angle_deg]
+    fits = min(min(x / max(abs(right), 1e-9), y / max(abs(up), 1e-9)) for right, up in sides)
+    return min(fits, 1.25 * min(x, y))
+
+
+def _dashes(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
+    """Begin and end of each dash, spread evenly, with a gap at both ends."""
+    count = max(1, round((2 * half_length - gap) / (dash + gap)))
+    stretch = 2 * half_length / (count * dash + (count + 1) * gap)
+    begins = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]
+    return [(begin, begin + stretch * dash) for begin in begins]
+
+
+def _one(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
+    canvas = Canvas(columns, rows)
+    right, up = _on_screen(plane, angle_deg)
+    cx, cy = (canvas.width - 1) / 2, (canvas.height - 1) / 2
+    reach = 0.95 * min(cx, cy)
+    start, end = (cx - reach * right, cy + reach * up), (cx + reach * right, cy - reach * up)
+    canvas.line(start, end, dashed)
+    for tip, turn in ((start, 180.0), (end, 0.0)):
+        for spread in (150.0, -150.0):
+            heading = math.degrees(math.atan2(up, right)) + turn + spread
+            h = math.radians(heading)
+            barb = (tip[0] + 5 * math.cos(h), tip[1] - 5 * math.sin(h))
+            canvas.line(tip, barb)
+    return canvas.lines()
+
+
+def _on_screen(plane: str, angle_deg: float) -> tuple[float, float]:
+    first, second = SCREEN[plane]
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    return c * first[0] + s * second[0], c * first[1] + s * second[1]
+
+
+def _end(plane: str, angle_deg: float) -> str:
+    (first_plus, first_minus), (second_plus, second_minus) = ENDS[plane]
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    words = []
+    if abs(s) > 0.2:
+        words.append(second_plus if s > 0 else second_minus)
+    if abs(c) > 0.2:
+        words.append(first_plus if c > 0 else first_minus)
+    return "-".join(words)

@@ -1,0 +1,26 @@
+"""A large 1 or 2, where there is no direction to draw."""
+
+from functools import lru_cache
+from itertools import pairwise
+
+from study.tui.drawing.braille import Canvas, Point
+
+_STROKES: dict[int, tuple[Point, ...]] = {
+    1: ((-0.28, 0.62), (0.05, 1.0), (0.05, -1.0), (-0.32, -1.0), (0.42, -1.0)),
+    2: ((-0.5, 0.5), (-0.38, 0.85), (0.0, 1.0), (0.38, 0.85), (0.5, 0.5), (0.38, 0.1), (-0.5, -1.0), (0.52, -1.0)),
+}
+"""Right and up from the middle, in half heights."""
+
+
+@lru_cache(maxsize=16)
+def large_number(number: int, columns: int, rows: int) -> tuple[str, ...]:
+    canvas = Canvas(columns, rows)
+    x, y = canvas.middle
+    thick = max(2.5, y / 5)
+    reach = min(x, y) - thick / 2
+    corners = [(x + reach * right, y - reach * up) for right, up in _STROKES[number]]
+    for start, end in pairwise(corners):
+        canvas.stroke(start, end, thick)
+    for corner in corners:
+        canvas.disc(corner, thick / 2)
+    return tuple(canvas.lines())

@@ -1,0 +1,71 @@
+"""Channels of a recording as lines of braille: their course over time, and their spectrum."""
+
+import itertools
+from collections.abc import Iterable
+
+import numpy as np
+
+from analysis.look.channels import Channel, in_unit
+from analysis.look.overview import Overview
+from equalizer.signals.signal import FloatArray
+from study.tui.drawing.braille import Canvas
+
+LABEL, COLUMNS, ROWS = 24, 54, 2
+_DECADES = 4.0
+"""Of a spectrum's amplitude, below its highest."""
+
+
+def course_lines(channel: Channel) -> Iterable[str]:
+    """From the lowest to the highest sample of each column of dots, with both ends beside it."""
+    known = channel.known
+    if not known.size:
+        yield f"{_named(channel)} {'':{COLUMNS}} no samples"
+        return
+    canvas = Canvas(COLUMNS, ROWS)
+    low, high = float(known.min()), float(known.max())
+    span = high - low or 1.0
+    for x, (bottom, top) in enumerate(_columns(channel.samples, canvas.width)):
+        if np.isfinite(bottom):
+            from_y, to_y = (round((high - value) / span * (canvas.height - 1)) for value in (top, bottom))
+            canvas.line((x, from_y), (x, to_y))
+    first, last = canvas.lines()
+    yield f"{_named(channel)} {first:{COLUMNS}} {in_unit(high, channel.unit)}".rstrip()
+    yield f"{'':{LABEL}} {last:{COLUMNS}} {in_unit(low, channel.unit)}".rstrip()
+
+
+def _columns(samples: FloatArray, columns: int) -> list[tuple[float, float]]:
+    edges = np.linspace(0, len(samples), columns + 1).astype(int)
+    found = []
+    for start, stop in itertools.pairwise(edges):
+        piece = samples[start : max(stop, start + 1)]
+        piece = piece[np.isfinite(piece)]
+        found.append((float(piece.min()), float(piece.max())) if piece.size else (np.nan, np.nan))
+    return found
+
+
+def spectrum_lines(found: Overview) -> Iterable[str]:
+    """Amplitude of commands and responses over frequency, both axes logarithmic."""
+    if found.spectra is None:
+        return
+    frequency_hz = found.spectra.frequency_hz
+    for k, channel in enumerate(found.channels):
+        power = found.spectra.power(k)
+        if channel.role not in ("command", "response") or power.max() <= 0:
+            continue
+        canvas = Canvas(COLUMNS, ROWS)
+        edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * 1.001, canvas.width + 1)
+        for x, (start, stop) in enumerate(itertools.pairwise(edges)):
+            inside = power[(frequency_hz >= start) & (frequency_hz < stop)]
+            size = float(inside.max()) if inside.size else float(np.interp(start, frequency_hz, power))
+            down = -0.5 * np.log10(max(size / power.max(), 1e-99)) / _DECADES
+            if down <= 1:
+                canvas.line((x, round(down * (canvas.height - 1))), (x, canvas.height - 1))
+        first, last = canvas.lines()
+        yield f"{_named(channel)} {first:{COLUMNS}} amplitude, {_DECADES:g} decades"
+        span = f"{frequency_hz[0]:.3g} to {frequency_hz[-1]:.4g} Hz"
+        yield f"{'':{LABEL}} {last:{COLUMNS}} {span}"
+
+
+def _named(channel: Channel) -> str:
+    name = f"{channel.role} {channel.name}"
+    return f"{name[: LABEL - 1]:{LABEL}}"

@@ -1,0 +1,139 @@
+"""The screen's end of the pipe: starts the engine, hands over what it says, and notices when it is gone.
+
+Nothing here waits in the thread that draws: two threads start the engine, write to it and read from it.
+"""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from queue import SimpleQueue
+from typing import IO
+
+from study.errors import ExitCode
+from study.tui.engine.child_process import start_child
+from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, Opened
+from study.tui.engine.to_engine import Heartbeat, ToEngine
+
+CLOSING_S = 6.0
+"""An engine that lost its screen has ended itself long before."""
+
+
+class EngineClient:
+    """deliver: gets what the engine says, from a thread of this client. Last comes a `Failed` if the engine dies."""
+
+    def __init__(self, deliver: Callable[[FromEngine], None]) -> None:
+        self._deliver = deliver
+        self._outbox: SimpleQueue[ToEngine | None] = SimpleQueue()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._connection: Connection | None = None
+        self._closing = False
+        self._opened: Opened | None = None
+        self.dead = False
+        """The engine ended by itself; a new client can be started."""
+        self._thread = threading.Thread(target=self._live, name="engine-client", daemon=True)
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid if self._process is not None else None
+
+    def start(self) -> None:
+        """Returns at once. What is sent before the engine is there waits for it."""
+        self._thread.start()
+
+    def send(self, message: ToEngine) -> None:
+        """Returns at once. A heartbeat that finds others still waiting is left out: it would come late."""
+        if not isinstance(message, Heartbeat) or self._outbox.empty():
+            self._outbox.put(message)
+
+    def close(self, patience_s: float = CLOSING_S) -> None:
+        """Close the pipe and wait for the engine to let go, to write its last line, and to end. May be called twice."""
+        self._closing = True
+        self._outbox.put(None)
+        if self._thread.ident is None:
+            return
+        self._thread.join(patience_s)
+        process = self._process
+        if process is not None and process.poll() is None:
+            process.kill()
+            process.wait()
+
+    def _live(self) -> None:
+        with tempfile.TemporaryFile() as said:
+            try:
+                connection, process = start_child("study.tui.engine.engine", "run", said=said)
+            except OSError as problem:
+                self.dead = True
+                self._deliver(_not_started(problem))
+                return
+            self._connection, self._process = connection, process
+            writer = threading.Thread(target=self._write, args=(connection,), name="engine-writer", daemon=True)
+            writer.start()
+            self._read(connection)
+            self._outbox.put(None)
+            code = _code_at_end(process)
+            writer.join()
+            connection.close()
+            if not self._closing:
+                self.dead = True
+                self._deliver(_death(code, _last_words(said), self._opened))
+
+    def _read(self, connection: Connection) -> None:
+        try:
+            while True:
+                message: FromEngine = connection.recv()
+                if isinstance(message, Opened):
+                    self._opened = message
+                self._deliver(message)
+        except (EOFError, OSError):
+            return
+        except Exception:  # noqa: BLE001 - what cannot be understood is the end of the engine, and is told as that
+            traceback.print_exc()
+
+    def _write(self, connection: Connection) -> None:
+        with contextlib.suppress(OSError):
+            while (message := self._outbox.get()) is not None:
+                connection.send(message)
+        # The engine sees the end of the pipe, and this side the end of the engine.
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
+            end.shutdown(socket.SHUT_WR)
+
+
+def _code_at_end(process: "subprocess.Popen[bytes]") -> int:
+    """Of an engine whose pipe has ended; it ends by itself, or by force."""
+    try:
+        return process.wait(CLOSING_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
+
+
+def _not_started(problem: OSError) -> Failed:
+    happened = f"The system refused to start the process that drives the device: {problem.strerror or problem}."
+    do_now = "Close other programs, or start the computer anew, and begin again."
+    return Failed(ErrorText("The device program cannot be started", happened, "", do_now, int(ExitCode.ERROR)))
+
+
+def _last_words(said: IO[bytes]) -> str:
+    said.seek(0)
+    lines = said.read().decode(errors="replace").strip().splitlines()
+    return lines[-1].strip() if lines else ""
+
+
+def _death(code: int, last_words: str, opened: Opened | None) -> Failed:
+    how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
+    happened = f"The process that drives the device ended {how}."
+    if last_words:
+        happened += f" Its last words: {last_words}"
+    do_now = "Take the hand off the handle until you know that no force is on."
+    if opened is not None:
+        do_now += f" Then go on with: hapteq resume {opened.path}"
+    saved = "Every answer that was given is on disk." if opened is not None else ""
+    text = ErrorText("The device program ended", happened, saved, do_now, int(ExitCode.DEVICE))
+    return Failed(text, opened.path if opened is not None else "")

@@ -1,0 +1,201 @@
+"""What the engine does for the screen: lists, views, whole sittings, analyses, withdrawals. One after the other."""
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from study.devices.clock import RealClock
+from study.devices.device import Device
+from study.errors import WrongUseError
+from study.local_clock import machine_zone
+from study.session.views.archive_views import HomeView
+from study.store.disk.privacy import left_open
+from study.store.sessions.archive import SessionFolder, find_session
+from study.tui.engine.from_engine import (
+    Diagnosis,
+    Finished,
+    Home,
+    Opened,
+    Preparing,
+    Results,
+    Session,
+    Trouble,
+    Withdrawn,
+    Working,
+)
+from study.tui.engine.remote_display import RemoteDisplay
+from study.tui.engine.screen_link import ScreenLink
+from study.tui.engine.to_engine import (
+    Analyze,
+    AskBeside,
+    Begin,
+    Command,
+    Diagnose,
+    Resume,
+    SessionOrder,
+    ShowDiagnosis,
+    ShowHome,
+    ShowSession,
+    Withdraw,
+)
+from study.workflows.results.fold_session import fold_session
+from study.workflows.results.session_results import write_results
+from study.workflows.results.written_analysis import WrittenAnalysis
+from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.session.end_sitting import end_sitting, finish_closed
+from study.workflows.session.plan_sitting import plan_sitting
+from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+from study.workflows.trial.display import PersonsHand
+from study.workflows.views.ask_session import ask_session
+from study.workflows.views.list_models import model_words
+from study.workflows.views.list_protocols import protocol_line
+from study.workflows.views.list_sessions import home_view
+from study.workflows.views.view_session import session_view
+
+OPENING = "Preparing the device: some ten seconds the first time."
+
+
+class Desk:
+    """`opened`: the session that the present command opened and has not finished: what can be gone on with."""
+
+    def __init__(self, link: ScreenLink) -> None:
+        self._link = link
+        self._clock = RealClock()
+        self.opened: SessionFolder | None = None
+
+    def perform(self, command: Command) -> None:
+        """Raises StudyError where it cannot be done, KeyboardInterrupt where somebody let go."""
+        self.opened = None
+        # From here on a signal interrupts. What came before found nobody to interrupt.
+        if self._link.taken_is_let_go:
+            raise KeyboardInterrupt
+        match command:
+            case ShowHome() | ShowSession() | ShowDiagnosis():
+                self._link.send(_looked_up(command))
+            case Begin(order=order):
+                self._begin(order)
+            case Resume():
+                self._resume(command)
+            case Analyze(session=session):
+                self._link.send(Preparing("Making the tables and the report."))
+                write_results(SessionFolder(Path(session)))
+                self._link.send(Session(session_view(Path(session), machine_zone)))
+            case Withdraw(session=session):
+                self._withdraw(SessionFolder(Path(session)))
+            case Diagnose():
+                self._diagnose(command)
+            case AskBeside(session=session, request=request):
+                ask_session(SessionFolder(Path(session)), request, self._clock)
+
+    def _begin(self, order: SessionOrder) -> None:
+        model = Path(order.model) if order.model else None
+        plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
+        for note in plan.notes:
+            self._link.send(Trouble(note))
+        self._sit(lambda participant: conduct_new(plan.session, order.device, participant))
+
+    def _resume(self, command: Resume) -> None:
+        folder = find_session(command.session, Path(command.data))
+        folded = fold_session(folder)
+        observer = folded.state.opened.observer
+        if observer is not None:
+            raise WrongUseError(
+                "This session belongs to a simulated participant",
+                f"'{observer}' began {folder.name}; a person's answers must not be added to it.",
+                f"It goes on by itself with: hapteq resume {folder.path}",
+                saved="Nothing was changed.",
+            )
+        if still_open := left_open(folder.path.parent):
+            self._link.send(Trouble(still_open))
+        if folded.state.closed:
+            self._link.send(Preparing("Making the tables and the report."))
+            written = finish_closed(folder, folded)
+            self._link.send(Finished(str(folder.path), folded.state.answers, _results(written)))
+            return
+        self._sit(lambda participant: conduct_resumed(folder, command.device, participant))
+
+    def _sit(self, conduct: Callable[[Participant], Conducted]) -> None:
+        self._link.send(Preparing(OPENING))
+        with self._participant() as participant:
+            end = conduct(participant)
+        if end.state.closed:
+            self.opened = None  # there is nothing left to go on with
+        if not end.left:
+            self._link.send(Preparing("Making the tables and the report."))
+        written = end_sitting(end, self._clock.utc())
+        self._link.send(Finished(str(end.folder.path), end.state.answers, _results(written)))
+
+    @contextlib.contextmanager
+    def _participant(self) -> Iterator[Participant]:
+        self._link.requests.take()  # what was asked of an earlier session
+        self._link.forget_replies()
+        display = RemoteDisplay(self._link, self._clock)
+        try:
+            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._hear)
+        finally:
+            self._link.stop_device = None
+
+    def _hear(self, folder: SessionFolder, device: Device) -> None:
+        self.opened = folder
+        self._link.stop_device = device.stop
+        self._link.send(Opened(folder.name, str(folder.path)))
+
+    def _withdraw(self, folder: SessionFolder) -> None:
+        data, plan = folder.path.parent, plan_withdrawal(folder)
+        elsewhere = still_elsewhere(data, plan)
+        withdraw(data, plan, self._clock.utc())
+        for sentence in (*plan.doubtful, *elsewhere):
+            self._link.send(Trouble(sentence))
+        self._link.send(Withdrawn(plan.sessions))
+
+    def _diagnose(self, wanted: Diagnose) -> None:
+        from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
+        from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
+
+        self._link.send(Working("getting ready", 0.0))
+        sources = tuple(Path(source) for source in wanted.sources)
+        out = Path(wanted.out) if wanted.out else free_out(sources[0])
+        model, clean = Path(wanted.model) if wanted.model else None, tuple(Path(one) for one in wanted.clean)
+        plan = DiagnosePlan(sources, out, model, clean=clean)
+        written = diagnose_at_screen(plan, lambda what, share: self._link.send(Working(what, share)))
+        self._link.send(_diagnosis(written))
+
+
+def _looked_up(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:
+    match command:
+        case ShowHome():
+            return Home(_offered(command))
+        case ShowSession(path=path):
+            return Session(session_view(Path(path), machine_zone))
+        case ShowDiagnosis(path=path):
+            return _diagnosis(Path(path))
+
+
+def _diagnosis(path: Path) -> Diagnosis:
+    # Compilers and solvers are loaded when somebody asks for what needs them.
+    from study.workflows.views.view_diagnosis import diagnosis_view
+
+    return Diagnosis(diagnosis_view(path))
+
+
+def _offered(wanted: ShowHome) -> HomeView:
+    """The start screen, with what the command line named in the first place."""
+    view = home_view(Path(wanted.data))
+    line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None
+    protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols
+    devices = tuple(sorted(view.devices, key=lambda name: name != wanted.device))
+    models = (wanted.model, *(name for name in view.models if name != wanted.model)) if wanted.model else view.models
+    known = dict(view.qualities)
+    qualities = tuple((model, known.get(model) or model_words(model)) for model in models)
+    return replace(view, protocols=protocols, devices=devices, models=models, qualities=qualities)
+
+
+def _results(written: WrittenAnalysis) -> Results:
+    document = {
+        "thresholds": [asdict(threshold) for threshold in written.thresholds],
+        "warnings": list(written.warnings),
+        "report": str(written.report),
+    }
+    return Results(written.table, written.warnings, str(written.report), json.dumps(document, indent=2))

@@ -1,0 +1,202 @@
+"""The display port over the pipe: asks the screen, and never waits for it longer than a hand may be shaken."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from protocols.trial import VoidCause
+from study.devices.clock import Clock
+from study.session.facts.void_reasons import why_screen_silent
+from study.session.views.form_views import Form, FormReply
+from study.session.views.views import (
+    AfterPause,
+    DemoChoice,
+    DemoDone,
+    DemoMenu,
+    DeviceReport,
+    Goodbye,
+    HandleView,
+    PauseNotice,
+    PlayingNotice,
+    PracticeResult,
+    Question,
+    RestNotice,
+    Unanswered,
+    Welcome,
+)
+from study.session.views.views import Reply as Answer
+from study.tui.engine.from_engine import Ask, Call, Close, Feedback, LookUpdate, Trouble
+from study.tui.engine.screen_link import ScreenLink
+from study.tui.engine.to_engine import Reply
+from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.trial.display import SignOfLife
+
+GLANCE_S = 0.04
+"""Between two signs of life; the port allows 100 ms."""
+LOOK_EVERY_S = 0.1
+UNSHOWN_S = 1.0
+"""A wait for the handle that is no longer than this shows nothing of its own."""
+SILENT_AFTER_S = 0.5
+"""A screen without a heartbeat for so long is suspended, dead or hung: nobody could stop what plays."""
+
+CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
+TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
+
+
+class RemoteDisplay:
+    """Any method raises KeyboardInterrupt where the screen is gone."""
+
+    def __init__(self, link: ScreenLink, clock: Clock, load: Callable[[], float | None] = load_per_processor) -> None:
+        self._link = link
+        self._clock = clock
+        self._load = load
+        self._number = 0
+        self._late_s = 0.0
+        """How late this program itself woke up at the most, since something was asked."""
+
+    def fill_in(self, form: Form) -> FormReply:
+        reply: FormReply = self._ask(Call.FILL_IN, form)
+        return reply
+
+    def device_checked(self, report: DeviceReport) -> bool:
+        return bool(self._ask(Call.DEVICE_CHECKED, report))
+
+    def welcome(self, notice: Welcome) -> None:
+        self._ask(Call.WELCOME, notice)
+
+    def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
+        number = self._show(Call.CHOOSE_DEMO, menu)
+        while sign_of_life():
+            reply = self._reply(number)
+            if reply is not None:
+                choice: DemoChoice = reply.value
+                return choice
+        self._link.send(Close(number))
+        return DemoDone()
+
+    def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
+        number = self._show(Call.SHOW_PLAYING, notice)
+        until_s = self._clock.now_s() + notice.seconds
+        while (left_s := until_s - self._clock.now_s()) > 0:
+            reply = self._reply(number, min(GLANCE_S, left_s))
+            if not sign_of_life():
+                return self._over(number, CUT_SHORT)
+            if reply is not None:
+                cut: Unanswered | None = reply.value
+                return cut
+            if self._silent():
+                return self._over(number, silent(self._late_s, self._load()))
+        self._link.send(Close(number))
+        return None
+
+    def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
+        """Shown only where the handle is away from its place, or the wait is long: most trials begin with it there,
+        held still for a moment."""
+        number, view, self._late_s = 0, look(), 0.0
+        began_s = looked_s = self._clock.now_s()
+        while not view.ready:
+            away = math.hypot(*view.offset_mm) > view.radius_mm or self._clock.now_s() - began_s > UNSHOWN_S
+            if away and not number:
+                number = self._show(Call.AWAIT_HANDLE, view)
+            reply = self._reply(number)
+            if not sign_of_life():
+                return self._over(number, CUT_SHORT)
+            if reply is not None and number:
+                cut: Unanswered | None = reply.value
+                return cut
+            if self._silent():
+                return self._over(number, silent(self._late_s, self._load()))
+            if self._clock.now_s() - looked_s >= LOOK_EVERY_S:
+                view, looked_s = look(), self._clock.now_s()
+                if number:
+                    self._link.send(LookUpdate(number, view))
+        if number:
+            self._link.send(Close(number))
+        return None
+
+    def ask(self, question: Question, sign_of_life: SignOfLife) -> Answer:
+        number = self._show(Call.ASK, question)
+        until_s = self._clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
+        while True:
+            reply = self._reply(number)
+            if not sign_of_life():
+                return self._over(number, CUT_SHORT)
+            if reply is not None:
+                answer: Answer = reply.value
+                return answer
+            if self._silent():
+                return self._over(number, silent(self._late_s, self._load()))
+            if self._clock.now_s() > until_s:
+                return self._over(number, TOO_LATE)
+
+    def feedback(self, correct: bool) -> None:
+        self._link.send(Feedback(correct))
+
+    def practice_over(self, result: PracticeResult) -> None:
+        self._ask(Call.PRACTICE_OVER, result)
+
+    def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
+        """Enforced here: a screen that comes back too early waits for the rest of it."""
+        number = self._show(Call.REST, notice)
+        started_s = self._clock.now_s()
+        back = False
+        while not back or self._clock.now_s() - started_s < notice.seconds:
+            back = self._reply(number) is not None or back
+            if not sign_of_life():
+                self._link.send(Close(number))
+                break
+        return self._clock.now_s() - started_s
+
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        number = self._show(Call.PAUSE, notice)
+        while sign_of_life():
+            reply = self._reply(number)
+            if reply is not None:
+                decision: AfterPause = reply.value
+                return decision
+        self._link.send(Close(number))
+        return AfterPause.LEAVE
+
+    def await_return(self, reason: str) -> None:
+        self._ask(Call.AWAIT_RETURN, reason)
+
+    def goodbye(self, notice: Goodbye) -> None:
+        self._ask(Call.GOODBYE, notice)
+
+    def trouble(self, sentence: str) -> None:
+        self._link.send(Trouble(sentence))
+
+    def _ask(self, call: Call, shown: Any) -> Any:
+        """While nothing plays: a screen may be suspended for as long as anybody likes."""
+        number = self._show(call, shown)
+        while (reply := self._reply(number)) is None:
+            pass
+        return reply.value
+
+    def _show(self, call: Call, shown: Any) -> int:
+        self._number += 1
+        self._late_s = 0.0
+        self._link.send(Ask(self._number, call, shown))
+        return self._number
+
+    def _reply(self, number: int, patience_s: float = GLANCE_S) -> Reply | None:
+        """The screen's reply to this; None where none came meanwhile, or one to something that is over."""
+        began_s = self._clock.now_s()
+        reply = self._link.reply(patience_s)
+        self._late_s = max(self._late_s, self._clock.now_s() - began_s - patience_s)
+        return reply if reply is not None and reply.number == number else None
+
+    def _silent(self) -> bool:
+        return self._link.silent_s() > SILENT_AFTER_S
+
+    def _over(self, number: int, why: Unanswered) -> Unanswered:
+        """number: 0 where nothing is shown."""
+        if number:
+            self._link.send(Close(number))
+        return why
+
+
+def silent(engine_late_s: float, load_per_processor: float | None) -> Unanswered:
+    """What a screen without a heartbeat makes of a trial."""
+    reason = why_screen_silent(engine_late_s, load_per_processor)
+    return Unanswered(reason, leave=False, cause=VoidCause.SCREEN_LATE)

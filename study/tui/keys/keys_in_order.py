@@ -1,0 +1,95 @@
+"""Keys, clicks and pastes one after the other: each is handed on when what the one before it did is done.
+
+Textual hands a key to the widget that has the keyboard when the key is looked at. Tab, or Enter in a field, moves the
+keyboard only some messages later: of keys that arrive together, those behind it would go into the field before.
+"""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from textual.app import App
+from textual.events import Event, Key, MouseDown, MouseUp, Paste
+from textual.message_pump import MessagePump
+
+from study.tui.keys.key_presses import arrival_s
+
+AT_ONCE = ("ctrl+c", "ctrl+q", "ctrl+z")
+"""Take the force off, or suspend: they wait for nothing."""
+ROUNDS = 3
+"""From a widget to the application: the key itself, the message that it becomes, what is done about that."""
+PATIENCE_S = 1.0
+"""A widget that is busy for longer holds up no key."""
+
+
+class KeysInOrder:
+    """hand_on: the application's own handling of an event."""
+
+    def __init__(self, app: App[Any], hand_on: Callable[[Event], Awaitable[None]]) -> None:
+        self._app = app
+        self._hand_on = hand_on
+        self._waiting: deque[Event] = deque()
+        self._settling: asyncio.Task[None] | None = None
+        self._deaf_until_s = float("-inf")
+
+    @property
+    def at_work(self) -> bool:
+        return self._settling is not None
+
+    def forget_earlier(self) -> None:
+        """Something new is asked: a key that was read before now was meant for something else."""
+        self._deaf_until_s = time.monotonic()
+
+    async def take(self, event: Event) -> None:
+        """Every event of the application, in its own message loop."""
+        if isinstance(event, Key) and event.key not in AT_ONCE and arrival_s(event) < self._deaf_until_s:
+            return  # also where it comes back from a widget: its bindings would be those of another screen
+        if not _is_typed(event):
+            await self._hand_on(event)
+            return
+        self._waiting.append(event)
+        if self._settling is None:
+            await self._next()
+
+    async def _next(self) -> None:
+        self._settling = None
+        if self._waiting:
+            event = self._waiting.popleft()
+            if isinstance(event, Key) and arrival_s(event) < self._deaf_until_s:
+                await self._next()
+                return
+            before = self._with_the_keyboard()
+            await self._hand_on(event)
+            self._settling = asyncio.create_task(self._settle(before))
+
+    async def _settle(self, before: list[MessagePump]) -> None:
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await _pass_through(before)
+                for _ in range(ROUNDS - 1):
+                    await _pass_through(self._with_the_keyboard())
+        except TimeoutError:
+            pass
+        self._app.call_later(self._next)
+
+    def _with_the_keyboard(self) -> list[MessagePump]:
+        """From the widget that has the keyboard up to the application."""
+        if not self._app.screen_stack:
+            return [self._app]
+        return list((self._app.focused or self._app.screen).ancestors_with_self)
+
+
+def _is_typed(event: Event) -> bool:
+    if isinstance(event, Key):
+        return not event.is_forwarded and event.key not in AT_ONCE
+    return isinstance(event, (MouseDown, MouseUp, Paste)) and not event.is_forwarded
+
+
+async def _pass_through(nodes: list[MessagePump]) -> None:
+    """Each has then worked through all that was waiting for it, and what it passed on waits at the next."""
+    for node in nodes:
+        handled = asyncio.Event()
+        if node.call_later(handled.set):
+            await handled.wait()

@@ -1,0 +1,108 @@
+"""Line mode: the participant's part in plain sentences, for any terminal, a screen reader, or a pipe of answers."""
+
+from collections.abc import Callable
+from typing import TextIO
+
+from study.devices.clock import Clock
+from study.session.facts.void_reasons import void_for_participant
+from study.session.views.counted import answers_are
+from study.session.views.form_views import Form, FormReply
+from study.session.views.views import (
+    AfterPause,
+    DemoChoice,
+    DemoMenu,
+    DeviceReport,
+    Goodbye,
+    HandleView,
+    PauseNotice,
+    PlayingNotice,
+    PracticeResult,
+    Question,
+    Reply,
+    RestNotice,
+    Unanswered,
+    Welcome,
+)
+from study.session.watching.requests import NoteAsked
+from study.tui.keys.answer_keys import DIGITS, AnswerKeys
+from study.tui.line_mode import plain_demo, plain_forms, plain_pause, plain_question
+from study.tui.line_mode.conversation import Conversation
+from study.tui.line_mode.line_input import LineInput
+from study.tui.trial_words import progress_sentence, run_name, turned_away_words
+from study.workflows.trial.display import SignOfLife
+
+
+class PlainDisplay:
+    """note: what takes notes and adverse events that are typed during a pause; without it none are offered."""
+
+    def __init__(
+        self,
+        lines: LineInput,
+        out: TextIO,
+        clock: Clock,
+        keys: AnswerKeys = DIGITS,
+        note: Callable[[NoteAsked], None] | None = None,
+    ) -> None:
+        self._talk = Conversation(lines, out, clock)
+        self._keys = keys
+        self._note = note
+        self._demo_shown = False
+        self._run_told: tuple[str, int] | None = None
+
+    def fill_in(self, form: Form) -> FormReply:
+        return plain_forms.fill_in(form, self._talk)
+
+    def device_checked(self, report: DeviceReport) -> bool:
+        return plain_forms.device_checked(report, self._talk)
+
+    def welcome(self, notice: Welcome) -> None:
+        plain_question.welcome(notice, self._talk, self._keys)
+
+    def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
+        if not self._demo_shown:
+            self._talk.say("", "Feel both directions, as often as you like:", *plain_question.pictured(menu.picture))
+            self._demo_shown = True
+        return plain_demo.choose_demo(menu, self._talk, self._keys, sign_of_life)
+
+    def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
+        return plain_demo.show_playing(notice, self._talk, sign_of_life)
+
+    def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
+        return plain_demo.await_handle(look, self._talk, sign_of_life)
+
+    def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
+        run = (run_name(question), question.run_number)
+        if question.progress is not None and run != self._run_told:
+            self._talk.say("", progress_sentence(question.progress))
+            self._run_told = run
+        return plain_question.ask(question, self._talk, self._keys, sign_of_life)
+
+    def feedback(self, correct: bool) -> None:
+        self._talk.say("Right." if correct else "Wrong.")
+
+    def practice_over(self, result: PracticeResult) -> None:
+        plain_question.practice_over(result, self._talk)
+
+    def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
+        return plain_pause.rest(notice, self._talk, sign_of_life)
+
+    def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        return plain_pause.pause(notice, self._talk, self._note, sign_of_life)
+
+    def await_return(self, reason: str) -> None:
+        self._talk.forget()
+        self._talk.say("", f"The last trial does not count. {void_for_participant(reason)}")
+        self._talk.say("Press Enter when you are ready for it again.")
+        self._talk.answer_or_leave()
+
+    def goodbye(self, notice: Goodbye) -> None:
+        if notice.outcome:
+            self._talk.say("", *turned_away_words(notice.outcome))
+        elif notice.finished:
+            self._talk.say("", f"Finished: {notice.answers} answers. Thank you.")
+        else:
+            because = f": {notice.reason}" if notice.reason else ""
+            self._talk.say("", f"This sitting is over{because}. {answers_are(notice.answers)} on disk. Thank you.")
+
+    def trouble(self, sentence: str) -> None:
+        self._talk.say(sentence)

@@ -1,0 +1,92 @@
+"""Line mode: the demonstration, and waiting while something plays or the handle is brought back."""
+
+from collections.abc import Callable
+
+from study.session.views.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
+from study.tui.drawing.direction_picture import sentence
+from study.tui.keys.answer_keys import AnswerKeys
+from study.tui.line_mode.conversation import GLANCE_S, Conversation, WaitOver, shown
+from study.tui.line_mode.plain_question import LEFT
+from study.tui.trial_replies import PAUSE
+from study.workflows.trial.display import SignOfLife
+
+SAY_AGAIN_S = 1.0
+"""A screen reader that hears more than a sentence a second never finishes one."""
+
+CUT_SHORT = Unanswered(WaitOver.CUT_SHORT.value, leave=False)
+NOBODY = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
+
+
+def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
+    talk.forget()
+    vibration = menu.vibration
+    talk.say("", _place(menu, vibration))
+    while True:
+        talk.prompt(f"{keys.choice} plays, n next vibration, b back, Enter ends: ")
+        line = talk.wait(sign_of_life)
+        if line is WaitOver.CUT_SHORT:
+            return DemoDone()
+        if isinstance(line, WaitOver) or line.word == "q":
+            raise KeyboardInterrupt
+        if line.word in ("", "done"):
+            return DemoDone()
+        if line.word in ("n", "b"):
+            vibration, said = _turned(menu, vibration, 1 if line.word == "n" else -1)
+            talk.say(said)
+            continue
+        number = keys.answer(line.text)
+        if number is not None:
+            return PlayDemo(vibration, number)
+        talk.say(f"{shown(line)} is none of these keys; q leaves the study.")
+
+
+def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
+    """A key typed meanwhile is no answer yet: only p and q are heard."""
+    talk.forget()
+    if notice.title:  # a gap between two intervals has none
+        words = f" ({sentence(notice.picture, notice.number)[3:]})" if notice.picture is not None else ""
+        talk.say(f"{notice.title}{words}")
+    until_s = talk.clock.now_s() + notice.seconds
+    while (left_s := until_s - talk.clock.now_s()) > 1e-9:
+        cut = _glance(talk, sign_of_life, min(GLANCE_S, left_s))
+        if cut is not None:
+            return cut
+    return None
+
+
+def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
+    talk.forget()
+    said, said_at_s = "", float("-inf")
+    while not (view := look()).ready:
+        now_s = talk.clock.now_s()
+        if view.sentence != said and now_s - said_at_s >= SAY_AGAIN_S:
+            talk.say(view.sentence)
+            said, said_at_s = view.sentence, now_s
+        cut = NOBODY if talk.nobody_left() else _glance(talk, sign_of_life, GLANCE_S)
+        if cut is not None:
+            return cut
+    return None
+
+
+def _glance(talk: Conversation, sign_of_life: SignOfLife, seconds: float) -> Unanswered | None:
+    talk.clock.sleep(seconds)
+    if not sign_of_life():
+        return CUT_SHORT
+    line = talk.overheard()
+    return {"q": LEFT, "p": PAUSE}.get(line.word) if line is not None else None
+
+
+def _turned(menu: DemoMenu, vibration: int, step: int) -> tuple[int, str]:
+    turned = vibration + step
+    if turned < 1:
+        return vibration, "This is the first vibration."
+    if turned > menu.vibrations:
+        return vibration, "This is the last vibration."
+    return turned, _place(menu, turned)
+
+
+def _place(menu: DemoMenu, vibration: int) -> str:
+    felt = [str(number) for number in (1, 2) if (vibration, number) in menu.felt]
+    so_far = f"Felt so far: {' and '.join(felt)}." if felt else "Nothing of it was felt yet."
+    moves = "" if menu.handle_moves else " The device is a simulation: nothing moves."
+    return f"Demonstration, vibration {vibration} of {menu.vibrations}. {so_far}{moves}"

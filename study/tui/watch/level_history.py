@@ -1,0 +1,93 @@
+"""The staircase of one run as it grows: level over trials on a logarithmic scale, on our own braille canvas."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from textual.content import Content
+from textual.widget import Widget
+
+from study.session.watching.watch_view import StaircasePoint
+from study.tui.drawing.braille import Canvas
+from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG
+
+LEAST_RANGE = 4.0
+"""Cap over the lowest level drawn, at least: a staircase that hardly moves must not look wild."""
+DOTS_PER_TRIAL = 4.0
+"""At most; many trials move together."""
+
+MUTED = "$foreground 65%"
+NEXT = "?"
+LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} reversal {NEXT}next ┄cap"
+
+_STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}
+_FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
+"""Where several marks fall on one cell, the highest is shown."""
+
+
+class LevelHistory(Widget):
+    """Fills whatever room it gets."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._points: tuple[StaircasePoint, ...] = ()
+        self._next_n: float | None = None
+        self._cap_n = 1.0
+
+    def show(self, points: tuple[StaircasePoint, ...], next_n: float | None, cap_n: float) -> None:
+        if (points, next_n, cap_n) != (self._points, self._next_n, self._cap_n):
+            self._points, self._next_n, self._cap_n = points, next_n, cap_n
+            self.refresh()
+
+    def render(self) -> Content:
+        width, height = self.content_size.width, self.content_size.height
+        if width < LABEL_COLUMNS + 8 or height < 4:
+            return Content("No room for the staircase.")
+        return level_history(self._points, self._next_n, self._cap_n, (width, height))
+
+
+def level_history(
+    points: Sequence[StaircasePoint], next_n: float | None, cap_n: float, size: tuple[int, int]
+) -> Content:
+    """size: columns and rows, labels and legend included."""
+    columns, rows = size[0] - LABEL_COLUMNS, size[1] - 1
+    levels = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
+    lowest_n = min([cap_n / LEAST_RANGE, *(0.85 * level for level in levels)])
+    canvas = Canvas(columns, rows)
+    pitch = min(DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(levels) - 1))
+
+    def dot(place: int, level_n: float) -> tuple[float, float]:
+        share = math.log(cap_n / level_n) / math.log(cap_n / lowest_n)
+        return place * pitch, 1 + share * (canvas.height - 3)
+
+    canvas.line(dot(0, cap_n), (canvas.width - 1, dot(0, cap_n)[1]), dashed=True)
+    dots = [dot(place, level) for place, level in enumerate(levels)]
+    for start, end in itertools.pairwise(dots):
+        canvas.line(start, end)
+    marks: dict[tuple[int, int], str] = {}
+    for (x, y), mark in zip(dots, [*map(_mark, points), NEXT], strict=False):
+        cell = (round(y) // 4, round(x) // 2)
+        if cell not in marks or _FIRST[mark] >= _FIRST[marks[cell]]:
+            marks[cell] = mark
+    labels = {0: cap_n, rows - 1: lowest_n}
+    if levels:
+        labels[round(dots[-1][1]) // 4] = levels[-1]
+    lines = [_line(row, text, marks, labels.get(row)) for row, text in enumerate(canvas.lines())]
+    legend = Content.styled(f"{'':{LABEL_COLUMNS}}{LEGEND}"[: size[0]], MUTED)
+    return Content("\n").join([*lines, legend])
+
+
+def _mark(point: StaircasePoint) -> str:
+    """A reversal after a right answer is a peak gone past: down from here; after a wrong one a valley."""
+    if point.reversal:
+        return PEAK if point.correct else VALLEY
+    return RIGHT if point.correct else WRONG
+
+
+def _line(row: int, text: str, marks: dict[tuple[int, int], str], label_n: float | None) -> Content:
+    label = f"{label_n:5.3g} N" if label_n is not None else ""
+    parts: list[Content | str | tuple[str, str]] = [(f"{label:>{LABEL_COLUMNS - 1}} ", MUTED)]
+    for column, dots in enumerate(text):
+        mark = marks.get((row, column))
+        parts.append(dots if mark is None else (mark, _STYLES[mark]))
+    return Content.assemble(*parts)

@@ -1,0 +1,162 @@
+"""The panels of the watcher's screen as text: runs, last trials, exposure and device, details."""
+
+from collections.abc import Sequence
+
+from textual.content import Content
+
+from study.session.watching.watch_view import Alarm, ClosedTrial, RunStatus, WatchedRun, WatchView
+from study.tui.watch.watch_words import (
+    NOT_MEASURED,
+    NOT_MEASURED_MARK,
+    SYMBOLS,
+    catch_words,
+    clock_time,
+    device_words,
+    dose_words,
+    handle_words,
+    not_measured,
+    reversals,
+    run_name,
+    sensor_words,
+    time_words,
+    verdict,
+    what_goes_on,
+)
+
+Piece = Content | str | tuple[str, str]
+
+MUTED = "$foreground 65%"
+_STANDING_STYLES = {
+    "running": "bold $text-success",
+    "paused": "bold $text-warning",
+    "resting": "bold $text-warning",
+    "finished": "bold $text-success",
+    "stopped": "bold $text-error",
+    "not running": "bold $text-error",
+    "refused": MUTED,
+    "excluded": MUTED,
+}
+_RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
+_VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
+BAR_CELLS = 6
+
+
+def standing_line(view: WatchView) -> Content:
+    standing = f"{SYMBOLS[view.standing]} {view.standing.upper()}"
+    return Content.assemble(
+        (standing, _STANDING_STYLES[view.standing]), "  ", (view.session, "bold"), f"  {what_goes_on(view)}"
+    )
+
+
+def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
+    loud = [
+        Content.assemble((f"▲ {alarm.sentence}", "bold $text-error"), (f"  since {clock_time(alarm.since)}", ""))
+        for alarm in unseen
+    ]
+    quiet = [Content.styled(f"  seen: {alarm.sentence}", MUTED) for alarm in seen]
+    return Content("\n").join([*loud, *quiet])
+
+
+def runs_lines(view: WatchView, rows: int) -> Content:
+    """As many runs as there are rows for, the present one among them."""
+    lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
+    lines += [_run_line(view, run) for run in _around_the_present(view.runs, rows - 1)]
+    return Content("\n").join(lines)
+
+
+def trials_lines(view: WatchView, rows: int, columns: int) -> Content:
+    header = "trial     N shown said           s m/s²  off"
+    lines = [Content.styled(f"{header}  remark" if columns > len(header) + 10 else header, MUTED)]
+    trial = view.open_trial
+    if trial is not None:
+        lines.append(Content(f"{trial.trial + 1:>5} {trial.level_n:5.3g}  hidden until it is answered"))
+    room = max(0, rows - len(lines))
+    legend = [Content.styled(f"{NOT_MEASURED_MARK} {NOT_MEASURED}", MUTED)]
+    explained = room > 1 and any(map(not_measured, view.last[: room - 1]))
+    lines += [_trial_line(row, columns) for row in view.last[: room - explained]]
+    lines += legend * explained
+    return Content("\n").join(lines)
+
+
+def gauges(view: WatchView) -> Content:
+    """Time and dose as bars with numbers; catch trials, handle, sensor and device in words."""
+    exposure = view.exposure
+    rows: list[tuple[str, Content]] = [
+        ("Time", _bar(exposure.time_share, time_words(exposure))),
+        ("A(8)", _bar(exposure.dose_share, dose_words(exposure))),
+        ("Catch", Content.styled(catch_words(view), "bold $text-error" if view.catch_lapses else "")),
+        ("Handle", Content(handle_words(view))),
+        ("Sensor", Content(sensor_words(view))),
+        ("Device", Content(device_words(view))),
+    ]
+    return Content("\n").join(Content.assemble((f"{name:<6} ", MUTED), text) for name, text in rows)
+
+
+def details(view: WatchView) -> Content:
+    who = f"simulated '{view.observer}'" if view.observer else "a person"
+    answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
+    parts: list[Piece] = [
+        *_section("Session", [f"{view.subject}, {who}, {answers}", view.protocol, f"Device: {view.device}"]),
+        *_section("Forms", [f"{clock_time(f.utc)}  {f.form}: {_passed(f.passed)}" for f in view.forms]),
+        *_section(
+            "Practice",
+            [f"{p.frequency_hz:g} Hz: {p.right} right of {p.of}, {_passed(p.passed)}" for p in view.practice],
+        ),
+        *_section(
+            "Notes",
+            [f"{clock_time(n.utc)}  {'ADVERSE ' if n.adverse else ''}{n.who}: {n.text}" for n in view.notes],
+        ),
+    ]
+    return Content.assemble(*parts)
+
+
+def _section(title: str, lines: Sequence[str]) -> list[Piece]:
+    return [(f"{title}\n", "bold"), *(f"{line}\n" for line in lines or ["none so far"]), "\n"]
+
+
+def _passed(passed: bool) -> str:
+    return "passed" if passed else "NOT passed"
+
+
+def _around_the_present(runs: tuple[WatchedRun, ...], rows: int) -> tuple[WatchedRun, ...]:
+    present = next((place for place, run in enumerate(runs) if run.status == "present"), len(runs) - 1)
+    first = max(0, min(present - rows // 2, len(runs) - rows))
+    return runs[first : first + max(1, rows)]
+
+
+def _run_line(view: WatchView, run: WatchedRun) -> Content:
+    name = f"{_RUN_SYMBOLS[run.status]} {run_name(view, run):<12}"
+    text = f"{name} {run.frequency_hz:4g} {reversals(run):>5} {run.trials:>2}"
+    return Content.styled(text, {"present": "bold", "done": "", "to come": MUTED}[run.status])
+
+
+def _trial_line(trial: ClosedTrial, columns: int) -> Content:
+    word = verdict(trial)
+    number = f"{trial.trial + 1}{'+' * min(trial.attempt, 2)}"
+    left = f"{number:>5} {trial.level_n:5.3g} {_or_dash(trial.shown, 5)} {_or_dash(trial.answer, 4)} "
+    delivered = NOT_MEASURED_MARK if not_measured(trial) else _number(trial.delivered_mps2, 4)
+    right = f"{_number(trial.response_time_s, 4)} {delivered} {_number(trial.off_axis_mps2, 4)}"
+    reversed_here = "↺" if trial.reversal else " "
+    room = columns - len(left) - len(right) - 9
+    remark = trial.remark or ("measuring" if trial.status == "measuring" else "")
+    if trial.phase == "catch":
+        remark = f"catch {remark}".rstrip()
+    shortened = remark if len(remark) <= room else f"{remark[: room - 1]}…"
+    tail = f"  {shortened}" if room >= 8 else " !" if remark else ""
+    return Content.assemble(
+        left, (f"{word:<5}", _VERDICT_STYLES.get(word, MUTED)), f"{reversed_here} {right}", (tail, MUTED)
+    )
+
+
+def _or_dash(value: int | None, width: int) -> str:
+    return f"{'–' if value is None else value:>{width}}"
+
+
+def _number(value: float | None, width: int) -> str:
+    return f"{'–' if value is None else format(value, '.1f'):>{width}}"
+
+
+def _bar(share: float, words: str) -> Content:
+    filled = round(min(1.0, share) * BAR_CELLS)
+    style = "bold $text-error" if share >= 1 else "bold $text-warning" if share >= 0.8 else ""
+    return Content.assemble(("█" * filled, style), ("░" * (BAR_CELLS - filled), MUTED), (f" {words}", style))

@@ -1,0 +1,231 @@
+"""The experimenter's view of a running session: everything but the direction of the open trial.
+
+It follows; all that it can do is to ask the session for a stop or a pause, and to note something.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.message import Message
+from textual.reactive import reactive
+from textual.screen import Screen
+from textual.widgets import Footer, Static
+
+from study.errors import StudyError
+from study.session.watching.requests import NoteAsked, PauseAsked, Request, StopAsked
+from study.session.watching.watch_view import ON, Alarm, WatchView
+from study.tui.screens.note_prompt import NotePrompt
+from study.tui.screens.watch_help import GUIDE, HELP
+from study.tui.screens.watch_style import STYLE
+from study.tui.watch.alarm_book import AlarmBook
+from study.tui.watch.level_history import LevelHistory
+from study.tui.watch.watch_panels import alarm_lines, details, gauges, runs_lines, standing_line, trials_lines
+from study.tui.watch.watch_source import WatchSource
+from study.tui.watch.watch_words import staircase_title
+
+LOOK_EVERY_S = 0.1
+UNHEARD_AFTER_S = 2.0
+"""A session looks for requests twenty times a second."""
+NO_NEWS_AFTER_S = 3.0
+SAID_FOR_S = 8.0
+
+
+class WatchMessage(Message):
+    """A new view; the screen shows whichever came last."""
+
+    def __init__(self, view: WatchView) -> None:
+        super().__init__()
+        self.view = view
+
+
+class WatchScreen(Screen[None]):
+    HELP = HELP
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
+    CSS = STYLE
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("S,f8", "stop", "STOP", key_display="S"),
+        Binding("p", "pause", "Pause"),
+        Binding("n", "note(False)", "Note"),
+        Binding("e", "note(True)", "Adverse"),
+        Binding("a", "acknowledge", "Seen"),
+        Binding("d", "details", "Details"),
+        Binding("f1,question_mark", "help", "Help", key_display="F1"),
+        Binding("q", "leave", "Leave"),
+    ]
+    view: reactive[WatchView | None] = reactive(None)
+
+    class Left(Message):
+        """Whoever watched wants to leave; the session goes on."""
+
+    def __init__(
+        self, source: WatchSource, ask: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        """ask: hands a request to the session. Raises StudyError where it cannot. clock_s: time of alarms, seconds."""
+        super().__init__()
+        self._clock_s = clock_s
+        self._source = source
+        self._ask = ask
+        self._book = AlarmBook()
+        self._taken: WatchView | None = None
+        self._news_s = self._clock_s()
+        self._stop_sent_s: float | None = None
+        self._stopped_here = False
+        self._said_s = float("-inf")
+
+    def compose(self) -> ComposeResult:
+        yield Static(id="standing")
+        yield Static(GUIDE, id="guide")
+        yield Static(id="alarms")
+        with Horizontal():
+            with Vertical(id="left"):
+                with Vertical(id="levels", classes="panel"):
+                    yield LevelHistory(id="history")
+                yield Static(id="trials", classes="panel")
+            with Vertical(id="right"):
+                yield Static(id="runs", classes="panel")
+                yield Static(id="gauges", classes="panel")
+            with VerticalScroll(id="aside", classes="panel"):
+                yield Static(id="details")
+        yield Footer(show_command_palette=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#standing", Static).update("Opening the session …")
+        titles = {"#trials": "Last trials", "#runs": "Runs", "#gauges": "Exposure and device", "#aside": "Details"}
+        for name, title in titles.items():
+            self.query_one(name).border_title = title
+        self.set_interval(LOOK_EVERY_S, self.look)
+        self.look()
+
+    def look(self) -> None:
+        """Ten times a second: is there a new view, must the bell ring, was the stop heard?"""
+        view = self._source.latest()
+        if view is not None and view is not self._taken:
+            self._taken = view
+            self.post_message(WatchMessage(view))
+        elif self.is_mounted:
+            self._attend()
+
+    def on_watch_message(self, message: WatchMessage) -> None:
+        self._news_s = self._clock_s()
+        self._stopped_here = self._stopped_here and message.view.standing not in ON
+        self.view = message.view
+
+    def watch_view(self, view: WatchView | None) -> None:
+        if view is None:
+            return
+        self._attend()
+        self.query_one("#standing", Static).update(standing_line(view))
+        self.query_one("#levels").border_title = staircase_title(view)
+        self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
+        self.query_one("#details", Static).update(details(view))
+        self.query_one("#gauges", Static).update(gauges(view))
+        # Alarms above may just have taken room from the tables.
+        self.call_after_refresh(self._fill_tables)
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._fill_tables)
+
+    def _fill_tables(self) -> None:
+        if self.view is None:
+            return
+        runs, trials = self.query_one("#runs", Static), self.query_one("#trials", Static)
+        runs.update(runs_lines(self.view, runs.content_size.height))
+        trials.update(trials_lines(self.view, trials.content_size.height, trials.content_size.width))
+
+    def _attend(self) -> None:
+        now_s = self._clock_s()
+        alarms = (*self._own_alarms(now_s), *self._alarms_of_the_view())
+        if self._book.take(alarms, now_s):
+            self.app.bell()
+        self._show_alarms()
+        if now_s - self._said_s > SAID_FOR_S:
+            self._guide(GUIDE, said=False)
+
+    def _alarms_of_the_view(self) -> tuple[Alarm, ...]:
+        """Nobody needs to be alarmed by the end that was asked for here."""
+        alarms = self.view.alarms if self.view is not None else ()
+        return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
+
+    def _own_alarms(self, now_s: float) -> list[Alarm]:
+        """Of what the log cannot tell: that nobody reads it any more, that a stop was not heard."""
+        since = self.view.utc if self.view is not None else ""
+        alarms = []
+        if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:
+            self._stop_sent_s, self._stopped_here = None, True
+            self._say(f"The session has stopped: {self.view.reason}.")
+        if self._stop_sent_s is not None and now_s - self._stop_sent_s > UNHEARD_AFTER_S:
+            unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
+            alarms.append(Alarm("stop unheard", unheard, since))
+        if self._source.problem:
+            alarms.append(Alarm("no reader", f"This view is not fed any more: {self._source.problem}", since))
+        elif self.view is not None and now_s - self._news_s > NO_NEWS_AFTER_S:
+            alarms.append(Alarm("no news", "This view has stood still for seconds; look at the session itself.", since))
+        return alarms
+
+    def _show_alarms(self) -> None:
+        unseen, seen = self._book.unseen, self._book.seen
+        panel = self.query_one("#alarms", Static)
+        panel.set_class(bool(unseen or seen), "any")
+        panel.set_class(not unseen, "seen")
+        panel.border_title = "! ALARM: press a when you have seen it" if unseen else "Alarms that you have seen"
+        panel.update(alarm_lines(unseen, seen))
+
+    def action_stop(self) -> None:
+        self._stop_sent_s = self._clock_s()
+        self._send(StopAsked("experimenter"), "Stop sent: the force goes off at once.")
+
+    def action_pause(self) -> None:
+        if self.view is not None and self.view.standing == "paused":
+            self._say("It is paused already; the participant goes on at their own screen.")
+            return
+        self._send(PauseAsked("experimenter"), "Pause sent. The participant goes on at their own screen.")
+
+    def action_note(self, adverse: bool) -> None:
+        def write(text: str | None) -> None:
+            if text:
+                self._send(NoteAsked("experimenter", text, adverse), "Sent: the session writes it into the log.")
+
+        self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
+
+    def action_acknowledge(self) -> None:
+        seen = self._book.acknowledge(self._clock_s())
+        self._say(f"{seen} alarm{'' if seen == 1 else 's'} seen." if seen else "There is no alarm to be seen.")
+        self._show_alarms()
+
+    def action_details(self) -> None:
+        self.toggle_class("details")
+        self.call_after_refresh(self._fill_tables)
+
+    def action_help(self) -> None:
+        from study.tui.screens.help import HelpScreen
+
+        self.app.push_screen(HelpScreen(HELP))
+
+    def action_leave(self) -> None:
+        self.post_message(self.Left())
+
+    def _send(self, request: Request, said: str) -> None:
+        try:
+            self._ask(request)
+        except StudyError as error:
+            self._say(f"NOT sent: {error.happened} {error.do_now}")
+            self.app.bell()
+            return
+        if self.view is not None and self.view.standing not in ON:
+            said = "Nothing runs here; it was sent all the same."
+        self._say(said)
+
+    def _say(self, sentence: str) -> None:
+        self._said_s = self._clock_s()
+        self._guide(sentence, said=True)
+
+    def _guide(self, sentence: str, said: bool) -> None:
+        guide = self.query_one("#guide", Static)
+        guide.set_class(said, "said")
+        guide.update(sentence)

@@ -1,0 +1,128 @@
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from study.importing.arrays.arrays import read_arrays
+from study.importing.map_format.import_map import CsvMap
+from study.importing.map_format.map_errors import ImportRefusedError
+from study.store.disk.file_errors import CannotReadError
+
+U = np.array([0.5, np.nan, -2.0])
+
+
+def read(path, **csv):
+    return read_arrays(path, CsvMap(**csv)).by_name
+
+
+def written(tmp_path, text, name="a.csv"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("t,u\n0,0.5\n1,\n2,-2\n", {}),
+        ("t;u\n0;0,5\n1;NaN\n2;-2,0\n", {"decimal": ","}),
+        ("t\tu\n0\t0.5\n1\tnan\n2\t-2\n", {}),
+        ("  t   u\n  0  0.5\n\n  1  nan\n  2  -2\n", {}),
+        ("# made by a logger\n# t, u\n0, 0.5\n1, nan\n2, -2\n", {}),
+        ("Logger 3\nstarted today\nt,u\n0,0.5\n1,\n2,-2\n", {"skip_lines": 2}),
+        ("0,0.5\n1,\n2,-2\n", {"names": ("t", "u")}),
+        ("\ufefft,u\r\n0,0.5\r\n1,\r\n2,-2\r\n", {}),
+        ('"t","u"\n"0","0.5"\n"1",""\n"2","-2"\n', {}),
+    ],
+)
+def test_tables_are_read_however_they_are_written(tmp_path, text, settings):
+    found = read(written(tmp_path, text), **settings)
+    assert list(found) == ["t", "u"]
+    np.testing.assert_array_equal(found["t"], [0, 1, 2])
+    np.testing.assert_array_equal(found["u"], U)
+
+
+def test_columns_without_a_header_are_numbered(tmp_path):
+    assert list(read(written(tmp_path, "0 1\n2 3\n", "a.txt"))) == ["column1", "column2"]
+
+
+_COMMA = (
+    "Line 3, column 'u': '0,25' is not a number; where the decimal sign is a comma, the map says decimal = \",\" under "
+    "[csv]."
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "It holds no lines."),
+        ("t,u\n", "It has a header, but no rows below it."),
+        ("t,u\n0,1\n1,OK\n", "Line 3, column 'u': 'OK' is not a number."),
+        ("t;u\n0;1\n1;0,25\n", _COMMA),
+        ("# c\nt,u\n0,1\n1,2,3\n", "Line 4 has 3 fields, but there are 2 columns."),
+        ("t,t\n0,1\n", "Its header names 't' twice; give the columns names of their own in [csv] names."),
+    ],
+)
+def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, sentence):
+    with pytest.raises(ImportRefusedError) as refused:
+        read(written(tmp_path, text))
+    assert refused.value.happened == sentence
+    assert refused.value.saved == "Nothing was written."
+
+
+def test_npz_is_read_without_running_anything_in_it(tmp_path):
+    np.savez(tmp_path / "a.npz", u=U[:, None], fs=1000.0, names=np.array(["a"]), bad=np.array([{}], dtype=object))
+    found = read(tmp_path / "a.npz")
+    assert {name: array.shape for name, array in found.items()} == {"u": (3,), "fs": (), "names": ()}
+
+
+def test_a_single_npy_is_data(tmp_path):
+    np.save(tmp_path / "a.npy", U)
+    np.testing.assert_array_equal(read(tmp_path / "a.npy")["data"], U)
+
+
+def test_structures_of_matlab_are_named_with_a_dot(tmp_path):
+    savemat(tmp_path / "a.mat", {"data": {"u": U[:, None], "run": {"fs": 1000.0}}, "note": "hello"})
+    found = read(tmp_path / "a.mat")
+    assert set(found) == {"data.u", "data.run.fs", "note"}
+    np.testing.assert_array_equal(found["data.u"], U)
+
+
+def test_matlab_files_that_are_hdf5_are_turned_the_right_way(tmp_path):
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file["data/y"] = np.arange(6.0).reshape(3, 2)
+        file["#refs#/x"] = 1.0
+    found = read(tmp_path / "a.mat")
+    assert {name: array.shape for name, array in found.items()} == {"data.y": (2, 3)}
+
+
+def test_datasets_of_hdf5_are_named_by_their_path(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["run1/force"] = U
+    np.testing.assert_array_equal(read(tmp_path / "a.h5")["run1/force"], U)
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.npy", "a.mat", "a.h5"])
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut off", b"\x93NUMPY\x01\x00", bytes(range(256)) * 4])
+def test_a_damaged_file_is_a_named_error(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ImportRefusedError, match=name):
+        read(tmp_path / name)
+
+
+def test_a_file_of_no_known_kind_is_refused_with_the_known_ones(tmp_path):
+    with pytest.raises(ImportRefusedError) as refused:
+        read(written(tmp_path, "x", "a.xlsx"))
+    assert "known are .csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5" in refused.value.happened
+
+
+def test_a_file_with_no_arrays_is_refused(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w"):
+        pass
+    with pytest.raises(ImportRefusedError, match="It holds no arrays"):
+        read(tmp_path / "a.h5")
+
+
+def test_a_file_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(CannotReadError, match="There is no file"):
+        read(tmp_path / "a.npz")

@@ -1,0 +1,224 @@
+"""The engine as a process of its own, with a scripted screen at the other end of its pipe."""
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
+from study.session.views.views import Answered
+from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
+from study.store.sessions.log_writer import somebody_writes
+from study.tui.engine.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
+from study.tui.engine.to_engine import (
+    AskBeside,
+    Begin,
+    LetGo,
+    Relay,
+    Reply,
+    Resume,
+    SessionOrder,
+    ShowHome,
+    ShowSession,
+    Withdraw,
+)
+
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
+
+ROOT = Path(__file__).parents[4]
+
+
+def asks(call: Call):
+    return lambda message: isinstance(message, Ask) and message.call is call
+
+
+def is_a(*kinds: type):
+    return lambda message: isinstance(message, kinds)
+
+
+def third_trial(screen) -> Ask:
+    for _ in range(2):
+        screen.reply(screen.wait_for(asks(Call.ASK)))
+    return screen.wait_for(asks(Call.ASK))
+
+
+def log_of(session: Path) -> str:
+    return (session / "events.jsonl").read_text()
+
+
+def gone_within(pid: int, seconds: float) -> bool:
+    until_s = time.monotonic() + seconds
+    while time.monotonic() < until_s:
+        if not Path(f"/proc/{pid}").exists() or "Z" in Path(f"/proc/{pid}/stat").read_text().split()[2]:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_a_session_runs_to_its_report_and_is_listed(begun, order, session):
+    end = begun.wait_for(is_a(Finished))
+    assert Path(end.results.report).is_file()
+    assert end.path == str(session)
+    begun.send(ShowHome(order.data, order.protocol, order.device))
+    home = begun.wait_for(is_a(Home)).view
+    assert [line.name for line in home.sessions] == ["P01_001"]
+    assert home.protocols[0].name == order.protocol
+    begun.send(ShowSession(end.path))
+    assert begun.wait_for(is_a(Session)).view.line.standing == "finished"
+    begun.send(Withdraw(end.path))
+    assert begun.wait_for(is_a(Withdrawn)).sessions == ("P01_001",)
+    assert not session.joinpath("events.jsonl").exists()
+
+
+def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session):
+    trial = third_trial(begun)
+    began_s = time.monotonic()
+    begun.send(LetGo())
+    failure = begun.next()
+    assert time.monotonic() - began_s < 0.5
+    assert isinstance(failure, Failed)
+    assert failure.error.title == "Interrupted"
+    assert failure.error.saved == "2 answers are on disk."
+    assert failure.path == str(session)
+    assert failure.error.exit_code == 130
+    assert somebody_writes(session / "events.jsonl") is False
+    begun.send(Reply(trial.number, Answered(1, time.monotonic())))
+    begun.send(Resume("P01_001", "simulated", order.data))
+    assert begun.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2
+
+
+def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, session):
+    screen.send(Begin(order))
+    screen.send(LetGo())
+    failure = screen.next()
+    assert isinstance(failure, Failed)
+    assert (failure.error.title, failure.path) == ("Interrupted", "")
+    assert not session.exists()
+    screen.send(Begin(order))
+    screen.wait_for(asks(Call.WELCOME))
+
+
+def test_a_reply_of_an_earlier_sitting_answers_nothing_in_the_next(screen, order):
+    screen.send(Reply(1, True))
+    screen.send(Begin(order))
+    assert screen.wait_for(is_a(Ask)).number == 1
+    with pytest.raises(queue.Empty):
+        screen.next(1.0)
+
+
+def test_a_reply_to_what_is_over_is_ignored(begun, session):
+    trial = third_trial(begun)
+    begun.send(Reply(trial.number - 1, Answered(2, time.monotonic())))
+    begun.send(Reply(trial.number, Answered(1, time.monotonic())))
+    assert begun.wait_for(is_a(Ask)).number > trial.number
+    answers = [line for line in log_of(session).splitlines() if "answer_given" in line]
+    assert '"answer":1' in answers[-1]
+
+
+def test_without_a_heartbeat_the_trial_is_void_and_waits_for_somebody(begun, session):
+    trial = third_trial(begun)
+    begun.suspend()
+    began_s = time.monotonic()
+    assert begun.next() == Close(trial.number)
+    assert 0.3 < time.monotonic() - began_s < 1.2
+    waiting = begun.next()
+    assert isinstance(waiting, Ask)
+    assert waiting.call is Call.AWAIT_RETURN
+    assert waiting.shown in (SCREEN_SILENT, SCREEN_LATE)  # by how busy this computer is
+    assert "the screen gave no sign of life" in log_of(session).splitlines()[-1]
+    begun.come_back()
+    begun.reply(waiting)
+    assert begun.next().shown.repeated
+
+
+@pytest.mark.parametrize(
+    ("request_", "call"), [(PauseAsked("participant"), Call.PAUSE), (StopAsked("participant"), None)]
+)
+def test_requests_from_the_screen_reach_the_session(begun, session, request_, call):
+    third_trial(begun)
+    begun.send(Relay(NoteAsked("experimenter", "coughed")))
+    begun.send(Relay(request_))
+    if call is not None:
+        begun.reply(begun.wait_for(asks(call)))
+        begun.wait_for(asks(Call.ASK))
+    else:
+        begun.wait_for(asks(Call.GOODBYE))
+    assert "coughed" in log_of(session)
+
+
+def test_what_cannot_be_begun_is_told_and_the_engine_goes_on(screen, order):
+    screen.send(Begin(SessionOrder("no_such_protocol", "simulated", "P01", order.data)))
+    failure = screen.next()
+    assert isinstance(failure, Failed)
+    assert "no_such_protocol" in failure.error.happened
+    assert failure.path == ""
+    screen.send(AskBeside(order.data, PauseAsked("experimenter")))
+    assert isinstance(screen.next(), Failed)
+    screen.send(ShowHome(order.data))
+    assert isinstance(screen.next(), Home)
+
+
+def test_a_killed_engine_says_what_is_safe_and_how_to_go_on(begun, session):
+    third_trial(begun)
+    os.kill(begun.engine.pid, signal.SIGSEGV)
+    failure = begun.next()
+    assert isinstance(failure, Failed)
+    assert failure.error.title == "The device program ended"
+    assert "SIGSEGV" in failure.error.happened
+    assert failure.error.saved == "Every answer that was given is on disk."
+    assert f"hapteq resume {session}" in failure.error.do_now
+    assert failure.error.exit_code == 3
+    assert begun.engine.dead
+    assert somebody_writes(session / "events.jsonl") is False
+
+
+def test_the_engine_hears_no_key_of_the_terminal_and_writes_nowhere(screen, order, capfd):
+    screen.send(ShowHome(order.data))
+    screen.next()
+    pid = screen.engine.pid
+    assert os.getsid(pid) == pid != os.getsid(0)
+    for stream in (0, 1, 2):
+        assert "/dev/pts" not in str(Path(f"/proc/{pid}/fd/{stream}").readlink())
+    assert capfd.readouterr() == ("", "")
+
+
+SCREEN_THAT_DIES = """
+import sys, time
+sys.path[:0] = [{root!r}, {here!r}]
+import importlib.util
+spec = importlib.util.spec_from_file_location("scripted", {conftest!r})
+scripted = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(scripted)
+from study.tui.engine.from_engine import Ask, Call
+from study.tui.engine.to_engine import Begin, SessionOrder
+screen = scripted.ScriptedScreen()
+screen.send(Begin(SessionOrder({protocol!r}, "simulated", "P01", {data!r}, seed=4)))
+for _ in range(3):
+    trial = screen.wait_for(lambda m: isinstance(m, Ask) and m.call is Call.ASK)
+    if _ < 2:
+        screen.reply(trial)
+print(screen.engine.pid, flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_killed_screen_takes_the_engine_with_it_and_loses_nothing(screen, order, session):
+    conftest = Path(__file__).with_name("conftest.py")
+    script = SCREEN_THAT_DIES.format(
+        root=str(ROOT), here=str(conftest.parent), conftest=str(conftest), protocol=order.protocol, data=order.data
+    )
+    other = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert other.stdout is not None
+    engine = int(other.stdout.readline())
+    other.kill()
+    other.wait()
+    other.stdout.close()
+    assert gone_within(engine, 4.5)  # about one on a machine that is not busy; its last resort comes at five
+    assert "session_interrupted" in log_of(session).splitlines()[-1]
+    screen.send(Resume("P01_001", "simulated", order.data))
+    assert screen.wait_for(asks(Call.WELCOME)).shown.resumed_after == 2

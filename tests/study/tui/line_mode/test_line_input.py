@@ -1,0 +1,39 @@
+import os
+
+import pytest
+
+from study.tui.line_mode.line_input import LineInput
+
+
+@pytest.fixture
+def pipe():
+    read, write = os.pipe()
+    return LineInput(read), write
+
+
+def test_lines_come_one_by_one_and_nothing_is_none(pipe):
+    lines, write = pipe
+    os.write(write, b"1\n2\nhal")
+    assert [lines.read(0.0), lines.read(0.0), lines.read(0.0)] == ["1", "2", None]
+    os.write(write, b"f\n")
+    assert lines.read(0.0) == "half"
+
+
+def test_the_end_of_the_input_is_told(pipe):
+    lines, write = pipe
+    os.write(write, b"1\n")
+    os.close(write)
+    assert lines.read(0.0) == "1"
+    with pytest.raises(EOFError):
+        lines.read(0.0)
+
+
+def test_an_input_has_ended_only_when_its_last_line_was_taken(pipe):
+    lines, write = pipe
+    assert not lines.ended()
+    os.write(write, b"1\n")
+    os.close(write)
+    assert not lines.ended()
+    assert lines.read(0.0) == "1"
+    assert lines.ended()
+    assert lines.ended()
