@@ -4,13 +4,44 @@ import os
 import tomllib
 from pathlib import Path
 
+import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from protocols.definition.staircase_rule import STRICT
+from study.devices.accelerometer.calibration import Calibration
+from study.devices.accelerometer.serial_reader import SerialAccelerometer, open_serial
 from study.errors import DeviceError
 
+Triple = tuple[float, float, float]
+
 FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
+
+
+@dataclass(frozen=True, config=STRICT)
+class SensorSettings:
+    """An accelerometer on a serial line, with what its calibration found."""
+
+    port: str
+    """As the system calls it: /dev/ttyACM0, COM3."""
+    bias: Triple
+    """Raw value of each channel at no acceleration."""
+    sensitivity: tuple[Triple, Triple, Triple]
+    """Raw per m/s²; a row is a channel, a column an axis of the device."""
+    raw_range: tuple[int, int]
+    """Lowest and highest raw value that are no clipping."""
+    baud: int = Field(default=2_000_000, gt=0)
+
+    def opened(self) -> SerialAccelerometer:
+        """Zeroed, so at rest. Raises `DeviceError`."""
+        calibration = Calibration(np.array(self.bias), np.array(self.sensitivity), np.zeros(3), 0.0)
+        sensor = SerialAccelerometer(open_serial(self.port, self.baud), calibration, self.raw_range)
+        try:
+            sensor.zero()
+        except BaseException:
+            sensor.close()
+            raise
+        return sensor
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -19,6 +50,7 @@ class LabSettings:
     """What the gravity compensation carries: handle and sensor. None: the model's own."""
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
     """What the centring spring moves, at the handle. None: the assumption in the table of models."""
+    accelerometer: SensorSettings | None = None
 
 
 def lab_file() -> Path:

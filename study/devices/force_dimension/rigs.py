@@ -2,10 +2,11 @@
 
 import time
 
+from study.devices.accelerometer.serial_reader import SerialAccelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.connect import failed, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
-from study.devices.force_dimension.lab import read_lab
+from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rig import ForceDimensionRig
@@ -18,6 +19,22 @@ def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRi
     """Raises `DeviceError` that says what is missing. What was opened until then is stopped and closed again."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
+    sensor = lab.accelerometer.opened() if lab.accelerometer is not None else None
+    try:
+        return _rig(library, model, lab, sensor, settings)
+    except BaseException:
+        if sensor is not None:
+            sensor.close()
+        raise
+
+
+def _rig(
+    library: Library,
+    model: DeviceModel,
+    lab: LabSettings,
+    sensor: SerialAccelerometer | None,
+    settings: DeviceSettings,
+) -> ForceDimensionRig:
     handle = open_model(library, model)
     try:
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
@@ -25,7 +42,7 @@ def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRi
         if drops_after_s > 0:
             prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
         info = info_of(handle, library, model, lab.effective_mass_kg)
-        return ForceDimensionRig(handle, info, drops_after_s, cap_n)
+        return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
         handle.let_go()
         raise failed(model.name, error) from error

@@ -1,0 +1,1 @@
+"""An accelerometer on a microcontroller, read over a serial line: packets, parser, clock, calibration, reader."""

@@ -1,0 +1,74 @@
+"""Six positions under gravity: bias, sensitivity with cross-axis, and noise of the accelerometer.
+
+raw = sensitivity a + bias is solved by least squares for six known directions of gravity. At rest the sensor reads
+what holds it up: +g along the axis that points up.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+
+GRAVITY_MPS2 = 9.80665
+
+POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
+UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
+"""(6, 3): the axis that points up in each position."""
+
+WORST_RESIDUAL = 0.05
+"""Of g. Six readings and twelve unknowns leave six residuals; tilts of 1 to 2 degrees in laying the sensor down give
+0.02 to 0.04 of g, a position taken for another gives more than 0.5."""
+
+
+WORST_CONDITION = 10.0
+"""Of the sensitivity: the ADXL335's channels differ by 10 %, a dead one by any factor."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    bias: FloatArray
+    """(3,), raw at no acceleration."""
+    sensitivity: FloatArray
+    """(3, 3), raw per m/s²: row = channel, column = axis."""
+    noise_mps2: FloatArray
+    """(3,), standard deviation at rest."""
+    residual_g: float
+    """Largest misfit of a position, of g."""
+
+    def acceleration(self, raw: FloatArray) -> FloatArray:
+        """(n, 3) or (3,), m/s², gravity included."""
+        turned = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
+        return np.asarray(turned.T, dtype=np.float64)
+
+    @property
+    def cross_axis(self) -> float:
+        """Largest share of one axis in another channel."""
+        of_own = np.abs(np.diag(self.sensitivity))
+        others = np.abs(self.sensitivity - np.diag(np.diag(self.sensitivity)))
+        return float((others / of_own[:, None]).max())
+
+
+def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
+    """positions: raw samples (n, 3) at rest in each of `POSITIONS`.
+
+    Raises ValueError that says which position does not fit, or that a channel hardly answers.
+    """
+    if len(positions) != len(POSITIONS) or any(len(samples) < 2 for samples in positions):
+        raise ValueError(f"{len(POSITIONS)} positions are needed, each with two samples or more")
+    means = np.array([np.mean(samples, axis=0) for samples in positions])
+    known = np.hstack((GRAVITY_MPS2 * UP, np.ones((len(UP), 1))))
+    solution = np.linalg.lstsq(known, means, rcond=None)[0]
+    sensitivity, bias = solution[:3].T, solution[3]
+    scale = float(np.linalg.norm(sensitivity, 2))
+    if not scale > 0:
+        raise ValueError("no channel answers to gravity: check the wiring")
+    misfit_g = np.linalg.norm(means - known @ solution, axis=1) / (scale * GRAVITY_MPS2)
+    worst = int(np.argmax(misfit_g))
+    if misfit_g[worst] > WORST_RESIDUAL:
+        raise ValueError(f"'{POSITIONS[worst]}' is off by {misfit_g[worst]:.2f} g: lay the sensor down again")
+    if np.linalg.cond(sensitivity) > WORST_CONDITION:
+        raise ValueError("a channel hardly answers to gravity: check its wiring")
+    deviations = np.concatenate([samples - np.mean(samples, axis=0) for samples in positions])
+    noise = np.linalg.solve(sensitivity, deviations.T).T.std(axis=0)
+    return Calibration(bias, sensitivity, noise, float(misfit_g.max()))

@@ -1,0 +1,125 @@
+"""From bytes as they come, torn, lost or garbled, to samples: every packet whose check sum is right, in order.
+
+A packet is looked for at every byte, so a garbled one hides none of its neighbours. Where two candidates overlap (a
+check sum is right by chance once in 65 536 times), the one whose number follows its neighbour's is taken.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from study.devices.accelerometer.packet import CHECKED, LAYOUT, SIZE, SYNC, Bytes, crc_of
+
+Indices = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    sequence: npt.NDArray[np.int64]
+    """(n,), counted on where the 16 bits of a packet begin anew."""
+    time_us: npt.NDArray[np.int64]
+    """(n,), counted on likewise."""
+    raw: npt.NDArray[np.uint16]
+    """(n, 3)."""
+
+    def __len__(self) -> int:
+        return len(self.sequence)
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Since the beginning."""
+
+    packets: int = 0
+    lost: int = 0
+    """By the gaps in the sequence numbers."""
+    spoiled_bytes: int = 0
+    """That belonged to no whole packet."""
+    restarts: int = 0
+    """How often the microcontroller began anew."""
+
+
+class PacketParser:
+    def __init__(self) -> None:
+        self._rest: Bytes = np.zeros(0, dtype=np.uint8)
+        self._last: tuple[int, int] | None = None
+        self.counts = Counts()
+
+    def feed(self, data: bytes) -> Samples:
+        """The samples that became whole with these bytes."""
+        stream = np.concatenate((self._rest, np.frombuffer(data, dtype=np.uint8)))
+        starts = _whole_packets(stream)
+        starts = starts[_without_overlaps(starts, _packets_at(stream, starts))]
+        used = int(starts[-1]) + SIZE if len(starts) else 0
+        # What may still be the beginning of a packet waits for its end.
+        keep_from = max(used, len(stream) - (SIZE - 1))
+        self._rest = stream[keep_from:].copy()
+        packets = _packets_at(stream, starts)
+        spoiled = keep_from - SIZE * len(starts)
+        return self._counted_on(packets, spoiled)
+
+    def _counted_on(self, packets: npt.NDArray[np.void], spoiled: int) -> Samples:
+        sequence = packets["sequence"].astype(np.int64)
+        time_us = packets["time_us"].astype(np.int64)
+        before = self._last if self._last is not None or not len(packets) else (int(sequence[0]) - 1, int(time_us[0]))
+        if before is None:
+            self.counts = Counts(spoiled_bytes=self.counts.spoiled_bytes + spoiled)
+            return Samples(sequence, time_us, packets["raw"])
+        steps = np.diff(sequence, prepend=before[0]) % 2**16
+        forward = (steps > 0) & (steps < 2**15)
+        # Backwards: the firmware began anew. What was lost meanwhile is not known; time and number go on by a step.
+        steps = np.where(forward, steps, 1)
+        times = np.where(forward, np.diff(time_us, prepend=before[1]) % 2**32, 1)
+        sequence, time_us = before[0] + np.cumsum(steps), before[1] + np.cumsum(times)
+        if len(packets):
+            self._last = int(sequence[-1]), int(time_us[-1])
+        was = self.counts
+        self.counts = Counts(
+            packets=was.packets + len(packets),
+            lost=was.lost + int((steps - 1).sum()),
+            spoiled_bytes=was.spoiled_bytes + spoiled,
+            restarts=was.restarts + int((~forward).sum()),
+        )
+        return Samples(sequence, time_us, packets["raw"])
+
+
+def _whole_packets(stream: Bytes) -> Indices:
+    """Where packets with the right check sum begin."""
+    last = len(stream) - SIZE + 1
+    if last <= 0:
+        return np.zeros(0, dtype=np.intp)
+    starts: Indices = np.flatnonzero((stream[:last] == SYNC[0]) & (stream[1 : last + 1] == SYNC[1]))
+    packets = _packets_at(stream, starts)
+    checked = packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED]
+    right: Indices = starts[crc_of(checked) == packets["crc"]]
+    return right
+
+
+def _packets_at(stream: Bytes, starts: Indices) -> npt.NDArray[np.void]:
+    packets: npt.NDArray[np.void] = stream[starts[:, None] + np.arange(SIZE)].reshape(-1).view(LAYOUT)
+    return packets
+
+
+def _without_overlaps(starts: Indices, packets: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
+    """Which of them to keep, (n,)."""
+    kept = np.ones(len(starts), dtype=bool)
+    if (np.diff(starts) >= SIZE).all():
+        return kept
+    sequence = dict(zip(starts.tolist(), packets["sequence"].tolist(), strict=True))
+    last = 0
+    for k in range(1, len(starts)):
+        if starts[k] - starts[last] < SIZE:
+            better = _neighbours(int(starts[k]), sequence) > _neighbours(int(starts[last]), sequence)
+            kept[last if better else k] = False
+            last = k if better else last
+        else:
+            last = k
+    return kept
+
+
+def _neighbours(start: int, sequence: dict[int, int]) -> int:
+    """How many packets right before and right after it have the number before and after its own."""
+    own = sequence[start]
+    before, after = sequence.get(start - SIZE), sequence.get(start + SIZE)
+    return (before == (own - 1) % 2**16) + (after == (own + 1) % 2**16)

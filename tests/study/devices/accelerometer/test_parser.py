@@ -1,0 +1,155 @@
+"""Packets out of bytes that were lost, torn and garbled: every good one is found, and what was bad is counted."""
+
+import ctypes
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study.devices.accelerometer.packet import CHECKED, SIZE, SYNC, crc_of, packed
+from study.devices.accelerometer.parser import PacketParser
+
+FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
+
+
+def stream(count: int, first: int = 0, seed: int = 1) -> tuple[bytes, np.ndarray]:
+    raw = np.random.default_rng(seed).integers(0, 2**16, (count, 3), dtype=np.uint16)
+    numbers = first + np.arange(count)
+    return packed(numbers, 250 * numbers, raw), raw
+
+
+def test_the_check_sum_is_the_published_one():
+    """CRC-16/CCITT-FALSE of the digits 1 to 9 is 29B1."""
+    assert crc_of(np.frombuffer(b"123456789", dtype=np.uint8)[None]) == 0x29B1
+
+
+def test_whole_packets_come_out_as_they_went_in():
+    data, raw = stream(1000)
+    parser = PacketParser()
+    samples = parser.feed(data)
+    assert (samples.raw == raw).all()
+    assert (samples.sequence == np.arange(1000)).all()
+    assert (samples.time_us == 250 * np.arange(1000)).all()
+    assert (parser.counts.packets, parser.counts.lost, parser.counts.spoiled_bytes) == (1000, 0, 0)
+
+
+@settings(max_examples=30)
+@given(cuts=st.lists(st.integers(0, 100 * SIZE), max_size=40))
+def test_it_does_not_matter_where_the_bytes_are_torn(cuts):
+    data, raw = stream(100)
+    parser, found = PacketParser(), []
+    for start, stop in zip([0, *sorted(cuts)], [*sorted(cuts), len(data)], strict=True):
+        found.append(parser.feed(data[start:stop]).raw)
+    assert (np.concatenate(found) == raw).all()
+    assert parser.counts.spoiled_bytes == 0
+
+
+def test_numbers_and_times_go_on_where_their_bits_begin_anew():
+    numbers = 65_500 + np.arange(100)
+    times_us = 2**32 - 5000 + 250 * np.arange(100)
+    samples = PacketParser().feed(packed(numbers, times_us, np.zeros((100, 3))))
+    assert (samples.sequence == numbers).all()
+    assert (np.diff(samples.time_us) == 250).all()
+
+
+def test_what_was_lost_is_counted():
+    data, _ = stream(100)
+    parser = PacketParser()
+    parser.feed(data[: 10 * SIZE])
+    parser.feed(data[13 * SIZE : 50 * SIZE] + data[90 * SIZE :])
+    assert parser.counts.lost == 3 + 40
+    assert (parser.counts.packets, parser.counts.restarts) == (57, 0)
+
+
+def test_a_firmware_that_begins_anew_is_counted_and_time_goes_on():
+    parser = PacketParser()
+    first = parser.feed(stream(50, first=5000)[0])
+    second = parser.feed(stream(50)[0])
+    assert (parser.counts.restarts, parser.counts.lost) == (1, 0)
+    assert second.sequence[0] == first.sequence[-1] + 1
+    assert (np.diff(np.concatenate((first.time_us, second.time_us))) > 0).all()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
+    """Packets between stretches of noise that is full of sync bytes; some packets lose bytes, some have one changed."""
+    random = np.random.default_rng(seed)
+    count = 20_000
+    data, raw = stream(count, seed=seed)
+    fate = random.choice(["good", "torn", "flipped"], size=count, p=[0.8, 0.1, 0.1])
+    pieces, starts = [], []
+    for k in range(count):
+        packet = bytearray(data[k * SIZE : (k + 1) * SIZE])
+        if fate[k] == "torn":
+            del packet[random.integers(0, SIZE) :]
+        elif fate[k] == "flipped":
+            packet[random.integers(0, SIZE)] ^= 1 << random.integers(0, 8)
+        noise = random.integers(0, 256, random.integers(0, 80), dtype=np.uint8).tobytes()
+        starts.append(sum(map(len, pieces[-3:])) + (starts[-1] if starts else 0))
+        pieces += [bytes(packet), SYNC * int(random.integers(0, 3)), noise]
+    garbled = b"".join(pieces)
+    assert len(garbled) > 10**6
+    parser, found, at = PacketParser(), [], 0
+    while at < len(garbled):
+        size = int(random.integers(1, 5000))
+        found.append(parser.feed(garbled[at : at + size]))
+        at += size
+    numbers = np.concatenate([samples.sequence for samples in found])
+    # A packet whose last byte was lost is whole all the same where the noise after it begins with that byte.
+    whole = [k for k in range(count) if garbled[starts[k] : starts[k] + SIZE] == data[k * SIZE : (k + 1) * SIZE]]
+    assert set(np.flatnonzero(fate == "good")) <= set(whole)
+    assert numbers.tolist() == whole
+    assert (np.concatenate([samples.raw for samples in found]) == raw[whole]).all()
+    counts = parser.counts
+    assert counts.packets == len(numbers)
+    assert counts.packets + counts.lost == numbers[-1] - numbers[0] + 1
+    assert 0 <= len(garbled) - SIZE * counts.packets - counts.spoiled_bytes < SIZE
+
+
+def test_a_million_bytes_of_noise_are_no_packets():
+    parser = PacketParser()
+    noise = np.random.default_rng(4).integers(0, 256, 10**6, dtype=np.uint8).tobytes()
+    assert len(parser.feed(noise)) == 0
+    assert parser.counts.spoiled_bytes > 10**6 - SIZE
+
+
+def test_a_packet_within_a_packet_that_is_right_by_chance_does_not_hide_the_real_one():
+    """A false candidate ends in the real packet that follows a good one."""
+    data, _ = stream(3)
+    inner = bytearray(packed(77, 0, [[0, 0, 0]]))
+    forged = None
+    for k in range(2**16):  # raw values so that the candidate's check sum fits
+        trial = bytearray(inner)
+        trial[8:10] = k.to_bytes(2, "little")
+        body = np.frombuffer(bytes(trial[:6]), dtype=np.uint8)
+        whole = np.concatenate((body, np.frombuffer(data[SIZE : SIZE + 10], dtype=np.uint8)))
+        whole[4:6] = np.frombuffer(k.to_bytes(2, "little"), dtype=np.uint8)
+        if crc_of(whole[None, CHECKED])[0] == int.from_bytes(whole[14:16].tobytes(), "little"):
+            forged = bytes(whole[:6].tobytes())
+            break
+    assert forged is not None
+    samples = PacketParser().feed(data[:SIZE] + forged + data[SIZE:])
+    assert samples.sequence.tolist() == [0, 1, 2]
+
+
+def test_the_firmware_makes_the_same_packets(vendor, tmp_path):
+    source = tmp_path / "firmware.c"
+    source.write_text(
+        '#include "packet.h"\n'
+        "void make(uint8_t *out, uint16_t s, uint32_t t, const uint16_t *raw) { hapteq_packet(out, s, t, raw); }\n"
+    )
+    library = tmp_path / "firmware.so"
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", f"-I{FIRMWARE}"]
+    subprocess.run([*vendor.compiler(), *strict, "-o", str(library), str(source)], check=True)
+    make = ctypes.CDLL(str(library)).make
+    make.argtypes = [ctypes.c_char_p, ctypes.c_uint16, ctypes.c_uint32, ctypes.c_void_p]
+    random = np.random.default_rng(5)
+    for _ in range(200):
+        number, time_us = int(random.integers(2**16)), int(random.integers(2**32))
+        raw = random.integers(0, 2**16, 3, dtype=np.uint16)
+        out = ctypes.create_string_buffer(SIZE)
+        make(out, number, time_us, raw.ctypes.data)
+        assert out.raw == packed(number, time_us, raw[None])

@@ -1,0 +1,148 @@
+"""The reader over a pseudo-terminal, at the rates that a board sends, with bytes lost on the way."""
+
+import contextlib
+import os
+import threading
+import time
+import tty
+
+import numpy as np
+import pytest
+
+from study.devices.accelerometer.calibration import Calibration
+from study.devices.accelerometer.packet import SIZE, packed
+from study.devices.accelerometer.serial_reader import FRESH_S, SerialAccelerometer, open_serial
+from study.errors import DeviceError
+
+pytestmark = pytest.mark.real_time
+
+SCALE = 600.0
+IDEAL = Calibration(np.full(3, 32_768.0), SCALE * np.eye(3), np.zeros(3), 0.0)
+AT_REST = np.array([0.0, 0.0, 9.81])
+
+
+class Board:
+    """Sends packets as long as it is on. `spoil` changes the bytes of a block before they go."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self.master, self.slave = os.openpty()
+        tty.setraw(self.slave)
+        self.path = os.ttyname(self.slave)
+        self.acceleration = AT_REST
+        self.rate_hz, self.sent, self.on = rate_hz, 0, True
+        self.spoil = lambda block: block
+        self._thread = threading.Thread(target=self._send, daemon=True)
+        self._thread.start()
+
+    def _send(self) -> None:
+        started_s = time.monotonic()
+        while self.on:
+            due = int((time.monotonic() - started_s) * self.rate_hz)
+            if due > self.sent:
+                numbers = np.arange(self.sent, due)
+                raw = np.tile(np.clip(32_768 + SCALE * self.acceleration, 0, 65_535), (len(numbers), 1))
+                with contextlib.suppress(OSError):
+                    os.write(self.master, self.spoil(packed(numbers, 1e6 * numbers / self.rate_hz, raw)))
+                self.sent = due
+            time.sleep(0.002)
+
+    def close(self) -> None:
+        self.on = False
+        self._thread.join(5.0)
+        for end in (self.master, self.slave):
+            with contextlib.suppress(OSError):
+                os.close(end)
+
+
+def within(seconds: float, condition) -> bool:
+    until_s = time.monotonic() + seconds
+    while not condition() and time.monotonic() < until_s:
+        time.sleep(0.005)
+    return condition()
+
+
+@pytest.fixture
+def board():
+    with contextlib.closing(Board(2000.0)) as one:
+        yield one
+
+
+@pytest.fixture
+def sensor(board):
+    with contextlib.closing(SerialAccelerometer(open_serial(board.path, 115_200), IDEAL, (10, 65_525))) as one:
+        one.zero(0.2)
+        yield one
+
+
+def test_at_rest_it_reads_nothing_and_moved_it_reads_the_motion(board, sensor):
+    assert within(5.0, lambda: np.allclose(sensor.latest()[0], 0.0, atol=0.01))
+    board.acceleration = AT_REST + [3.0, -2.0, 1.0]
+    assert within(5.0, lambda: np.allclose(sensor.latest()[0], [3.0, -2.0, 1.0], atol=0.01))
+    assert sensor.latest()[1] is False
+
+
+def test_a_channel_at_its_limit_is_told(board, sensor):
+    board.acceleration = np.array([100.0, 0.0, 0.0])
+    assert within(5.0, lambda: sensor.latest()[1])
+
+
+def test_a_board_that_falls_silent_reads_nothing(board, sensor):
+    board.on = False
+    assert within(FRESH_S + 5.0, lambda: bool(np.isnan(sensor.latest()[0]).all()))
+
+
+@pytest.mark.parametrize("rate_hz", [1000.0, 4000.0, 10_000.0])
+def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
+    with contextlib.closing(Board(rate_hz)) as board:
+        random = np.random.default_rng(1)
+
+        def losing(block: bytes) -> bytes:
+            """Now and then a byte in the middle, so one packet of the block."""
+            at = int(random.integers(0, len(block))) if random.random() < 0.3 else None
+            return block if at is None else block[:at] + block[at + 1 :]
+
+        board.spoil = losing
+        with contextlib.closing(SerialAccelerometer(open_serial(board.path, 115_200), IDEAL, (10, 65_525))) as sensor:
+            assert within(20.0, lambda: sensor.counts.packets > rate_hz / 2)
+            counts = sensor.counts
+        assert 0 < counts.lost < 0.2 * counts.packets
+        assert counts.restarts == 0
+        assert counts.spoiled_bytes >= (SIZE - 1) * (counts.lost - 1)
+
+
+def test_a_line_on_which_nothing_comes_is_an_error_that_says_so():
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    with contextlib.closing(SerialAccelerometer(open_serial(os.ttyname(slave), 115_200), IDEAL, (0, 65_535))) as sensor:
+        os.write(master, b"no packet at all")
+        with pytest.raises(DeviceError, match="The accelerometer is silent"):
+            sensor.zero(0.1)
+        assert np.isnan(sensor.latest()[0]).all()
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_port_that_is_not_there_is_an_error_that_says_so(tmp_path):
+    with pytest.raises(DeviceError, match="cannot be opened.*group dialout"):
+        open_serial(str(tmp_path / "ttyACM7"), 115_200)
+
+
+def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path, monkeypatch):
+    from study.devices.clock import RealClock
+    from study.devices.opening import open_device
+
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
+    rows = "[[600.0, 0.0, 0.0], [0.0, 600.0, 0.0], [0.0, 0.0, 600.0]]"
+    (tmp_path / "device.toml").write_text(
+        f'[accelerometer]\nport = "{board.path}"\nbaud = 115200\nbias = [32768.0, 32768.0, 32768.0]\n'
+        f"sensitivity = {rows}\nraw_range = [10, 65525]\n"
+    )
+    with contextlib.closing(open_device("omega3", rigs.SETTINGS, RealClock(), 1)) as device:
+        board.acceleration = AT_REST + [1.0, 2.0, 3.0]
+
+        def seen() -> bool:
+            acceleration = device.look().acceleration_mps2
+            return acceleration is not None and np.allclose(acceleration, [1.0, 2.0, 3.0], atol=0.01)
+
+        assert within(10.0, seen)
+    assert stub.safe
