@@ -145,6 +145,13 @@ def stub(vendor, compiled_stub, tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def surviving_stub(stub, tmp_path, monkeypatch):
+    """It lives on in a file when the program that drives it is killed."""
+    monkeypatch.setenv("HAPTEQ_STUB_FILE", str(tmp_path / "device"))
+    return stub
+
+
+@pytest.fixture
 def stepped_stub(stub):
     """Its time passes with the forces that it gets: a millisecond each."""
     stub.set("wall_time", 0)

@@ -48,6 +48,7 @@ class Stub:
         self._library = ctypes.CDLL(str(path))
         self._library.stub_set.argtypes = [ctypes.c_char_p, ctypes.c_double]
         self._library.stub_get.argtypes, self._library.stub_get.restype = [ctypes.c_char_p], ctypes.c_double
+        self._library.stub_peek.argtypes, self._library.stub_peek.restype = [ctypes.c_char_p], ctypes.c_double
         self._library.stub_advance.argtypes = [ctypes.c_double]
         self._library.stub_move.argtypes = [ctypes.c_double] * 3
 
@@ -58,6 +59,10 @@ class Stub:
         value = float(self._library.stub_get(name.encode()))
         assert value == value, f"the stub knows no {name}"
         return value
+
+    def peek(self, name: str) -> float:
+        """While another program drives the device: what it knows as of its last call."""
+        return float(self._library.stub_peek(name.encode()))
 
     def advance(self, seconds: float) -> None:
         self._library.stub_advance(seconds)

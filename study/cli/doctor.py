@@ -1,6 +1,7 @@
 """`hapteq doctor`: is this computer, and the device at it, fit for a study?"""
 
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,6 +28,13 @@ def doctor(
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="First wait until the handle is put into its calibration position.")
     ] = False,
+    calibrate_sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PORT", help="Only this: lay the accelerometer on this serial line down in six positions."
+        ),
+    ] = None,
+    baud: Annotated[int, typer.Option(min=1, help="Of the accelerometer's serial line.")] = 2_000_000,
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves."""
@@ -36,6 +44,9 @@ def doctor(
     from study.workflows.checks.check_installation import this_terminal
     from study.workflows.checks.examine_setup import examine_setup
 
+    if calibrate_sensor is not None:
+        _calibrate_sensor(calibrate_sensor, baud)
+        return
     if calibrate:
         _calibrate(device)
     with bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda done: None) as show:
@@ -54,6 +65,19 @@ def _calibrate(device: str) -> None:
     where = "Bring the handle into its calibration position, as the device's manual shows, and leave it there"
     typer.echo(f"{where} (within {CALIBRATION_S:g} s).", err=True)
     calibrate_device(device, CALIBRATION_S)
+
+
+def _calibrate_sensor(port: str, baud: int) -> None:
+    from study.devices.opening import calibrate_accelerometer
+
+    def lay_down(position: str) -> None:
+        typer.echo(f"Lay the sensor down with {position}, let go of it, and press Enter. ", err=True, nl=False)
+        if not sys.stdin.readline():
+            raise KeyboardInterrupt
+
+    table = calibrate_accelerometer(port, baud, lay_down)
+    typer.echo("Put this into the device's file (docs/hardware.md):", err=True)
+    typer.echo(table)
 
 
 def _say(examination: "Examination") -> None:

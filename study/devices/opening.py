@@ -3,6 +3,8 @@
 The heavy parts (numba above all) are imported when a device is opened, so that the command line starts at once.
 """
 
+from collections.abc import Callable
+
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceSettings
 from study.devices.force_dimension.models import MODELS
@@ -67,3 +69,13 @@ def calibrate_device(name: str, patience_s: float) -> None:
     from study.devices.force_dimension.findings import calibrate
 
     calibrate(name, patience_s)
+
+
+def calibrate_accelerometer(port: str, baud: int, before_each: Callable[[str], None]) -> str:
+    """Six positions under gravity; `before_each(position)` returns when the sensor lies there. TOML for the lab's file.
+
+    Raises `DeviceError`.
+    """
+    from study.devices.accelerometer.six_positions import calibrate_on_table
+
+    return calibrate_on_table(port, baud, before_each)

@@ -1,5 +1,12 @@
 """A whole short study through the driver of a real device, on the stub of its library, in real time."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
 import pytest
 
 from study.cli.main import main
@@ -41,3 +48,72 @@ def test_a_simulated_participant_takes_a_study_on_the_driver(stub, short_file, t
     assert 0.3 < stub.get("peak_n") <= 4.5
     trials = (tmp_path / "data" / "ideal1_001" / "trials.csv").read_text().splitlines()
     assert len(trials) > 8
+
+
+class Taking:
+    """A simulated participant takes the study, in a program of its own."""
+
+    def __init__(self, arguments: list[str], stub) -> None:
+        self.stub = stub
+        self.program = subprocess.Popen(
+            [sys.executable, "-m", "study", *arguments],
+            env=os.environ | {"HAPTEQ_STUB": "stiffness=150"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+
+    def await_force(self) -> bool:
+        """Until a force is played. False where the program ended before."""
+        while self.program.poll() is None:
+            if self.stub.peek("last_write") > 0.2 and self.stub.peek("force_on"):
+                return True
+            time.sleep(0.001)
+        return False
+
+    def end(self) -> str:
+        self.program.send_signal(signal.SIGCONT)
+        return self.program.communicate(timeout=120)[0].decode()
+
+
+def watch_it_let_go(stub) -> None:
+    """Nothing drives the device any more: its firmware goes on, from where the program left it."""
+    time.sleep(0.1)
+    assert stub.safe
+    assert stub.get("cause") == 3
+    assert stub.get("peak_n") <= 4.5
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 22))])
+def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(surviving_stub, short_file, tmp_path, seed):
+    random, stub = np.random.default_rng(seed), surviving_stub
+    data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
+    arguments = ["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", str(seed), *data]
+    log, before, killed = tmp_path / "data" / "ideal1_001" / "events.jsonl", b"", 0
+    for _ in range(2):
+        taking = Taking(arguments, stub)
+        if taking.await_force():
+            time.sleep(float(random.uniform(0.0, 0.5)))
+            taking.program.kill()
+            killed += 1
+        said = taking.end()
+        time.sleep(0.1)
+        assert stub.safe, said
+        assert stub.get("peak_n") <= 4.5
+        after = log.read_bytes()
+        assert after.startswith(before.rsplit(b"\n", 1)[0])
+        before, arguments = after, ["resume", "ideal1_001", *data]
+    assert killed, said
+
+
+def test_a_program_that_is_stopped_leaves_no_force_and_none_comes_back(surviving_stub, short_file, tmp_path):
+    stub = surviving_stub
+    data = ["--data", str(tmp_path / "data"), "--device", "omega3"]
+    taking = Taking(["study", "--protocol", str(short_file), "--observer", "ideal", "--seed", "3", *data], stub)
+    assert taking.await_force(), taking.end()
+    taking.program.send_signal(signal.SIGSTOP)
+    watch_it_let_go(stub)
+    time.sleep(0.5)
+    taking.program.send_signal(signal.SIGCONT)
+    said = taking.end()
+    assert taking.program.returncode in (3, 130), said
+    assert stub.safe

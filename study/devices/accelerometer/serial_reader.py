@@ -3,7 +3,7 @@
 import contextlib
 import threading
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,6 +20,9 @@ ZEROING_S = 0.5
 
 AT_ONCE = 4096
 """Bytes: 0.1 s at 2 kHz."""
+
+WAIT_S = 0.01
+"""For a byte, on a silent line: so long until a reader hears that it is to end."""
 
 
 class Port(Protocol):
@@ -98,11 +101,25 @@ def open_serial(path: str, baud: int) -> Port:
             "Install hapteq with its hardware extra: pip install '.[hardware]'.",
         ) from error
     try:
-        port: Port = serial.Serial(path, baud, timeout=0.01, exclusive=True)
+        return _SerialPort(serial.Serial(path, baud, timeout=WAIT_S, exclusive=True))
     except (OSError, ValueError) as error:
         raise DeviceError(
             "The accelerometer cannot be opened",
             f"{path}: {error}.",
             "Plug it in, and name its port in the device's file; on Linux this account must be in the group dialout.",
         ) from error
-    return port
+
+
+class _SerialPort:
+    """What is there is read at once; where nothing is, a byte is waited for. pyserial would wait for all of them."""
+
+    def __init__(self, line: Any) -> None:
+        self._line = line
+
+    def read(self, size: int) -> bytes:
+        first: bytes = self._line.read(1)
+        waiting = min(size - 1, self._line.in_waiting)
+        return first + self._line.read(waiting) if first and waiting else first
+
+    def close(self) -> None:
+        self._line.close()

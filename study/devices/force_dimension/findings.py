@@ -16,6 +16,11 @@ from study.session.views.views import DeviceFinding
 CAP_N = 1.0
 """While it is looked at no force is sent; if one were, the library would cut it here."""
 
+AT_REST_S = 0.3
+EVERY_S = 0.002
+DRIFTING_MPS = 0.02
+"""After `AT_REST_S` with gravity compensated and no hand: 7 % of g in excess of friction. Below, friction holds it."""
+
 POWER = "Switch its power supply on."
 
 
@@ -81,7 +86,7 @@ def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[Dev
     drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
     took_s = prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
     watchdog = f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * took_s:.0f} ms"
-    return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab)]
+    return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab), _gravity(handle)]
 
 
 def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
@@ -89,6 +94,21 @@ def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
     carried = f"{carried_kg:g} kg" if carried_kg else "what the library takes"
     moved = f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
     return DeviceFinding("Masses", f"gravity compensation {carried}, spring {moved} ({lab_file()})", fine=True)
+
+
+def _gravity(handle: Handle) -> DeviceFinding:
+    """Raises `LibraryError`."""
+    until_s = time.monotonic() + AT_REST_S
+    while time.monotonic() < until_s:
+        handle.set_force(0.0, 0.0, 0.0)
+        time.sleep(EVERY_S)
+    up_mps = handle.velocity_mps()[2]
+    if abs(up_mps) <= DRIFTING_MPS:
+        return DeviceFinding("Gravity", "compensated: the handle stays where it is", fine=True)
+    sinks = up_mps < 0
+    advice = f"With no hand on it, make effector_mass_kg in {lab_file()} {'larger' if sinks else 'smaller'}."
+    way = "sinks" if sinks else "rises"
+    return DeviceFinding("Gravity", f"the handle {way} at {1000 * abs(up_mps):.0f} mm/s", False, advice, warning=True)
 
 
 def _option(model: DeviceModel) -> str:

@@ -63,11 +63,10 @@ class Handle:
         return code == STALE
 
     def velocity_mps(self) -> tuple[float, float, float]:
-        return self._three("dhdGetLinearVelocity")
-
-    def applied_n(self) -> tuple[float, float, float]:
-        """The force that the device says it gives."""
-        return self._three("dhdGetForce")
+        """As the library estimates it, over its last 20 ms."""
+        x, y, z = c_double(), c_double(), c_double()
+        self.library.call("dhdGetLinearVelocity", byref(x), byref(y), byref(z), self.number)
+        return x.value, y.value, z.value
 
     def set_force(self, x_n: float, y_n: float, z_n: float) -> bool:
         """Whether the device gives less than that. From any thread."""
@@ -86,10 +85,6 @@ class Handle:
 
     def button_mask(self) -> int:
         return int(self.library.function("dhdGetButtonMask")(self.number))
-
-    def loop_khz(self) -> float:
-        """How often forces arrive at the device."""
-        return float(self.library.function("dhdGetComFreq")(self.number))
 
     def system_type(self) -> int:
         return self.library.call("dhdGetSystemType", self.number)
@@ -162,8 +157,3 @@ class Handle:
         except LibraryError:
             return False
         return True
-
-    def _three(self, name: str) -> tuple[float, float, float]:
-        x, y, z = c_double(), c_double(), c_double()
-        self.library.call(name, byref(x), byref(y), byref(z), self.number)
-        return x.value, y.value, z.value

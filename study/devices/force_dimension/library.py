@@ -14,10 +14,8 @@ from study.errors import DeviceError
 OLDEST_SDK = (3, 16, 0)
 """From here on all functions are there with the types below; older ones differ in some."""
 
-ANY_ERROR = 1
-NO_DEVICE_FOUND = 5
 DEVICE_IN_USE = 20
-"""Of the library's error codes, those that something is decided by."""
+"""Of the library's error codes, the one that something is decided by."""
 
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
@@ -26,7 +24,6 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdErrorGetLast": (c_int, ()),
     "dhdErrorGetLastStr": (c_char_p, ()),
     "dhdGetSDKVersion": (None, (POINTER(c_int),) * 4),
-    "dhdGetAvailableCount": (c_int, ()),
     "dhdGetDeviceCount": (c_int, ()),
     "dhdOpenID": (c_int, (_ID,)),
     "dhdClose": (c_int, (_ID,)),
@@ -41,12 +38,9 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdGetPosition": (c_int, _THREE),
     "dhdGetLinearVelocity": (c_int, _THREE),
     "dhdSetForce": (c_int, (_NUMBER, _NUMBER, _NUMBER, _ID)),
-    "dhdGetForce": (c_int, _THREE),
     "dhdGetButtonMask": (c_uint, (_ID,)),
-    "dhdGetComFreq": (c_double, (_ID,)),
     "dhdSetGravityCompensation": (c_int, (c_int, _ID)),
     "dhdSetEffectorMass": (c_int, (_NUMBER, _ID)),
-    "dhdGetEffectorMass": (c_int, (_NUMBERS, _ID)),
     "dhdSetMaxForce": (c_int, (_NUMBER, _ID)),
     "dhdReset": (c_int, (_ID,)),
     "dhdWaitForReset": (c_int, (c_int, _ID)),

@@ -91,7 +91,7 @@ def test_a_missing_library_is_a_finding_that_says_what_to_install(run, tmp_path,
 def test_a_real_device_is_found_with_library_firmware_calibration_and_watchdog(run, stub, tmp_path):
     code, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
     found = verdicts(out)
-    of_driver = ("Library", "Connection", "Power", "Calibration", "Watchdog", "Masses")
+    of_driver = ("Library", "Connection", "Power", "Calibration", "Watchdog", "Masses", "Gravity")
     assert {found[name] for name in (*of_driver, "Answers", "Handle", "Rate", "Largest force")} == {"fine"}
     assert "omega.3, serial 4242, firmware 2.41, SDK 3.17.5.0" in out
     assert "set to 30.0 ms; without forces the device let go within" in out
@@ -118,6 +118,18 @@ def test_what_is_missing_is_said_with_its_cure(run, stub, tmp_path, switch, valu
     assert cure in out
     stub.set("in_use", 0)
     assert (stub.safe, stub.get("opened"), stub.get("peak_n")) == (True, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("weight_n", "way", "cure"),
+    [(2.5, "sinks", "larger"), (0.5, "rises", "smaller")],
+)
+def test_a_handle_of_another_weight_is_a_warning(run, stub, tmp_path, weight_n, way, cure):
+    """The compensation carries 0.148 kg, so 1.45 N."""
+    stub.set("weight", weight_n)
+    _, out = run("--device", "omega3", "--data", tmp_path, "--timing", 0)
+    assert verdicts(out)["Gravity"] == "WARN"
+    assert f"the handle {way} at" in out and f"device.toml {cure}" in out.replace("none.toml", "device.toml")
 
 
 def test_a_device_can_be_calibrated_from_here(run, stub, tmp_path):

@@ -22,6 +22,7 @@ NAMED_IN = {
     "set_force": {
         "study/devices/force_dimension/handle.py",
         "study/devices/force_dimension/rig.py",
+        "study/devices/force_dimension/findings.py",  # zero only
         "study/devices/force_dimension/watchdog_proof.py",  # zero only
     },
     "dhdSetForce": {"study/devices/force_dimension/handle.py", "study/devices/force_dimension/library.py"},

@@ -4,14 +4,18 @@ import contextlib
 import os
 import threading
 import time
+import tomllib
 import tty
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
-from study.devices.accelerometer.calibration import Calibration
+from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, Calibration
 from study.devices.accelerometer.packet import SIZE, packed
 from study.devices.accelerometer.serial_reader import FRESH_S, SerialAccelerometer, open_serial
+from study.devices.accelerometer.six_positions import calibrate_on_table
+from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError
 
 pytestmark = pytest.mark.real_time
@@ -146,3 +150,25 @@ def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path,
 
         assert within(10.0, seen)
     assert stub.safe
+
+
+def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
+    laid: list[str] = []
+
+    def lay_down(position: str) -> None:
+        board.acceleration = GRAVITY_MPS2 * UP[len(laid)]
+        laid.append(position)
+        time.sleep(0.1)
+
+    table = tomllib.loads(calibrate_on_table(board.path, 115_200, lay_down, rest_s=0.3))["accelerometer"]
+    assert laid == list(POSITIONS)
+    assert table["port"] == board.path
+    np.testing.assert_allclose(table["bias"], 32_768, atol=2)
+    np.testing.assert_allclose(table["sensitivity"], SCALE * np.eye(3), atol=0.5)
+    assert 0 < table["raw_range"][0] < 32_768 - 2.9 * SCALE * GRAVITY_MPS2
+    TypeAdapter(SensorSettings).validate_python(table)
+
+
+def test_a_sensor_that_was_never_turned_is_not_calibrated(board):
+    with pytest.raises(DeviceError, match="was not calibrated"):
+        calibrate_on_table(board.path, 115_200, lambda position: None, rest_s=0.1)

@@ -1,7 +1,9 @@
 /* A stand-in for the vendor's device library, for tests only: ours, made from the public names and types of its
  * functions. Behind them a mass on a damper and a spring in wall time or stepped time, a firmware with watchdog and
  * brakes, and faults by switch: stub_set("name", value), or HAPTEQ_STUB="name=value,name=value" in the environment.
+ * HAPTEQ_STUB_FILE names a file in which the device lives on when the program that drives it is killed.
  */
+#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdatomic.h>
 #include <stddef.h>
@@ -14,6 +16,9 @@
 #define EXPORT __declspec(dllexport)
 #else
 #define EXPORT
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
 #endif
 
 #define SWITCHES(X)                                                                                                    \
@@ -32,7 +37,20 @@
 #define AS_VALUE(name, value) value,
 #define AS_NAME(name, value) #name,
 enum { SWITCHES(AS_ENUM) COUNT };
-static double p[COUNT] = {SWITCHES(AS_VALUE)};
+typedef struct {
+  double values[COUNT], position[3], velocity[3], commanded[3], told[3], started, integrated, commanded_at, reset_at;
+} Device;
+static Device own = {.values = {SWITCHES(AS_VALUE)}, .started = -1};
+static Device *device = &own;
+#define p device->values
+#define x device->position
+#define v device->velocity
+#define command device->commanded
+#define shown device->told
+#define started_s device->started
+#define integrated_s device->integrated
+#define last_command_s device->commanded_at
+#define reset_s device->reset_at
 static const char *const names[COUNT] = {SWITCHES(AS_NAME)};
 
 enum { OTHER = 1, COM = 2, NO_DEVICE = 5, TIMEOUT = 7, EXPERT_OFF = 9, NOT_IMPLEMENTED = 10, NOT_READY = 12, IN_USE = 20 };
@@ -43,7 +61,6 @@ static const char *const texts[] = {"no error", "error", "communication error", 
 
 static _Thread_local int last_error;
 static atomic_flag busy = ATOMIC_FLAG_INIT;
-static double x[3], v[3], command[3], shown[3], started_s = -1, integrated_s, last_command_s, reset_s;
 
 static double wall_s(void) {
   struct timespec t;
@@ -59,7 +76,22 @@ static int find(const char *name, size_t length) {
   return -1;
 }
 
+static void share(void) {
+#ifndef _WIN32
+  const char *name = getenv("HAPTEQ_STUB_FILE");
+  int file = name && device == &own ? open(name, O_RDWR | O_CREAT, 0600) : -1;
+  if (file < 0) return;
+  int fresh = lseek(file, 0, SEEK_END) == 0;
+  void *place = ftruncate(file, sizeof own) ? MAP_FAILED : mmap(0, sizeof own, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  close(file);
+  if (place == MAP_FAILED) abort();
+  device = place;
+  if (fresh) *device = own;
+#endif
+}
+
 static void start(void) {
+  share();
   if (started_s >= 0) return;
   started_s = wall_s();
   const char *at = getenv("HAPTEQ_STUB");
@@ -85,8 +117,8 @@ static void step(double dt) {
   if (p[off_by]) drop((int)p[off_by]);
   for (int i = 0; i < 3; i++) {
     double applied = p[force_on] && !p[brake] ? command[i] : 0;
-    int lifted = i < 2 || (p[gravity] && p[force_on]);
-    double force = applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - (lifted ? 0 : p[weight]);
+    double lift = p[gravity] && p[force_on] ? 9.81 * p[effector] : 0, down = i == 2 && p[weight] > 0 ? p[weight] - lift : 0;
+    double force = applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - down;
     p[fx + i] = applied, p[ax + i] = force / p[mass];
     v[i] += dt * p[ax + i], x[i] += dt * v[i];
     norm += applied * applied;
@@ -135,6 +167,12 @@ EXPORT double stub_get(const char *name) {
   double value = i < 0 ? NAN : p[i];
   unlock();
   return value;
+}
+/* Without a step of time: another program drives the device just now. */
+EXPORT double stub_peek(const char *name) {
+  start();
+  int i = find(name, strlen(name));
+  return i < 0 ? NAN : p[i];
 }
 EXPORT void stub_advance(double seconds) { lock(), start(), run_to(integrated_s + seconds), unlock(); }
 EXPORT void stub_move(double to_x, double to_y, double to_z) { lock(), x[0] = to_x, x[1] = to_y, x[2] = to_z, unlock(); }

@@ -1,7 +1,10 @@
 """The proof that the device's own watchdog works, on devices where it does and where it does not."""
 
+from pathlib import Path
+
 import pytest
 
+from study.devices.force_dimension import findings, watchdog_proof
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.watchdog_proof import MARGIN_S, prove_watchdog
 from study.errors import DeviceError
@@ -74,3 +77,10 @@ def test_a_force_that_went_off_for_another_reason_proves_nothing(stepped_stub, h
 
     with pytest.raises(DeviceError, match="for another reason: the USB connection broke"):
         prove_watchdog(handle, handle.arm_watchdog(WATCHDOG_S), time.now_s, sleep)
+
+
+def test_only_zero_forces_are_ever_sent_past_the_safety_layer():
+    """By the source: these files write to a device without the governor."""
+    for module in (findings, watchdog_proof):
+        source = Path(module.__file__).read_text()
+        assert source.count("set_force(") == source.count("set_force(0.0, 0.0, 0.0)") > 0
