@@ -24,6 +24,9 @@ settings.load_profile("repeatable")
 os.environ["TZ"] = "UTC"
 time.tzset()
 
+# For people a crashing effect is left out and the run goes on; a test must see it.
+os.environ["HAPTEQ_STRICT"] = "1"
+
 
 @pytest.fixture
 def summer_and_winter(monkeypatch) -> Iterator[None]:

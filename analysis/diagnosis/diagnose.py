@@ -1,7 +1,7 @@
 """From recordings and a model to findings: the whole diagnosis, without files, clocks or screens."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,8 +24,9 @@ from analysis.diagnosis.search.by_balance import balances_of, borne_out, leaves_
 from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, hums_low, known_to_repeat
 from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.impacts import rattling
-from analysis.diagnosis.search.learn_clean_floor import NothingLearned, learned_from
+from analysis.diagnosis.search.learn_clean_floor import NothingLearned, floor_of, learned_from
 from analysis.diagnosis.search.looks import Look, look_of, looks_of
 from analysis.diagnosis.search.patience import OUT_OF_TIME, always
 from analysis.diagnosis.search.rivalry import Arena
@@ -66,6 +67,8 @@ class DiagnosisSettings:
     """Laws that were found elsewhere, to be looked for beside the catalogue."""
     patient: Patience = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
+    guard: Guard = field(default_factory=Guard)
+    """Where it is on, an effect that crashes is left out, and that is said."""
 
 
 def diagnose(
@@ -124,7 +127,7 @@ def _beside_clean(
     stands = arena.confirmed(arena.contender(given))
     found = Searched(arena, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
     progress("writing down what was found", 0.95)
-    floor = CleanFloor() if settings.fitted else _floor(recordings, model, settings.clean, map_, progress)
+    floor = CleanFloor() if settings.fitted else floor_of(settings.clean, model, recordings, map_, progress)
     whole = _assembled(recordings, settings, look, _Seen(found, floor), ())
     return with_contrast(whole, contrast, recordings[0], BEYOND)
 
@@ -153,20 +156,6 @@ def _by_given_model(
     return _assembled(recordings, settings, look, replace(seen, searched=searched), ())
 
 
-def _floor(
-    recordings: Sequence[Recording],
-    model: MechanicalModel,
-    clean: Sequence[Recording],
-    map_: Mapper,
-    progress: Progress,
-) -> CleanFloor:
-    """What a given model misses of the clean recordings, too, is no mismatch; of none, where they tell nothing."""
-    try:
-        return learned_from(clean, model, recordings, map_, progress).floor
-    except (NothingLearned, np.linalg.LinAlgError):
-        return CleanFloor()
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
     searched: Searched
@@ -176,7 +165,7 @@ class _Seen:
 def _arena(look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
     measure = look.chosen.measure
     tuning = tuning_of(look.model, measure.records[0].recording.command.channels)
-    return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without))
+    return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 
 
 def _by_search(
@@ -240,9 +229,9 @@ def _assembled(
     found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
     whole = assembled(replace(searched, found=found), look.chosen.floors, names, seen.floor)
     diagnosis = with_balances(whole.diagnosis, balances, recordings[0].command.channels)
-    early = (OUT_OF_TIME,) if not all(balance.complete for balance in balances) else ()
+    early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear = linear_remarks(balances, recordings[0].command.channels)
-    remarks = tuple(dict.fromkeys((*look.chosen.remarks, *searched.remarks, *early, *linear, *whole.remarks)))
+    remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *searched.remarks, *linear, *whole.remarks)))
     reached = reached_of(diagnosis, balances, recordings[0].command.channels)
     maps = state_maps(diagnosis, balances, whole.evidence, recordings[0])
     return replace(whole, diagnosis=diagnosis, remarks=remarks, reached=reached, state_maps=maps)

@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, evaluated
 from analysis.diagnosis.search.brief import Brief
-from analysis.diagnosis.search.rivalry import Arena, first_fits, sensitivity_at
+from analysis.diagnosis.search.rivalry import FITTING, SCREENING, Arena, first_fits, sensitivity_at
 from analysis.diagnosis.search.screening import Screened, screen
 from analysis.diagnosis.settings import WORTH_FITTING
 
@@ -16,18 +16,19 @@ def fits_by_brief(
     arena: Arena, brief: Brief, base: Fitted, timeless: Sequence[Hypothesis], timed: Sequence[Hypothesis]
 ) -> list[Fitted]:
     """On all samples, the best first. timed: what hangs on when a sample was taken, which the brief cannot judge."""
-    short = brief.arena
+    short, guard = brief.arena, arena.guard
     there = evaluated(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis)
-    screened = screen(short.measure, short.tuning, there, known, timeless, short.map_)
+    screened = screen(short.measure, short.tuning, there, known, timeless, guard.over(short.map_, SCREENING))
 
     def whole(fitted: Fitted) -> Fitted:
         return evaluated(arena.measure, arena.tuning, fitted.deviations, fitted.hypothesis)
 
-    fits: list[Fitted] = list(arena.map_(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
+    each = guard.over(arena.map_, FITTING)
+    fits: list[Fitted] = list(each(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
     if timed:
         known = sensitivity_at(arena, base.deviations, base.hypothesis)
-        screened = screen(arena.measure, arena.tuning, base, known, timed, arena.map_)
+        screened = screen(arena.measure, arena.tuning, base, known, timed, guard.over(arena.map_, SCREENING))
         fits += first_fits(arena, base, known, _promising(base, fits, screened))
     # A law that the brief leaves open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)

@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.errors.hypothesis import alike
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting
 from analysis.diagnosis.search.brief import brief_of
-from analysis.diagnosis.search.rivalry import Arena, Contender, sensitivity_at
+from analysis.diagnosis.search.rivalry import FITTING, Arena, Contender, sensitivity_at
 from analysis.diagnosis.settings import (
     MOST_REFINED,
     NO_SECOND_START,
@@ -26,13 +26,17 @@ deviations since, for it costs a simulation for each."""
 def contest(arena: Arena, base: Fitted, fits: Sequence[Fitted]) -> tuple[Contender, ...]:
     """The best first. fits: as `first_fits` leaves them."""
     worth = _worth_refining(base, fits)
-    refined, others = [refine(arena, candidate) for candidate in worth[:1]], worth[1:MOST_REFINED]
+
+    def refit(law: Fitted) -> Fitted:
+        return refine(arena, law)
+
+    refined: list[Fitted] = list(arena.guard.over(map, FITTING)(refit, worth[:1]))  # type: ignore[arg-type]
+    others = worth[1:MOST_REFINED]
     if refined and arena.contender(refined[0]).standing.seen <= NO_SECOND_START:
         others = [law for law in others if arena.contender(law).standing.seen <= REACHES_NOISE]
     rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
     plain = [plain_law for plain_law in rest if any(_holds(richer, plain_law) for richer in refined[:1])][:1]
-    further: list[Fitted] = list(arena.map_(lambda law: refine(arena, law), [*others, *plain]))  # type: ignore[arg-type]
-    refined += further
+    refined += arena.guard.over(arena.map_, FITTING)(refit, [*others, *plain])  # type: ignore[arg-type]
     contenders = [arena.contender(law) for law in [*refined, *(law for law in rest if law not in plain)]]
     return tuple(sorted(contenders, key=lambda contender: contender.standing.chosen_by))
 

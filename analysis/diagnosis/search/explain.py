@@ -15,7 +15,7 @@ from analysis.diagnosis.search.families import excludes
 from analysis.diagnosis.search.no_answer import silences
 from analysis.diagnosis.search.parsimony import plainest_first
 from analysis.diagnosis.search.patience import OutOfPatienceError, always, impatient
-from analysis.diagnosis.search.rivalry import Arena, Contender, first_fits, sensitivity_at
+from analysis.diagnosis.search.rivalry import SCREENING, STARTING, Arena, Contender, first_fits, sensitivity_at
 from analysis.diagnosis.search.same_within_errors import excess
 from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.settings import ADDED_GAIN, ADDED_SHARE, MOST_EFFECTS, NOISE_ALONE, SEALED_SURPRISE, SEARCH_ON
@@ -142,7 +142,8 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
         suggested = _suggested(arena, base.hypothesis, told, evidence)
         known = sensitivity_at(arena, base.deviations, base.hypothesis)
         step.at(0.2)
-        screened = screen(arena.measure, arena.tuning, base, known, suggested, arena.map_)
+        each = arena.guard.over(arena.map_, SCREENING)
+        screened = screen(arena.measure, arena.tuning, base, known, suggested, each)
         fits = first_fits(arena, base, known, screened)
     else:
         timeless = _suggested(
@@ -161,11 +162,11 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
 def _suggested(arena: Arena, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
     suggested = [
         hypothesis
-        for hypothesis in candidates(catalogue, evidence, arena.map_)
+        for hypothesis in candidates(catalogue, evidence, arena.guard.over(arena.map_, STARTING))
         if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
     ]
     if arena.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
-        suggested += clock_drift_by_trial(catalogue, evidence)
+        suggested += arena.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
     return suggested
 
 

@@ -85,6 +85,16 @@ def learned_from(
     return _with_colour(floor, lessons, map_)
 
 
+def floor_of(
+    clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
+) -> CleanFloor:
+    """As `learned_from`: what a given model misses of the clean recordings, too; none where they tell nothing."""
+    try:
+        return learned_from(clean, model, diagnosed, map_, progress).floor
+    except (NothingLearned, np.linalg.LinAlgError):
+        return CleanFloor()
+
+
 def require_alike(learned_by: str, error: str) -> None:
     """Raises NothingLearned."""
     if learned_by != error:

@@ -1,7 +1,7 @@
 """What all fits share, and the first fits of the hypotheses that passed the screening."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
 from analysis.diagnosis.errors.standing import Standing, standing
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.screening import Screened
 from analysis.diagnosis.search.sound_recordings import SoundRecordings
 from analysis.diagnosis.settings import LEAST_FITTED, MOST_FITTED, WORTH_FITTING
@@ -18,6 +19,8 @@ from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
 FIRST_ROUNDS = 3
+STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
+"""What is done once for each effect."""
 FELT = 0.06
 """Change of an axis's channel, as a share of the largest that any number makes there."""
 
@@ -52,6 +55,8 @@ class Arena:
     """Clean recordings: what a contender gains on them is counted against it."""
     certain: tuple[Hypothesis, ...] = ()
     """Faults that a recording shows by itself (`seen_directly`): added without a search."""
+    guard: Guard = field(default_factory=Guard)
+    """Of what is done once for each effect."""
 
     def half_opened(self) -> "Arena":
         """With the first half of every sealed stretch to fit and to choose by."""
@@ -84,7 +89,8 @@ def first_fits(arena: Arena, base: Fitted, known: Sensitivity, screened: Sequenc
             measure, tuning, evaluated(measure, tuning, base.deviations, candidate.hypothesis), known, FIRST_ROUNDS
         )
 
-    fits: list[Fitted] = list(arena.map_(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
+    each = arena.guard.over(arena.map_, FITTING)
+    fits: list[Fitted] = list(each(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
     return sorted(fits, key=lambda found: found.cost)
 
 

@@ -42,16 +42,23 @@ class Searched:
 
 
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
-    found = pruned(arena, explain(arena, catalogue, progress, patient), patient)
+    found = _pruned(arena, explain(arena, catalogue, progress, patient), patient)
     judged = _judged(arena, found)
     if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
         return Searched(arena, found, judged, _remarks(found))
     half = arena.half_opened()
-    again = pruned(half, explain(half, catalogue, progress, patient), patient)
+    again = _pruned(half, explain(half, catalogue, progress, patient), patient)
     second = _judged(half, again)
     if second.named:
         return Searched(half, again, second, (OPENED, *_remarks(again)))
     return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN, *_remarks(found)))
+
+
+def _pruned(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
+    """Nothing is named whose last look crashes."""
+    nothing = replace(found, after=found.retuned, steps=())
+    newest = found.steps[-1].newest if found.steps else ""
+    return arena.guard.part(newest, "its last look", lambda: pruned(arena, found, patient), nothing)
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:

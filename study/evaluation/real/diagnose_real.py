@@ -16,6 +16,7 @@ from analysis.diagnosis.errors.played_errors import PlayedError, played_error
 from analysis.diagnosis.result.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from analysis.diagnosis.settings import EXPLAINED_ERROR
 from analysis.diagnosis.types import Patience, Progress
@@ -55,7 +56,13 @@ class _Read:
     before: Recording | None
 
 
-def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progress) -> RealDiagnosis:
+def crashed(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
+    said = f"{type(crash).__name__}: {crash}".rstrip(": .")
+    broken = f"The program crashed at this recording ({said}). That is a fault of the program; the others are answered."
+    return RealDiagnosis(_refused(wanted, broken), None, wanted.parents)
+
+
+def diagnose_real(wanted: RealRecording, patient: Patience, guard: Guard, on_progress: Progress) -> RealDiagnosis:
     """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
     parents = wanted.parents
     try:
@@ -66,6 +73,7 @@ def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progres
             fitted=wanted.model() is None,
             balances=read.balances,
             patient=patient,
+            guard=guard,
         )
         with worker_threads() as threads:
             found = diagnose((read.recording,), read.model, settings, threads.map, on_progress)
@@ -73,8 +81,10 @@ def diagnose_real(wanted: RealRecording, patient: Patience, on_progress: Progres
             diagnosis = wanted.found.source.map.diagnosis
             names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
             answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
-    except (StudyError, NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        return RealDiagnosis(_refused(wanted, refusal), None, parents)
+    except StudyError as refusal:
+        return RealDiagnosis(_refused(wanted, f"{refusal.title}: {refusal.happened}"), None, parents)
+    except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+        return RealDiagnosis(_refused(wanted, f"The fits broke down: {refusal}."), None, parents)
     further = tuple(_further(each, wanted, found) for each in wanted.tests)
     pair = None if read.before is None else _pair(wanted, read, found)
     objections = (
@@ -145,7 +155,7 @@ def _model(wanted: RealRecording, recording: Recording, patient: Patience, on_pr
     return FirstModel(given, ())
 
 
-def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
+def _refused(wanted: RealRecording, answer: str) -> RealAnswer:
     diagnosis = wanted.found.source.map.diagnosis
     return RealAnswer(
         folder=wanted.folder.name,
@@ -153,9 +163,7 @@ def _refused(wanted: RealRecording, refusal: Exception) -> RealAnswer:
         title=wanted.found.source.map.title,
         device=wanted.found.source.map.device,
         verdict="refused",
-        answer=f"{refusal.title}: {refusal.happened}"
-        if isinstance(refusal, StudyError)
-        else f"The fits broke down: {refusal}.",
+        answer=answer,
         model="",
         error="",
         fitted=None,

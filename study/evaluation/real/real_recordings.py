@@ -12,7 +12,7 @@ from analysis.diagnosis.result.real_answer import RealAnswer
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
-from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, retuned_model
+from study.evaluation.real.diagnose_real import RealDiagnosis, crashed, diagnose_real, retuned_model
 from study.evaluation.real.inject_real import carriers, injected_outcomes
 from study.evaluation.real.kept_answers import (
     ANSWER_NAME,
@@ -30,6 +30,7 @@ from study.store.disk.new_folder import new_folder
 from study.store.disk.provenance import Provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import write_real_answer
+from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 
 RETUNED_NAME = "retuned.toml"
@@ -143,11 +144,21 @@ def _answers(
 
 def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Progress, clock: Clock) -> RealAnswer:
     """budget_s: of processor time, that the search may take."""
-    begun_s, worked = clock.now_s(), process_time()
-    done = diagnose_real(one, lambda: process_time() - worked < budget_s, on_progress)
-    answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
-    _write(answer_place(plan.out, one), replace(done, answer=answer), origin_of_answer(one, plan.seconds))
-    return answer
+    begun_s, worked, guard = clock.now_s(), process_time(), crash_guard()
+
+    def kept(done: RealDiagnosis) -> RealAnswer:
+        answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
+        _write(answer_place(plan.out, one), replace(done, answer=answer), origin_of_answer(one, plan.seconds))
+        return answer
+
+    try:
+        return kept(diagnose_real(one, lambda: process_time() - worked < budget_s, guard, on_progress))
+    except StudyError:
+        raise
+    except Exception as crash:
+        if not guard.on:
+            raise
+        return kept(crashed(one, crash))
 
 
 def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:

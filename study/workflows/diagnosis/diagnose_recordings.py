@@ -22,6 +22,7 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.sessions.written_elsewhere import note_written
+from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
@@ -178,6 +179,7 @@ def _settings(
         kept=tuple(read_entry(path) for path in plan.effect_files),
         discovery=plan.discovery,
         patient=patient,
+        guard=crash_guard(),
     )
 
 

@@ -122,6 +122,22 @@ def test_one_recording_is_answered_and_the_others_are_said(folder: Path, tmp_pat
     assert kept.stat().st_mtime_ns == before
 
 
+def test_a_recording_at_which_the_program_crashes_is_said_and_the_others_are_answered(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def crash(wanted: object, *more: object) -> object:
+        raise ZeroDivisionError("a fault of the program")
+
+    monkeypatch.setattr("study.evaluation.real.real_recordings.diagnose_real", crash)
+    with pytest.raises(ZeroDivisionError):  # the tests themselves see it
+        diagnose_folder(RealPlan(folder, tmp_path / "strict"), silent)
+    monkeypatch.delenv("HAPTEQ_STRICT")
+    done = diagnose_folder(RealPlan(folder, tmp_path / "out"), silent)
+    assert [one.verdict for one in done.results.answers] == ["refused", "refused"]
+    assert "crashed at this recording (ZeroDivisionError: a fault of the program)" in done.results.answers[0].answer
+    assert "ZeroDivisionError" in done.page.read_text()
+
+
 def test_interrupted_the_same_command_goes_on(folder: Path, tmp_path: Path) -> None:
     def leave(what: str, share: float) -> None:
         if what.startswith("torn"):

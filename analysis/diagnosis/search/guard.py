@@ -1,0 +1,82 @@
+"""A crash of one effect does not end a search: the effect is left out, and the answer says so.
+
+Off, as it is unless asked for, every crash is an error: so tests, benchmarks and banks see it.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.search.patience import OutOfPatienceError
+from analysis.diagnosis.types import Mapper
+from analysis.wording import capital, listed
+from equalizer.effects.effect import Effect
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class Crash:
+    what: str
+    """An effect's name, or what else was tried, in words."""
+    doing: str
+    said: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Guard:
+    on: bool = False
+    crashes: list[Crash] = field(default_factory=list)
+    """So far."""
+
+    def over(self, map_: Mapper, doing: str) -> Mapper:
+        """The same map, over effects, hypotheses or fits of them; what crashes is noted, and has no result."""
+        if not self.on:
+            return map_
+
+        def mapped(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
+            def kept(item: object) -> tuple[object, ...]:
+                return self._tried(_effect_of(item), doing, lambda: function(item))
+
+            results: list[tuple[object, ...]] = list(map_(kept, items))  # type: ignore[arg-type]
+            return [result for found in results for result in found]
+
+        return mapped
+
+    def part(self, what: str, doing: str, work: Callable[[], Result], instead: Result) -> Result:
+        """Of a piece of the work that can be left out. what: an effect's name, or words."""
+        found = self._tried(what, doing, work) if self.on else (work(),)
+        return found[0] if found else instead
+
+    def _tried(self, what: str, doing: str, work: Callable[[], Result]) -> tuple[Result, ...]:
+        try:
+            return (work(),)
+        except OutOfPatienceError:
+            raise
+        except Exception as crash:  # noqa: BLE001 - whatever it is, the rest of the search can go on
+            self.crashes.append(Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": .")))
+            return ()
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """One per effect, with what it crashed at and how."""
+        return tuple(_sentence(what, self.crashes) for what in dict.fromkeys(crash.what for crash in self.crashes))
+
+
+def _sentence(what: str, crashes: Iterable[Crash]) -> str:
+    own = list(dict.fromkeys((crash.doing, crash.said) for crash in crashes if crash.what == what))
+    noun = noun_of(what)
+    name = noun if what in noun or noun == what.replace("_", " ") else f"{noun} ({what})"
+    at = listed([f"{doing} ({said})" for doing, said in own])
+    return f"{capital(name)} was left out where the program crashed at {at}: this answer was found without it."
+
+
+def _effect_of(item: object) -> str:
+    """The newest effect of what is tried."""
+    if isinstance(item, Effect):
+        return item.name
+    hypothesis = item if isinstance(item, Hypothesis) else getattr(item, "hypothesis", None)
+    claims = () if hypothesis is None else hypothesis.claims
+    return claims[-1].effect.name if claims else "the model's own numbers"

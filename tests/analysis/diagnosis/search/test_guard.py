@@ -1,0 +1,59 @@
+"""An effect that crashes is left out, the rest is found all the same; without the guard the crash is an error."""
+
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.search.explain import explain
+from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.search.patience import OutOfPatienceError
+from equalizer.effects.catalogue import EFFECTS
+
+
+def broken(*arguments):
+    raise ValueError("operands could not be broadcast together")
+
+
+BROKEN = replace(EFFECTS["backlash"], starts=broken)
+RUBS = EFFECTS["coulomb_friction"]
+
+
+def quiet(what, share):
+    return None
+
+
+def test_the_others_are_searched_and_the_crash_is_said(diagnosed, arena_of):
+    arena = replace(arena_of(diagnosed.RUBBING), guard=Guard(on=True))
+    found = explain(arena, [BROKEN, RUBS], quiet)
+    assert found.after.newest == "coulomb_friction"
+    (said,) = arena.guard.sentences
+    assert said.startswith("Play (backlash) was left out")
+    assert "its starting values" in said and "operands could not be broadcast" in said
+
+
+def test_without_the_guard_a_crash_is_an_error(diagnosed, arena_of):
+    with pytest.raises(ValueError, match="broadcast"):
+        explain(arena_of(diagnosed.RUBBING), [BROKEN, RUBS], quiet)
+
+
+def test_each_item_that_crashes_is_dropped_and_named_once():
+    guard = Guard(on=True)
+    effects = [EFFECTS["backlash"], RUBS, EFFECTS["backlash"]]
+
+    def work(effect):
+        return broken() if effect.name == "backlash" else effect.name
+
+    assert list(guard.over(map, "its fit")(work, effects)) == ["coulomb_friction"]
+    assert len(guard.crashes) == 2 and len(guard.sentences) == 1
+    assert guard.part("coulomb_friction", "its last look", broken, "instead") == "instead"
+    assert len(guard.sentences) == 2
+
+
+def test_a_search_that_ends_for_lack_of_time_is_no_crash():
+    def late():
+        raise OutOfPatienceError
+
+    guard = Guard(on=True)
+    with pytest.raises(OutOfPatienceError):
+        guard.part("backlash", "its fit", late, None)
+    assert guard.sentences == ()
