@@ -148,6 +148,9 @@ class ForceDimensionRig:
         got = self._sending.acquire(timeout=LOCK_S)
         try:
             self._handle.set_force(0.0, 0.0, 0.0)
+            if not self._sent_zero and self._silent_for_too_long() and not (status := self._handle.status()).force_on:
+                # A force was cut off: its call may hang still, and must find a device that takes none.
+                self._failed(f"It let its force go: {status.why_off}")
             self._sent_zero, self._scaled = True, 0
             if not self._silent_for_too_long():
                 self._sent_s = time.monotonic()

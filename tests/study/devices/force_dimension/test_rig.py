@@ -123,6 +123,20 @@ def test_after_a_silence_with_a_force_it_is_not(stub):
         assert stub.safe
 
 
+def test_a_zero_after_a_force_that_was_cut_off_does_not_wake_it_either(stub):
+    """The call that was to hold the force may hang still: it must not find a device that takes forces again."""
+    with contextlib.closing(stub.rig(rests=True)) as rig:
+        rig.write(force(0.5, 0.0, 0.0))
+        time.sleep(0.1)
+        enabled = stub.get("enables")
+        rig.write(np.zeros(3))
+        time.sleep(0.1)
+        assert stub.safe
+        assert stub.get("enables") == enabled
+        with pytest.raises(DeviceError, match="too late for the device's watchdog"):
+            rig.write(force(0.5, 0.0, 0.0))
+
+
 def test_while_nothing_is_played_gravity_stays_compensated(stub):
     """The library compensates gravity only in forces that it is given."""
     stub.set("watchdog_stretch", 10)  # a busy computer may be late for the watchdog itself

@@ -1,0 +1,41 @@
+"""docs/hardware.md keeps to what is there: its tests exist, its files are read, its devices open."""
+
+import re
+import tomllib
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from study.devices.accelerometer.packet import LAYOUT, SIZE
+from study.devices.force_dimension.lab import LabSettings
+from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.usb import RULE, RULE_FILE
+
+ROOT = Path(__file__).parents[4]
+PAGE = (ROOT / "docs" / "hardware.md").read_text("utf-8")
+
+
+def test_the_tests_that_it_names_exist():
+    named = set(re.findall(r"`(?:[\w/]*/)?(test_\w+)(?:\.py)?`", PAGE))
+    assert len(named) >= 10
+    sources = {path: path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
+    missing = [
+        name
+        for name in named
+        if not any(path.stem == name or f"def {name}(" in text for path, text in sources.items())
+    ]
+    assert missing == []
+
+
+def test_the_example_of_a_lab_s_file_is_one():
+    (example,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    lab = TypeAdapter(LabSettings).validate_python(tomllib.loads(example))
+    assert lab.effective_mass_kg == MODELS["omega3"].effective_mass_kg
+    assert lab.accelerometer is not None
+
+
+def test_rule_devices_and_packet_are_those_of_the_code():
+    assert RULE in PAGE and RULE_FILE in PAGE
+    assert all(f"`{name}`" in PAGE or f"--device {name}`" in PAGE for name in MODELS)
+    assert LAYOUT.itemsize == SIZE == 16
+    assert (LAYOUT.fields["time_us"][1], LAYOUT.fields["raw"][1], LAYOUT.fields["crc"][1]) == (4, 8, 14)
