@@ -11,6 +11,9 @@ from equalizer.signals.signal import FloatArray
 ORDER = 4
 """Of the low pass: Butterworth's magnitude, as forwards and backwards in time (Gautier, Vandanjon and Pressé 1994)."""
 
+LINES = 8192
+"""That are looked at at once."""
+
 
 def low_pass(frequency_hz: FloatArray, band_hz: float) -> FloatArray:
     """Gain of a filter of the order that is run forwards and backwards; half the power passes each way."""
@@ -26,9 +29,11 @@ def through(
     nor kinks arise there. The line itself is not put back.
     """
     whole = odd_continued(samples - straight(samples))
-    spectrum = rfft(whole, axis=0)
-    by = gain(rfftfreq(len(whole), 1 / sample_rate_hz))
-    return np.asarray(irfft(np.einsum("lrk,lk->lr", by, spectrum), len(whole), axis=0)[: len(samples)])
+    spectrum, lines = rfft(whole, axis=0), rfftfreq(len(whole), 1 / sample_rate_hz)
+    # Matrices of all lines at once would take a gigabyte for some minutes at 1 kHz.
+    pieces = [slice(first, first + LINES) for first in range(0, len(lines), LINES)]
+    passed = np.concatenate([np.einsum("lrk,lk->lr", gain(lines[piece]), spectrum[piece]) for piece in pieces])
+    return np.asarray(irfft(passed, len(whole), axis=0)[: len(samples)])
 
 
 def odd_continued(samples: FloatArray) -> FloatArray:

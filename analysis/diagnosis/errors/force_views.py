@@ -9,7 +9,8 @@ from analysis.diagnosis.data.channel_noise import ChannelNoise
 from analysis.diagnosis.data.measured_motion import MeasuredMotion, measured_motion
 from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.needed_force import band_motion, inverse_lines
+from analysis.diagnosis.errors.inverse_lines import inverse_lines
+from analysis.diagnosis.errors.needed_force import band_motion
 from analysis.diagnosis.errors.predicted_force import PredictedForce, edge_samples
 from equalizer.effects.simulation.along_motion import entered_force
 from equalizer.plant.mechanical_model import MechanicalModel

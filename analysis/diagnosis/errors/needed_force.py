@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.errors.inverse_lines import inverse_lines, inverse_of
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import low_pass, straight, through
@@ -61,11 +62,11 @@ def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
     if model.coordinates == model.inputs:
         return _of_seen_bodies(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
-    m = model.inputs
+    m, learned = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
         within = low_pass(frequency_hz, motion.band_hz)[:, None, None]
-        inverse = inverse_lines(model, frequency_hz)
+        inverse = learned(frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
         wave = 2j * np.pi * frequency_hz[:, None, None]
         axes = inverse[:, m:]
@@ -86,20 +87,6 @@ def _of_seen_bodies(model: MechanicalModel, motion: BandMotion) -> NeededForce:
     )
     along = (driven_axes(model).T @ moved).T
     return NeededForce(force, *(course @ along for course in motion.at))
-
-
-def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
-    """(lines, 2 m, m): from the positions of the model's first m outputs' rows to the forces along the driven axes, and
-    to the axes' positions."""
-    n, m = model.coordinates, model.inputs
-    s = 2j * np.pi * frequency_hz[:, None, None]
-    whole = np.zeros((len(frequency_hz), n + m, n + m), dtype=np.complex128)
-    whole[:, :n, :n] = model.mass * s**2 + model.damping * s + model.stiffness
-    whole[:, :n, n:] = -model.input
-    whole[:, n:, :n] = model.output[:m]
-    asked = np.concatenate([np.zeros((n, m)), np.eye(m)])
-    solved = np.linalg.solve(whole, np.broadcast_to(asked.astype(np.complex128), (len(frequency_hz), n + m, m)))
-    return np.concatenate([solved[:, n:], driven_axes(model).T @ solved[:, :n]], axis=1)
 
 
 def _along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:

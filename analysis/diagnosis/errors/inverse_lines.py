@@ -1,0 +1,110 @@
+"""Lines of a model's inverse: from where its outputs are to what pushed them there.
+
+A rational function of frequency. Its poles are the model's zeros, generalised eigenvalues of its equations
+(Emami-Naeini and Van Dooren 1982, Automatica 18:415); with them all follows from a few lines.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.linalg
+
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+FEW = 2000
+"""Lines up to which each is solved for by itself."""
+LEARNED_ON, NEAR = 60, np.array([-1.0, 0.0, 1.0])
+"""Lines over the whole range, and about each pole in its half widths, of which the other numbers are learned."""
+HIGHEST_POWER = 4
+"""Of frequency: an inertia behind a massless coupling."""
+FAR = 1e3
+"""Times the highest line: a pole beyond it is a power."""
+RIGHT_TO = 1e-8
+"""Of the largest entry at each line that was not learned of; else all lines are solved for."""
+
+
+def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
+    """(lines, 2 m, m): from the positions of the model's first m outputs' rows to the forces along the driven axes, and
+    to the axes' positions. Raises numpy.linalg.LinAlgError where these rows do not say how the model moves."""
+    n, m = model.coordinates, model.inputs
+    s = 2j * np.pi * frequency_hz[:, None, None]
+    whole = np.zeros((len(frequency_hz), n + m, n + m), dtype=np.complex128)
+    whole[:, :n, :n] = model.mass * s**2 + model.damping * s + model.stiffness
+    whole[:, :n, n:] = -model.input
+    whole[:, n:, :n] = model.output[:m]
+    asked = np.concatenate([np.zeros((n, m)), np.eye(m)])
+    solved = np.linalg.solve(whole, np.broadcast_to(asked.astype(np.complex128), (len(frequency_hz), n + m, m)))
+    return np.concatenate([solved[:, n:], driven_axes(model).T @ solved[:, :n]], axis=1)
+
+
+def inverse_of(model: MechanicalModel, lines: int, highest_hz: float) -> Callable[[FloatArray], ComplexArray]:
+    """As `inverse_lines`, to be asked for so many lines, piece by piece."""
+    if lines > FEW and (learned := _learned(model, highest_hz)) is not None:
+        return learned
+    return lambda frequency_hz: inverse_lines(model, frequency_hz)
+
+
+def _learned(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
+    """None where a few lines do not foretell the others."""
+    poles = _zeros(model, 2 * np.pi * FAR * highest_hz)
+    tried, unit, m = _told_by(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
+    right, shapes = inverse_lines(model, tried), _shapes(tried, poles, unit)
+    # Forces and positions apart, and each line alike: their entries differ by many orders of magnitude.
+    forces, positions = (_numbers(shapes, part.reshape(len(tried), -1)) for part in (right[:, :m], right[:, m:]))
+    if forces is None or positions is None:
+        return None
+    numbers = np.hstack([forces, positions])
+
+    def lines(frequency_hz: FloatArray) -> ComplexArray:
+        found: ComplexArray = (_shapes(frequency_hz, poles, unit) @ numbers).reshape(-1, 2 * m, m)
+        slow = frequency_hz < tried[0]
+        if slow.any():
+            found[slow] = inverse_lines(model, frequency_hz[slow])
+        return found
+
+    return lines
+
+
+def _numbers(shapes: ComplexArray, right: ComplexArray) -> ComplexArray | None:
+    """(shapes, entries), learned of every other line; None where the lines between are not what they say."""
+    size = np.abs(right).max(axis=1)[:, None]
+    shapes, right = shapes / size, right / size
+    # So that no direction counts for less because of its unit.
+    unit = np.linalg.norm(shapes[::2], axis=0)
+    found = np.linalg.lstsq(shapes[::2] / unit, right[::2], rcond=1e-14)[0] / unit[:, None]
+    return found if np.all(np.abs(shapes[1::2] @ found - right[1::2]) <= RIGHT_TO) else None
+
+
+def _zeros(model: MechanicalModel, largest: float) -> ComplexArray:
+    """(k,), rad/s: of those above the real axis or on it."""
+    n, m = model.coordinates, model.inputs
+    left, right = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
+    left[:n, n : 2 * n] = np.eye(n)
+    left[n : 2 * n, :n], left[n : 2 * n, n : 2 * n] = -model.stiffness, -model.damping
+    left[n : 2 * n, 2 * n :], left[2 * n :, :n] = model.input, model.output[:m]
+    right[:n, :n], right[n : 2 * n, n : 2 * n] = np.eye(n), model.mass
+    above, below = scipy.linalg.eigvals(left, right, homogeneous_eigvals=True)
+    near = np.abs(above) < largest * np.abs(below)
+    found = above[near] / below[near]
+    return np.asarray(found[found.imag >= 0])
+
+
+def _told_by(poles: ComplexArray, highest_hz: float) -> FloatArray:
+    """(lines,), Hz, rising: over the whole range and about each resonance."""
+    width = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
+    about = (np.abs(poles.imag)[:, None] + width[:, None] * NEAR).ravel() / (2 * np.pi)
+    # Halved steps: what is learned of and what is judged by take turns.
+    whole = np.geomspace(1e-4 * highest_hz, highest_hz, LEARNED_ON)
+    even = np.linspace(0.0, highest_hz, LEARNED_ON)
+    return np.unique(np.clip(np.concatenate([about, 1.01 * about, whole, even]), 1e-6 * highest_hz, highest_hz))
+
+
+def _shapes(frequency_hz: FloatArray, poles: ComplexArray, unit: float) -> ComplexArray:
+    """(lines, shapes): powers of frequency, and a resonance for each pole and its mirror image."""
+    s = 2j * np.pi * frequency_hz[:, None] / unit
+    powers = s ** np.arange(HIGHEST_POWER + 1)
+    both = [1 / (s - poles / unit), 1 / (s - np.conj(poles[poles.imag > 0]) / unit)]
+    return np.asarray(np.concatenate([powers, *both], axis=1))
