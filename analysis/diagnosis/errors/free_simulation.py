@@ -45,11 +45,7 @@ class FreeSimulation:
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
             return tuple(
-                (
-                    record.measured
-                    - channels(self._played(model, effects, record, simulate_response), record.measured.shape[1])
-                )
-                / self.unit
+                _less(record.measured, self._played(model, effects, record, simulate_response)) / self.unit
                 for record in self.records
             )
 
@@ -71,6 +67,14 @@ class FreeSimulation:
             there = carrying(model, record.recording)
             found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
         return tuple(found)
+
+
+def _less(measured: FloatArray, played: Played) -> FloatArray:
+    """What was played taken off."""
+    p, rest = played.response.shape[1], measured.copy()
+    rest[:, :p] -= played.response
+    rest[:, p:] -= played.position[:, : rest.shape[1] - p]
+    return rest
 
 
 def channels(played: Played, count: int) -> FloatArray:

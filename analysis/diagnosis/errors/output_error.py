@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from analysis.diagnosis.data.growth import runs_away
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -34,6 +35,24 @@ class Sensitivity:
     """(t, samples): change of prediction per standard deviation, and"""
     squares: FloatArray
     """(t, t): their products."""
+    repeated: npt.NDArray[np.int64] | None = None
+    """Where columns hold one period of each segment: per sample to fit, which of the columns' samples is its own."""
+
+    def on(self, errors: FloatArray) -> FloatArray:
+        """(t,) or (t, k): products of the columns with errors on the samples to fit, (samples,) or (k, samples)."""
+        rows = np.atleast_2d(errors)
+        if self.repeated is not None:
+            rows = np.array([self._folded(row) for row in rows]).reshape(len(rows), self.columns.shape[1])
+        products = self.columns @ rows.T
+        return products if errors.ndim > 1 else products[:, 0]
+
+    def _folded(self, errors: FloatArray) -> FloatArray:
+        """Periods summed up. errors: (samples,), channel after channel at each instant."""
+        assert self.repeated is not None
+        each = errors.reshape(len(self.repeated), -1)
+        short = self.columns.shape[1] // each.shape[1]
+        summed = np.stack([np.bincount(self.repeated, channel, short) for channel in each.T], axis=1)
+        return np.asarray(summed.ravel())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +84,10 @@ def sensitivity(
     numbers whose columns are not."""
     base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
 
-    def moved(number: int) -> FloatArray:
+    columns = np.zeros((len(at), len(base))) if beside is None else beside[0].copy()
+
+    def move_one(number: int) -> None:
+        columns[number] = 0.0
         for move in (MOVED, -MOVED):
             there = at.copy()
             there[number] += move
@@ -75,21 +97,22 @@ def sensitivity(
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
             if np.isfinite(change).all():
-                return np.asarray(change / move)
+                np.divide(change, move, out=columns[number])
+                return
         # Neither way is a model: the number stays where it is.
-        return np.zeros_like(base)
 
-    known, numbers = (np.zeros((len(at), len(base))), range(len(at))) if beside is None else beside
-    columns = known.copy()
-    columns[numbers] = np.array(list(map_(moved, numbers))).reshape(len(numbers), len(base))  # type: ignore[operator]
+    list(map_(move_one, range(len(at)) if beside is None else beside[1]))  # type: ignore[operator]
     return Sensitivity(at, columns, columns @ columns.T)
 
 
-def fit(measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int) -> Fitted:
-    """Better than the start, or the start. known: of the model's numbers, taken anywhere near."""
+def fit(
+    measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int, map_: object = map
+) -> Fitted:
+    """Better than the start, or the start. known: of the model's numbers, taken anywhere near. map_: as for
+    `sensitivity`."""
     best = start
     for _ in range(rounds):
-        better = _stepped(measure, tuning, best, known)
+        better = _stepped(measure, tuning, best, known, map_)
         if better is None:
             return best
         gained = best.cost - better.cost
@@ -110,14 +133,14 @@ def _cost(errors: FloatArray, deviations: FloatArray) -> float:
     return cost if np.isfinite(cost) else np.inf
 
 
-def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity) -> Fitted | None:
+def _stepped(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity, map_: object) -> Fitted | None:
     errors = fitting(measure, from_.residuals)
-    own = own_columns(measure, tuning, from_, errors)
+    own = own_columns(measure, tuning, from_, errors, map_)
     t = len(from_.deviations)
     with np.errstate(over="ignore", invalid="ignore"):
-        cross = known.columns @ own.T
+        cross = known.on(own)
         products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
-        pull = np.concatenate([known.columns @ errors - from_.deviations, own @ errors])
+        pull = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
     if not (np.isfinite(products).all() and np.isfinite(pull).all()):
         # Some number moved the model to where it runs away.
         return None
@@ -143,17 +166,22 @@ def _longest_s(measure: ErrorMeasure) -> float:
     return max(len(record.command) / record.recording.sample_rate_hz for record in measure.records)
 
 
-def own_columns(measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray) -> FloatArray:
+def own_columns(
+    measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
+) -> FloatArray:
     """(numbers, samples): sensitivity of the prediction to the hypothesis's numbers."""
     model: MechanicalModel = tuning.tuned(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
     columns = np.empty((len(moves), len(errors)))
-    for number, move in enumerate(moves):
-        point = from_.hypothesis.point.copy()
+
+    def move_one(number: int) -> None:
+        point, move = from_.hypothesis.point.copy(), moves[number]
         point[number] += move
         with np.errstate(over="ignore", invalid="ignore"):
             moved = fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))
-            columns[number] = (errors - moved) / move
+            np.divide(errors - moved, move, out=columns[number])
+
+    list(map_(move_one, range(len(moves))))  # type: ignore[operator]
     return columns
 
 

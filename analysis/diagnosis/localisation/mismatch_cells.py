@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from statsmodels.stats.multitest import multipletests
+from scipy.stats import false_discovery_control
 
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.data.line_statistics import noncentral_f_sf
@@ -200,4 +200,4 @@ def _descend(
 
 
 def _benjamini_hochberg(p_values: FloatArray) -> FloatArray:
-    return np.asarray(multipletests(p_values, method="fdr_bh")[1], dtype=np.float64)
+    return np.asarray(false_discovery_control(p_values, method="bh"), dtype=np.float64)

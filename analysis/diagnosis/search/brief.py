@@ -48,9 +48,15 @@ class Brief:
 
     def repeated(self, known: Sensitivity) -> Sensitivity:
         """As it is on the long measure: what one period does, all of them do."""
-        t, samples = len(known.columns), sum(int(record.fit.sum()) for record in self.arena.measure.records)
-        columns = known.columns.reshape(t, samples, -1)[:, self.stands_in].reshape(t, -1)
-        return Sensitivity(known.at, columns, columns @ columns.T)
+        times = np.sqrt(np.bincount(self.stands_in, minlength=self._samples)).repeat(
+            known.columns.shape[1] // self._samples
+        )
+        weighed = known.columns * times
+        return Sensitivity(known.at, known.columns, weighed @ weighed.T, self.stands_in)
+
+    @property
+    def _samples(self) -> int:
+        return sum(int(record.fit.sum()) for record in self.arena.measure.records)
 
     def of(self, evidence: Evidence) -> Evidence:
         """The first record's, at the kept samples."""

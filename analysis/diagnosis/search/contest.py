@@ -56,7 +56,7 @@ def refine(arena: Arena, fitted: Fitted) -> Fitted:
     short = brief.arena
     near, known = _settled(short, evaluated(short.measure, short.tuning, fitted.deviations, fitted.hypothesis))
     start = evaluated(arena.measure, arena.tuning, near.deviations, near.hypothesis)
-    found = fit(arena.measure, arena.tuning, start, brief.repeated(known), WHOLE_ROUNDS)
+    found = fit(arena.measure, arena.tuning, start, brief.repeated(known), WHOLE_ROUNDS, arena.map_)
     # What one period leaves open may run away on the whole.
     return _plainest(arena, found) if found.cost <= fitted.cost else _settled(arena, fitted)[0]
 
@@ -98,7 +98,7 @@ def _refined_from(arena: Arena, fitted: Fitted, known: Sensitivity | None) -> tu
     there = known or sensitivity_at(arena, best.deviations, best.hypothesis)
     before = np.inf
     for _ in range(MOST_REFRESHED):
-        better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS)
+        better = fit(arena.measure, arena.tuning, best, there, SECOND_ROUNDS, arena.map_)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
         # Gains shrink about evenly, so that the next one can be foreseen.
         foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained

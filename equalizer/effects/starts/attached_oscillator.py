@@ -15,6 +15,9 @@ WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02
 """Of a spectrum; least power of a line that counts, over the largest; share of the missing force that noise alone would
 let the best of all trials explain."""
 
+SPANNED = 1e-9
+"""Of the largest: what directions leave of one another, below which they are the same but for rounding."""
+
 
 def with_oscillator(
     model: MechanicalModel, along: FloatArray, mass: float, damping: float, stiffness: float
@@ -58,8 +61,9 @@ def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
     return MissingMass(frequency[inside], power[inside].real, cross[inside])
 
 
-def hanging(frequency_hz: FloatArray, natural_hz: float, damping_ratio: float) -> ComplexArray:
-    """(lines,): the force on its host per acceleration and mass of an oscillator, negative."""
+def hanging(frequency_hz: FloatArray, natural_hz: float | FloatArray, damping_ratio: float) -> ComplexArray:
+    """The force on its host per acceleration and mass of an oscillator, negative; in the shape that both have
+    together."""
     ratio = frequency_hz / natural_hz
     tied = 1 + 2j * damping_ratio * ratio
     return np.asarray(-tied / (tied - ratio**2))
@@ -77,9 +81,10 @@ class Hung:
     """(m,): its pull on each axis over that on the own one."""
 
 
-def _rest(shapes: FloatArray, aim: FloatArray) -> FloatArray:
-    size = np.linalg.norm(shapes, axis=0)
-    return np.asarray(aim - shapes / size @ np.linalg.lstsq(shapes / size, aim, rcond=1e-9)[0])
+def _span(columns: FloatArray) -> FloatArray:
+    """Orthonormal columns that span the same."""
+    directions, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+    return np.asarray(directions[:, sizes > SPANNED * sizes[0]])
 
 
 def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]) -> list[Hung]:
@@ -93,21 +98,23 @@ def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_rati
     force = seen.cross / root[:, None]
     aim = np.vstack([force.real, force.imag])
     linear = np.vstack([linear.real, linear.imag])
-    alone = _rest(linear, aim)[:, axis]
-    power = max(float(alone @ alone), np.finfo(float).tiny)
+    beside = _span(linear)
+    alone = aim - beside @ (beside.T @ aim)
+    power = max(float(alone[:, axis] @ alone[:, axis]), np.finfo(float).tiny)
+    natural = np.array([one for one in natural_hz if one < seen.frequency_hz[-1]])
     found = []
     for ratio in damping_ratios:
-        for natural in (one for one in natural_hz if one < seen.frequency_hz[-1]):
-            shape = hanging(seen.frequency_hz, natural, ratio) * root
-            stacked = np.column_stack([np.append(shape.real, shape.imag), linear])
-            size = np.linalg.norm(stacked, axis=0)
-            strengths, *_ = np.linalg.lstsq(stacked / size, aim, rcond=1e-9)
-            rest = aim[:, axis] - stacked / size @ strengths[:, axis]
-            mass = strengths[0, axis] / size[0]
-            if mass > 0:
-                explained = 1 - float(rest @ rest) / power
-                pulls = np.asarray(strengths[0] / strengths[0, axis])
-                found.append(Hung(natural, ratio, float(mass), explained, pulls))
+        shape = hanging(seen.frequency_hz[:, None], natural, ratio) * root[:, None]
+        shapes = np.vstack([shape.real, shape.imag])
+        # What the linear part cannot take: beside it, a shape's least squares are its alone.
+        own = shapes - beside @ (beside.T @ shapes)
+        size = np.einsum("lt,lt->t", own, own)
+        apart = size > SPANNED**2 * np.einsum("lt,lt->t", shapes, shapes)
+        pulls = own[:, apart].T @ alone
+        for one, pull, square in zip(natural[apart].tolist(), pulls, size[apart].tolist(), strict=True):
+            if pull[axis] > 0:
+                explained = float(pull[axis]) ** 2 / square / power
+                found.append(Hung(one, ratio, float(pull[axis]) / square, explained, pull / pull[axis]))
     return sorted((one for one in found if one.explained > CHANCE), key=lambda one: -one.explained)
 
 

@@ -67,12 +67,17 @@ def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
     (record,) = lagging.measure.records
     whole = sensitivity(lagging.measure, lagging.tuning, at, NOTHING)
     found = short.repeated(sensitivity(short.arena.measure, short.arena.tuning, at, NOTHING))
-    assert found.columns.shape == whole.columns.shape == (len(at), record.fit.sum() * record.measured.shape[1])
     later = np.ones(len(record.fit), dtype=bool)
     for segment in record.recording.segments:
         later[segment.start : segment.start + segment.period] = False  # in which the motion settles
     told = np.repeat(later[record.fit], record.measured.shape[1])
-    off = np.linalg.norm((found.columns - whole.columns)[:, told], axis=1)
-    assert (off < 0.02 * np.linalg.norm(whole.columns[:, told], axis=1)).all()
-    turned = np.roll(found.columns, 100 * record.measured.shape[1], axis=1)
-    assert np.linalg.norm((turned - whole.columns)[:, told]) > 0.2 * np.linalg.norm(whole.columns[:, told])
+    errors = whole.columns * told
+    wanted, scale = whole.columns @ errors.T, np.linalg.norm(whole.columns, axis=1)
+    off = np.abs(found.on(errors) - wanted) / np.outer(scale, scale)
+    assert off.max() < 0.02
+    assert found.on(errors[0]) == pytest.approx(found.on(errors)[:, 0])
+    each = found.columns.reshape(len(at), -1, record.measured.shape[1])[:, short.stands_in].reshape(len(at), -1)
+    assert found.squares == pytest.approx(each @ each.T)
+    assert found.on(errors) == pytest.approx(each @ errors.T)
+    turned = np.roll(errors, 100 * record.measured.shape[1], axis=1)
+    assert (np.abs(found.on(turned) - wanted) / np.outer(scale, scale)).max() > 0.2
