@@ -15,9 +15,9 @@ LONGEST_M = 50e-9
 DAMPED = 0.5
 """A bristle's damping, over the root of its stiffness times the mass that it holds."""
 PARTS = 12
-"""Of a step, in which the bristle is followed while it bends."""
+"""Of a step at most, in which the bristle is followed while it bends."""
 STUCK = 0.3
-"""So many longest bends per step make no difference to a bristle."""
+"""So many longest bends per part make no difference to a bristle."""
 BENT = 1 - 1e-6
 _VECTOR = types.float64[::1]
 
@@ -41,7 +41,7 @@ def rubbing(forward: float, backward: float, start: float, memory: FloatArray, a
     damping = DAMPED * np.sqrt(stiffness * mass)
     pull, bend, impulse, last = (at[V_FREE] - velocity) / at[STEP_S], start * LONGEST_M, 0.0, 0.0
     moved = at[STEP_S] * (abs(velocity) + 0.5 * at[STEP_S] * abs(pull - stiffness * bend / mass))
-    parts = PARTS if moved > STUCK * LONGEST_M else 1
+    parts = min(PARTS, 1 + int(min(moved / (STUCK * LONGEST_M), PARTS)))
     step_s = at[STEP_S] / parts
     for _ in range(parts):
         free = velocity * step_s + 0.5 * pull * step_s**2

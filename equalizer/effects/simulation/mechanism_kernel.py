@@ -171,19 +171,26 @@ with warnings.catch_warnings():
         laws: Any, places: Integers, of: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
         own: FloatArray, at: FloatArray,
     ) -> None:  # fmt: skip
-        """Several forces. own: (2, items), scratch."""
+        """Several forces. own: (3, items), scratch. A force is not found again where no other has changed since."""
         before = memory.copy()
+        own[:] = 0.0
         for sweep in range(SWEEPS):
             for item in range(places.shape[0]):
+                if sweep > 0 and own[2, item] == 0.0:
+                    continue
                 port, kept, end = places[item, 1], places[item, 4], places[item, 5]
+                mean_before, end_before = own[0, item], own[1, item]
                 if sweep > 0:
-                    _act(per_newton, port, -own[0, item], -own[1, item], ports)
+                    _act(per_newton, port, -mean_before, -end_before, ports)
                     for i in range(kept, end):
                         memory[i] = before[i]
                 begin, law = places[item, 2], laws[places[item, 0]]
                 own[0, item], own[1, item] = _push_at(
                     law, of[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
                 )
+                if own[0, item] != mean_before or own[1, item] != end_before:
+                    own[2] = 1.0
+                own[2, item] = 0.0
 
     @njit(
         types.void(
@@ -210,7 +217,7 @@ with warnings.catch_warnings():
         size, r = state.shape[0], ports.shape[1]
         sees = commands.shape[0] > 0
         added, at = np.empty(size + r), np.zeros(LENGTH + SEEN * r if sees else LENGTH)
-        own, law = np.zeros((2, places.shape[0])), laws[places[0, 0]]
+        own, law = np.zeros((3, places.shape[0])), laws[places[0, 0]]
         its, its_memory = of[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
         at[STEP_S], ports[_A] = step_s, np.nan
         for k in range(rows.shape[0] // stride):
