@@ -40,6 +40,7 @@ _PREFIXABLE: dict[str, Dimension] = {
     "T": (1, 0, -2, -1, 0, 0),
 }
 _FORCE, _LENGTH = _PREFIXABLE["N"], _PREFIXABLE["m"]
+_TORQUE: Dimension = (1, 2, -2, 0, 0, 0)
 _POUND, _INCH = 0.45359237, 0.0254
 _POUND_FORCE = _POUND * 9.80665
 _FIXED: dict[str, Unit] = {
@@ -63,12 +64,20 @@ _FIXED: dict[str, Unit] = {
     "bar": Unit("Pa", 1e5, _PREFIXABLE["Pa"]),
     "degC": Unit("K", 1.0, _PREFIXABLE["K"], 273.15),
     "degF": Unit("K", 5 / 9, _PREFIXABLE["K"], 459.67 * 5 / 9),
+    "Nm": Unit("N m", 1.0, _TORQUE),
+    "kNm": Unit("N m", 1e3, _TORQUE),
+    "mNm": Unit("N m", 1e-3, _TORQUE),
+    "Ncm": Unit("N m", 1e-2, _TORQUE),
+    "Nmm": Unit("N m", 1e-3, _TORQUE),
+    "counts": Unit("1", 1.0, (0,) * 6),
+    "count": Unit("1", 1.0, (0,) * 6),
 }
 KNOWN_UNITS = (
     "deg", "g", "rpm", "rev", "turn", "min", "%", "in", "ft", "lbf", "ozf", "kgf", "lb", "oz", "psi", "bar",
-    "degC", "degF",
+    "degC", "degF", "Nm", "mNm", "Ncm", "Nmm", "kNm", "counts",
 )  # fmt: skip
-"""Accepted beside SI; `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf` forces."""
+"""Accepted beside SI; `g` is standard gravity, never a gram; `lb` and `oz` are masses, `lbf` and `ozf` forces; `counts`
+are plain numbers of unknown scale."""
 
 ALLOWED = (
     "allowed are SI symbols in ASCII (N, N m, m, rad, m/s, m/s^2, rad/s^2, V, A, kg, s, Hz, 1 ...; "
@@ -183,15 +192,20 @@ def _unknown(text: str, why: str = "") -> UnknownUnitError:
 
 
 def _suggestion(text: str) -> str:
+    plain = plain_unit(text)
+    return f" (did you mean '{plain}'?)" if plain != text else ""
+
+
+def plain_unit(text: str) -> str:
+    """In ASCII as it is written here (`m/s^2` for `m/s²`), where that is a unit; else the text itself."""
     plain = "".join(_NOT_ASCII.get(letter, letter) for letter in text).replace("**", "^").strip()
     plain = re.sub(r"(?<=[a-zA-Z])(-?[2-9])", r"^\1", plain)
-    if plain == text:
-        return ""
     try:
-        parse_unit(plain)
+        if plain != text:
+            parse_unit(plain)
     except UnknownUnitError:
-        return ""
-    return f" (did you mean '{plain}'?)"
+        return text
+    return plain
 
 
 _PREFERRED: dict[Dimension, str] = {}

@@ -2,26 +2,21 @@
 units: `time [s], force [N], displacement_mm`."""
 
 import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
 
 from study.importing.arrays.arrays import Arrays
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
-from study.importing.map_format.signal_words import named, roles_of
+from study.importing.map_format.signal_words import Named, named, open_roles, roles_of
 
 _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
     """None where the header does not say what every column is, or does not tell commands from responses."""
-    if len({array.shape for array in arrays.by_name.values()}) != 1 or next(iter(arrays.by_name.values())).ndim != 1:
+    if header_problems(arrays):
         return None
-    columns = [named(header) for header in arrays.by_name]
-    times = [column for column in columns if column.unit and _TIME.fullmatch(column.name) and column.quantity == "time"]
-    rest = [column for column in columns if column not in times]
-    if not all(column.sure and column.quantity for column in rest):
-        return None
-    roles = roles_of(rest)
-    if len(times) != 1 or roles is None or len({column.name for column in rest}) < len(rest):
-        return None
+    times, rest = _columns(arrays)
     clock = ClockMap(time=times[0].header, time_unit=times[0].unit)
     channels = tuple(
         ChannelMap(
@@ -31,6 +26,43 @@ def header_map(arrays: Arrays) -> ImportMap | None:
             unit=column.unit,
             quantity="" if column.unit else column.quantity,
         )
-        for column, role in zip(rest, roles, strict=True)
+        for column, role in zip(rest, roles_of(rest) or (), strict=True)
     )
     return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,))
+
+
+def header_problems(arrays: Arrays) -> tuple[str, ...]:
+    """What the names leave open, a clause each that names the column; empty where `header_map` gives a map."""
+    if len({array.shape for array in arrays.by_name.values()}) != 1:
+        return ("its arrays have several lengths",)
+    if next(iter(arrays.by_name.values())).ndim != 1:
+        return ("its arrays are no single columns",)
+    times, rest = _columns(arrays)
+    twice = [name for name, count in Counter(column.name for column in rest).items() if count > 1]
+    return (
+        *_open_time(times, rest),
+        *(f"'{column.header}': {column.doubt}" for column in rest if column.doubt),
+        *(f"nothing says {what}" for what in open_roles([column for column in rest if not _is_time(column)])),
+        *(f"several columns are called '{name}'" for name in twice),
+    )
+
+
+def _columns(arrays: Arrays) -> tuple[list[Named], list[Named]]:
+    """Stamps with their unit, and all others."""
+    columns = [named(header) for header in arrays.by_name]
+    times = [column for column in columns if column.unit and _is_time(column) and column.quantity == "time"]
+    return times, [column for column in columns if column not in times]
+
+
+def _is_time(column: Named) -> bool:
+    return bool(_TIME.fullmatch(column.name))
+
+
+def _open_time(times: Sequence[Named], rest: Sequence[Named]) -> Iterator[str]:
+    bare = [column.header for column in rest if _is_time(column)]
+    if len(times) > 1:
+        yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is open"
+    elif bare:
+        yield f"'{bare[0]}' does not say in which unit the time is (as in '{bare[0]} [s]')"
+    elif not times:
+        yield "no column is the time (as in 'time [s]')"

@@ -108,7 +108,8 @@ def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> 
     yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
     yield f"name = {json.dumps(told.name if name == header else name)}"
     yield f"value = {json.dumps(value)}"
-    yield f'unit = {json.dumps(told.unit):20s} # as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
+    why = f"{told.doubt}; " if told.doubt else ""
+    yield f'unit = {json.dumps(told.unit):20s} # {why}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
         yield f"clock = {json.dumps(clock)}"
 

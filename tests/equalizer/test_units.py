@@ -43,6 +43,9 @@ from equalizer.signals.units import ALLOWED, KNOWN_UNITS, UnknownUnitError, chec
         ("turn", "rad", 2 * math.pi),
         ("rev/s", "rad/s", 2 * math.pi),
         ("kgf", "N", 9.80665),
+        ("mNm", "N m", 1e-3),
+        ("Nm/rad", "N m/rad", 1.0),
+        ("counts", "1", 1.0),
         ("N m/turn", "N m/rad", 1 / (2 * math.pi)),
     ],
 )

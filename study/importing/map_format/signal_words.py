@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, quantity_of
+from equalizer.signals.units import UnknownUnitError, check_quantity, parse_unit, plain_unit, quantity_of
 from study.importing.map_format.import_map import SignalRole
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*")
@@ -14,19 +14,23 @@ _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _WORDS = {
     "force": ("force", "load", "thrust"),
     "torque": ("torque", "moment", "tau"),
-    "position": ("position", "pos", "displacement", "disp", "stroke", "travel"),
+    "position": ("position", "pos", "displacement", "disp", "stroke", "travel", "encoder"),
     "angle": ("angle", "theta", "phi"),
     "velocity": ("velocity", "vel", "speed", "omega"),
     "acceleration": ("acceleration", "accel", "acc"),
     "voltage": ("voltage", "volt", "volts"),
     "current": ("current",),
     "temperature": ("temperature", "temp"),
+    "pressure": ("pressure",),
+    "humidity": ("humidity",),
+    "setting": ("setting",),
 }
 _QUANTITY = {word: quantity for quantity, words in _WORDS.items() for word in words}
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
 _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
+    **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
 """Input and output of a textbook, where both are there and no `x` beside them: then `y` would be an axis."""
@@ -44,55 +48,82 @@ class Named:
     """As in the file; empty where none is stated, or none that is known here."""
     quantity: str
     """Empty where neither the unit nor a word says it."""
-    sure: bool
-    """False where a unit was read out of a name that no word supports (`phase_A`), or word and unit disagree."""
+    doubt: str
+    """What is not sure: a unit is unknown, or was read out of a name that no word supports (`phase_A`), or word and
+    unit disagree. Empty where nothing is."""
+
+    @property
+    def sure(self) -> bool:
+        return not self.doubt
 
 
 def unit_in(header: str) -> tuple[str, str]:
     """Name and unit in brackets; the unit is empty where the header says none."""
     match = _BRACKETED.fullmatch(header)
-    return (match["name"].strip(), match["unit"].strip()) if match and match["name"].strip() else (header, "")
+    if not match or not match["name"].strip():
+        return header, ""
+    return match["name"].strip(), plain_unit(match["unit"].strip())
 
 
 def named(header: str) -> Named:
     name, unit = unit_in(header)
-    word = next((_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY), "")
+    words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
+    word = words[-1] if words else ""  # the last says it: a load angle is an angle
     told = unit or _unit_at_end(name)
     try:
         known = parse_unit(told)
     except UnknownUnitError:
-        return Named(header, name, "", word, not unit)
+        return Named(header, name, "", word, f"'{unit}' is not a unit known here" if unit else "")
     by_unit = "time" if known.si == "s" else quantity_of(known.si)
     if not word:
-        return Named(header, name, told, by_unit, bool(unit))
+        doubt = "" if unit else f"whether {told} is its unit is not sure, for no word says what it is"
+        return Named(header, name, told, by_unit, doubt)
     try:
         check_quantity(word, known)
     except UnknownUnitError:
-        return Named(header, name, told, by_unit, False)
-    return Named(header, name, told, word, True)
+        return Named(header, name, told, by_unit, f"its name says {word}, its unit, {told}, says {by_unit}")
+    return Named(header, name, told, word, "")
 
 
 def roles_of(columns: Sequence[Named]) -> Sequence[SignalRole] | None:
     """By quantity: forces are commands, where there are none voltages or currents; accelerations and velocities are
-    responses, places responses where there are no others. None where something is left open, or a name says else."""
-    by_quantity = _by_quantity(columns)
-    found = [role for column in columns if (role := by_quantity.get(column.quantity)) and role != "helper"]
-    said = [_said_role(column, columns) for column in columns]
-    if len(found) < len(columns) or not {"command", "response"} <= set(found):
-        return None
-    return found if all(name in ("", role) for name, role in zip(said, found, strict=True)) else None
+    responses, places responses where there are no others; what is known and none of these is a condition. None where
+    something is left open, or a name says else (`open_roles` says what)."""
+    return None if open_roles(columns) else [role for column in columns if (role := _role(column, columns))]
+
+
+def open_roles(columns: Sequence[Named]) -> tuple[str, ...]:
+    """What names and quantities leave open, a clause each; empty where they tell all roles."""
+    roles = [_role(column, columns) for column in columns]
+    found = []
+    for column, role in zip(columns, roles, strict=True):
+        said = _said_role(column, columns)
+        if role == "helper" or (role and said not in ("", role)):
+            found.append(f"whether '{column.header}' is to be compared, or is only a help to others")
+        elif not role and column.quantity in _FEEDS:
+            found.append(f"whether '{column.header}' is the command")
+        elif not role:
+            found.append(f"what '{column.header}' is")
+    if found:
+        return tuple(found)
+    if "command" not in roles:
+        found.append("what the command is (no column is a force, torque, current or voltage)")
+    if "response" not in roles:
+        found.append("what the response is (no column is a position, angle, speed or acceleration)")
+    return tuple(found)
 
 
 def proposed_roles(columns: Sequence[Named]) -> list[SignalRole | Literal[""]]:
-    """By names, then by quantity; empty where that leaves one open, and all where there would be no command or no
-    response. A reference is a helper, and so are currents and voltages beside a force."""
-    by_quantity = _by_quantity(columns)
-    found: list[SignalRole | Literal[""]] = [
-        _said_role(column, columns) or by_quantity.get(column.quantity, "") for column in columns
-    ]
-    if not {"command", "response"} <= set(found):
-        found = ["" for _ in columns]
-    return found
+    """By names, then by quantity; empty where that leaves it open. A reference is a helper, and so are currents and
+    voltages beside a force."""
+    return [_said_role(column, columns) or _role(column, columns) for column in columns]
+
+
+def _role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
+    if _said_role(column, columns) == "condition":
+        return "condition"
+    known = column.quantity not in ("", "1", "time", *_DRIVES, *_FEEDS, *_MOTIONS, *_PLACES)
+    return _by_quantity(columns).get(column.quantity, "condition" if known else "")
 
 
 def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[""]:
@@ -105,9 +136,9 @@ def _said_role(column: Named, columns: Sequence[Named]) -> SignalRole | Literal[
 
 
 def _by_quantity(columns: Sequence[Named]) -> dict[str, SignalRole]:
-    quantities = {column.quantity for column in columns}
+    quantities = {column.quantity for column in columns if _said_role(column, columns) != "condition"}
     answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
-    by_quantity: dict[str, SignalRole] = {"temperature": "condition"}
+    by_quantity: dict[str, SignalRole] = {}
     if quantities & set(_DRIVES):
         by_quantity.update({**dict.fromkeys(_FEEDS, "helper"), **dict.fromkeys(_DRIVES, "command")})
     elif len(quantities & set(_FEEDS)) == 1:  # which of both would be the command cannot be told

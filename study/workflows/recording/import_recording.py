@@ -12,7 +12,7 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.arrays import read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map
+from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap, ImportMap
 from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_of_files, read_map
@@ -141,8 +141,7 @@ def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
         found = _by_map(shipped, files, on_progress)
         return replace(found, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *found.notes))
     if wanted is None:
-        why = "nothing says which array is what, and in which unit"
-        raise MapNeededError(files[0].name, why, map_skeleton(arrays))
+        raise MapNeededError(files[0].name, "; ".join(header_problems(arrays)), map_skeleton(arrays))
     built = build_recording(wanted, files, on_progress)
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
     return Foreign(built.recording, tuple(files), "header", "", (f"Taken from the header: {told}.", *built.notes))

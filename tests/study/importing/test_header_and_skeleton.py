@@ -3,7 +3,7 @@ import pytest
 
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map
+from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_toml import parse_map
 from study.importing.map_format.signal_words import named, proposed_roles, unit_in
@@ -38,6 +38,11 @@ def test_a_header_is_a_name_and_a_unit(header, expected):
         ("time_s,MotorTorque_Nm,omega_rad_s,theta_rad", ["command", "response", "position"]),
         ("time [s],force,position", ["command", "response"]),
         ("time [s],fx [lbf],temp [degC],ax [g]", ["command", "condition", "response"]),
+        ("time [s],force [lbf],displacement [in],pressure [psi]", ["command", "response", "condition"]),
+        ("time [s],force [N],position [mm],setting", ["command", "response", "condition"]),
+        ("time [s],current [A],encoder [counts],supply [V]", ["command", "response", "condition"]),
+        ("time [s],torque [Nm],motor angle [rad],load angle [rad]", ["command", "response", "response"]),
+        ("time [s],force [N],accel [m/s²]", ["command", "response"]),
     ],
 )
 def test_a_header_with_units_needs_no_map(tmp_path, header, roles):
@@ -76,6 +81,32 @@ def test_a_reference_is_no_response(tmp_path):
 )  # fmt: skip
 def test_a_header_that_leaves_something_open_is_not_guessed_at(tmp_path, header):
     assert header_map(arrays(tmp_path, header)) is None
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("time [s],position [furlong],force [N]", ["'position [furlong]': 'furlong' is not a unit known here"]),
+        ("time,current,angle", ["'time' does not say in which unit the time is (as in 'time [s]')"]),
+        ("displacement_mm,force_N", ["no column is the time (as in 'time [s]')"]),
+        ("time [s],current [A],voltage [V],speed [rpm]",
+         ["nothing says whether 'current [A]' is the command", "nothing says whether 'voltage [V]' is the command"]),
+        ("time [s],force [N],knob,ax [g]", ["nothing says what 'knob' is"]),
+        ("time [s],fx [N],fy [N]",
+         ["nothing says what the response is (no column is a position, angle, speed or acceleration)"]),
+        ("time [s],fx [N],fx [lbf],ax [g]", ["several columns are called 'fx'"]),
+    ],
+)  # fmt: skip
+def test_what_is_unclear_is_said_of_the_column_alone(tmp_path, header, said):
+    assert list(header_problems(arrays(tmp_path, header))) == said
+
+
+def test_an_unknown_unit_stays_in_the_map_as_a_comment_and_other_columns_keep_what_they_say(tmp_path):
+    text = map_skeleton(arrays(tmp_path, "time [s],position [furlong],torque [Nm],battery [V],phase_A"))
+    assert "unit = \"\"                   # 'furlong' is not a unit known here" in text
+    roles = [line.split('"')[1] for line in text.splitlines() if line.startswith("role")]
+    units = [line.split('"')[1] for line in text.splitlines() if line.startswith("unit")]
+    assert (roles, units) == (["response", "command", "condition", "helper"], ["", "Nm", "V", "A"])
 
 
 def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_path):
@@ -169,7 +200,7 @@ def test_a_proposal_for_several_runs_needs_a_device_and_no_more(tmp_path):
         (("u_Nm", "theta_rad", "omega_rad_s", "current_A"), ["command", "position", "response", "helper"]),
         (("u_mm", "y_N"), ["command", "response"]),
         (("x_mm", "y_mm", "force_N"), ["response", "response", "command"]),
-        (("position_rad", "current_A", "voltage_raw"), ["", "", ""]),
+        (("position_rad", "current_A", "voltage_raw"), ["response", "", ""]),
         (("torque_cmd", "torque_Nm", "speed"), ["command", "command", "response"]),
         (("knob", "force_N", "a_g"), ["", "command", "response"]),
         (("knob", "dial"), ["", ""]),
