@@ -42,7 +42,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
             TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.", "Give its recordings, REC.h5.",
             saved="Nothing was written.",
         )  # fmt: skip
-    found = read_input(plan.recordings, 1)
+    found = read_input(plan.recordings, 1, plain=True)
     if weighted(found.recordings):
         raise _refused("A recording was made with a weight on, and the model would hold the weight.")
     try:

@@ -20,9 +20,7 @@ def test_the_tests_that_it_names_exist():
     assert len(named) >= 10
     sources = {path: path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
     missing = [
-        name
-        for name in named
-        if not any(path.stem == name or f"def {name}(" in text for path, text in sources.items())
+        name for name in named if not any(path.stem == name or f"def {name}(" in text for path, text in sources.items())
     ]
     assert missing == []
 

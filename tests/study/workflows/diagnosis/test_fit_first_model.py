@@ -190,3 +190,16 @@ def test_the_command_prints_numbers_and_never_overwrites(tmp_path, capsys):
     assert "stiffness fx" in said and "95 %" in said and "Held-out error" in said
     assert main(words) == 1
     assert "never overwritten" in capsys.readouterr().err
+
+
+def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_is_said(tmp_path):
+    recording = recorded(device(0.4, 6.0, 300.0))
+    plain = {"quantity": "1", "unit": "1"}
+    bare = replace(
+        recording, command=replace(recording.command, **plain), response=replace(recording.response, **plain)
+    )
+    write_recording(tmp_path / "bare.h5", bare)
+    done = fit_first_model(FirstModelPlan((tmp_path / "bare.h5",), tmp_path / "m.toml"), lambda share: None)
+    assert done.choice.fit.kind == "mass-spring"
+    assert done.choice.fit.numbers[0].value == pytest.approx(0.4, rel=0.02)
+    assert any("Nothing says what x measures: it was taken for a position" in remark for remark in done.remarks)
