@@ -67,7 +67,16 @@ def clipped_samples(samples: FloatArray) -> int:
     beyond = [_would_go_on(filled, start, stop) for start, stop in runs]
     needed = max(_STEPS * step, 1e-6 * float(np.ptp(known)))
     counted = [stop - start for (start, stop), over in zip(runs, beyond, strict=True) if over > needed]
-    return int(at_top.sum()) if len(counted) >= LEAST_RUNS or max(counted, default=0) >= LEAST_SAMPLES else 0
+    # A periodic signal comes back to its peak again and again, by the same way: that is one run.
+    ways = {_way(filled, run, needed) for run, over in zip(runs, beyond, strict=True) if over > needed}
+    return int(at_top.sum()) if len(ways) >= LEAST_RUNS or max(counted, default=0) >= LEAST_SAMPLES else 0
+
+
+def _way(samples: FloatArray, run: tuple[int, int], step: float) -> tuple[float, ...]:
+    """Length, and the samples on either side in steps; the same to and fro."""
+    start, stop = run
+    beside = sorted((round(float(samples[start - 1]) / step), round(float(samples[stop]) / step)))
+    return (stop - start, *beside)
 
 
 def _would_go_on(samples: FloatArray, start: int, stop: int) -> float:

@@ -36,6 +36,16 @@ def test_a_signal_that_turns_by_itself_is_not_cut_off(name, step):
     assert clipped_samples(-rounded) == 0
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_peak_of_a_periodic_signal_is_not_cut_off_however_often_it_comes(seed):
+    lines = np.arange(1, 200)
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
+    period = np.cos(2 * np.pi * np.outer(np.arange(500) / 500, lines) + phases).sum(axis=1)
+    assert clipped_samples(np.tile(period, 10)) == 0
+    cut = np.minimum(period, 0.5 * period.max())
+    assert clipped_samples(np.tile(cut, 10)) == 10 * np.sum(period >= cut.max())
+
+
 def test_a_place_where_it_comes_to_rest_is_not_cut_off():
     """A coarse encoder at the end of each step of a square reference."""
     target = np.sign(np.sin(2 * np.pi * 0.5 * T))
