@@ -1,11 +1,41 @@
 """A figure together with what a page or a folder of files needs to show it."""
 
+import io
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 
+import matplotlib
 from matplotlib.figure import Figure
 
-from analysis.figures.svg import inline_svg
+
+def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
+    """The <svg> element alone, with a title and a description for those who cannot see it. The same figure gives the
+    same text.
+
+    name: letters, digits, hyphens; put before every id, so that two figures in a page do not share any.
+    """
+    buffer = io.StringIO()
+    # Text stays text: it can be read aloud, searched and copied.
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    # It lies where it should now; laying it out again would take as long as drawing it.
+    figure.set_layout_engine("none")
+    text = buffer.getvalue()
+    svg = text[text.index("<svg") :]
+    svg = re.sub(r'\bid="', f'id="{name}-', svg)
+    svg = svg.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
+    opening, rest = svg.split(">", 1)
+    named = f"{name}-title {name}-description" if description else f"{name}-title"
+    described = f'<desc id="{name}-description">{_escaped(description)}</desc>' if description else ""
+    return (
+        f'{opening} role="img" aria-labelledby="{named}"><title id="{name}-title">{_escaped(title)}</title>'
+        f"{described}{rest}"
+    )
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,9 +1,11 @@
 """Everything that can be said of a recording before any model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.data.rounding import rounding_step
 from analysis.look.channels import Channel, Stretch, channels_of, rms, stretches_of
 from analysis.look.check import Check
 from analysis.look.clipping import clipping
@@ -22,8 +24,35 @@ from analysis.look.kinematics import KinematicPair, kinematic_checks, kinematic_
 from analysis.look.levels import SegmentLevel, level_checks, segment_levels
 from analysis.look.plausibility import offsets, units
 from analysis.look.repeats import Repeats, repeat_checks, repeats
-from analysis.look.resolution import resolution
 from equalizer.signals.recording import Recording
+
+RESOLUTION = "resolution"
+COARSE, ROUGH, UNSEEN = 3.0, 30.0, 1000.0
+"""Steps in a channel's rms: below the first, rounding hides the motion, below the second it shows beside it, above the
+last it is not worth a word."""
+_SENSORS = ("response", "position")
+
+
+def resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """Of sensors; a command may have as few values as it was given."""
+    found = [_of_channel(channel) for channel in channels if channel.role in _SENSORS]
+    known = tuple(check for check in found if check is not None)
+    return known or (Check(RESOLUTION, "fine", "No step of a converter matters in any sensor."),)
+
+
+def _of_channel(channel: Channel) -> Check | None:
+    step = rounding_step(channel.samples)
+    steps = rms(channel.known) / step if step else UNSEEN
+    if steps >= UNSEEN:
+        return None
+    seen = f"{channel.label} moves in steps of {channel.of(step)}; its rms is {steps:.3g} of them."
+    if steps < COARSE:
+        return Check(RESOLUTION, "wrong", seen, "Use a finer sensor or range, or move more: rounding hides the motion.")
+    if steps < ROUGH:
+        return Check(
+            RESOLUTION, "notice", seen, "Do not differentiate it without a filter; expect rounding as a floor."
+        )
+    return Check(RESOLUTION, "fine", seen)
 
 
 @dataclass(frozen=True, slots=True)

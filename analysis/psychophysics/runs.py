@@ -42,7 +42,7 @@ def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = 
     """All runs of one phase, in the order in which they first occur.
 
     Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
-    staircase: whoever asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.practice`).
+    staircase: whoever asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.study_analysis`).
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
     answers before it lead to, or where a row is missing, doubled or too many.

@@ -1,6 +1,6 @@
 """Everything that the trials of one study say, in one call."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,10 +9,8 @@ from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
 from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
-from analysis.psychophysics.friedman import Friedman, friedman
 from analysis.psychophysics.population import Population, split_by_population
-from analysis.psychophysics.practice import PracticeRun, practice_runs
-from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
+from analysis.psychophysics.repeated_measures import Friedman, RepeatedMeasures, friedman, repeated_measures
 from analysis.psychophysics.repeated_trials import repeat_warning
 from analysis.psychophysics.runs import Run, recompute_runs
 from analysis.psychophysics.study_warnings import side_warnings, study_warnings
@@ -20,7 +18,55 @@ from analysis.psychophysics.threshold_table import ThresholdTable, threshold_tab
 from analysis.psychophysics.thresholds import Threshold, threshold_of
 from analysis.wording import f_text, p_text
 from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.practice import PracticeState, practice_over, practice_passed, right_of_last
 from protocols.trial import Phase, Trial
+
+
+@dataclass(frozen=True, slots=True)
+class PracticeRun:
+    """Practice runs: short, at a fixed level, passed or not. They enter no result."""
+
+    subject: str
+    session: str
+    run: int
+    frequency_hz: float
+    trials: int
+    """Answered and counted."""
+    right: int
+    right_of_last: int
+    """Of the last trials that the criterion looks at."""
+    passed: bool
+    over: bool
+    """False: broken off before it was passed or out of trials."""
+
+
+def practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
+    """In the order in which they first occur. Practice has the phase TRAINING and follows the training staircases."""
+    first = len(protocol.training.frequencies_hz)
+    places = range(first, first + len(protocol.practice.frequencies_hz))
+    grouped: dict[tuple[str, str, int], list[Trial]] = {}
+    for trial in trials:
+        if trial.phase is Phase.TRAINING and trial.run in places:
+            grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
+    return tuple(_practice_run(rows, protocol) for rows in grouped.values())
+
+
+def _practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
+    first, settings = rows[0], protocol.practice
+    counted = sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial)
+    state = PracticeState(tuple(bool(trial.correct) for trial in counted))
+    return PracticeRun(
+        subject=first.subject,
+        session=first.session,
+        run=first.run,
+        frequency_hz=first.frequency_hz,
+        trials=len(counted),
+        right=sum(state.correct),
+        right_of_last=right_of_last(settings, state),
+        passed=practice_passed(settings, state),
+        over=practice_over(settings, state),
+    )
+
 
 CONFIDENCE = 0.95
 

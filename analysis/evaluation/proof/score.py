@@ -1,6 +1,7 @@
 """What a bank's outcomes amount to, one figure with its interval each."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,11 +9,56 @@ import numpy as np
 from analysis.diagnosis.document import NamedEffect
 from analysis.evaluation.proof.calibration import Calibration, calibration
 from analysis.evaluation.proof.follow_up import FollowUp, follow_up_figures
-from analysis.evaluation.proof.miss import NOT_EXPLAINED, has_wrong_name, is_miss, on_another_axis
 from analysis.evaluation.proof.outcome import Concealed, Outcome
-from analysis.evaluation.proof.same_number import as_said
 from analysis.evaluation.proof.share import Figure, pooled, share, statistic
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+
+TURN = 2 * math.pi
+
+
+def as_said(name: str, said: float, values: Mapping[str, float]) -> float:
+    """The true value of a number in the way the diagnosis says it. values: all true ones of the effect.
+
+    Where an effect acts the same with another value, that one is taken which lies nearest to what was said.
+    """
+    true = values[name]
+    if name == "phase":
+        return true + TURN * round((said - true) / TURN)
+    if name == "position" and values.get("opposite") == 1.0:
+        return math.copysign(true, said)
+    return true
+
+
+NOT_EXPLAINED = ("unexplained", "partly_explained")
+
+
+def is_miss(one: Outcome) -> bool:
+    """A wrong name is one even where nothing could be seen; where the true effect is not to be named, any name is."""
+    if one.said is None or has_wrong_name(one):
+        return True
+    if one.kind in ("nothing", "without") or not one.detectable:
+        return False
+    if one.kind == "outside":
+        return one.verdict not in NOT_EXPLAINED
+    return not one.right or on_another_axis(one)
+
+
+def has_wrong_name(one: Outcome) -> bool:
+    """An effect is named that is not there, or that was not to be considered."""
+    there = () if one.kind in ("nothing", "without") else one.names
+    return not set(one.named_names) <= set(there)
+
+
+def on_another_axis(one: Outcome) -> bool:
+    """A right name, but at an axis where nothing is concealed; of devices with several."""
+    if len(one.axes) < 2:
+        return False
+    true = {each.effect: each.axis for each in one.concealed}
+    return any(
+        true.get(said.effect) is not None and said.axis is not None and said.axis != true[said.effect]
+        for said in one.named
+    )
+
 
 BANKS = ("main", "dirty", "engine")
 

@@ -1,7 +1,7 @@
 """From measured frequency responses to a model: starts, refinement, choice, uncertainty."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,15 +18,54 @@ from equalizer.identification.state_space.candidates import (
 )
 from equalizer.identification.state_space.misfit import Misfit, misfit_of, unknowns_of
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
-from equalizer.identification.state_space.model_uncertainty import parameter_draws, response_deviation
+from equalizer.identification.state_space.refinement import FittedForm, refine
 from equalizer.identification.state_space.refusals import IdentificationRefused, lines_or_refusal
 from equalizer.identification.state_space.relaxed_poles import Relaxed, SlowPole, relaxed, relaxed_again, slow_poles
 from equalizer.identification.state_space.settings import IdentificationSettings
+from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+
+STEPS = 3
+
+
+def parameter_draws(
+    fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
+) -> FloatArray:
+    """(draws, k), in the order of `IdentifiedModel.parameters`: each a fit that equally likely noise would give.
+
+    A covariance from the Jacobian would not do: an order above what the band shows leaves directions in which the
+    response hardly changes at first and then at once, so draws from it are unstable models. Refitting keeps every draw
+    within the decay bound, and is right to second order for the cost of a few steps each (parametric bootstrap, Efron
+    and Tibshirani 1993).
+
+    lines: those that the fit was made to, binned or not; noise_factor: what the noise is taken to be over what the
+    weights say, above 1 where the fit leaves more than noise.
+    """
+    random = np.random.default_rng(seed)
+    modelled = fitted.response(lines.z)
+    deviation = noise_factor / lines.weight / np.sqrt(2)
+    rows = []
+    for _ in range(draws):
+        real, imaginary = random.standard_normal((2, *modelled.shape))
+        noisy = replace(lines, response=modelled + deviation * (real + 1j * imaginary))
+        drawn = refine(fitted.form, noisy, radius, STEPS)
+        parts = (drawn.form.state_matrix, drawn.B, drawn.form.C, drawn.D)
+        rows.append(np.concatenate([part.ravel() for part in parts]))
+    return np.array(rows)
+
+
+def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
+    """Standard error |δG| of each entry, (lines, p, m), from the model's samples. Raises ValueError without them."""
+    if model.samples is None:
+        raise ValueError("the model holds no samples of its uncertainty; identify it again with draws > 0")
+    middle = model_response(model, frequency_hz)
+    squares = [np.abs(model_response(model.with_parameters(row), frequency_hz) - middle) ** 2 for row in model.samples]
+    return np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)
+
 
 FIRST_SEARCH = 0.8
 """Share of the progress that is told of it; poles are relaxed in the rest."""

@@ -1,21 +1,72 @@
 """A bank of concealed physics from start to end: sealed, answered by processes that know nothing, revealed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from analysis.diagnosis.document import diagnosis_from_json
 from analysis.evaluation.proof.controlled import Controlled
 from analysis.evaluation.proof.follow_up import FollowUp
-from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import Score, score
 from study.errors import LeftError
 from study.evaluation.bank.ask_engine import ask_engine, forget_recording, is_answered
 from study.evaluation.bank.follow_up import NEXT, follow_up
-from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, opened
-from study.evaluation.bank.proof_seals import label_at
-from study.evaluation.bank.reveal_cases import engines, reveal_cases
+from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, opened
+from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seals_of
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import BankPlan, redrawn, seal_cases, sealed_names, to_draw
+from study.store.disk.provenance import sha256_of
+
+
+def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
+    """Of the first so many numbers, all that are answered. Raises StudyError where a seal is broken."""
+    seals = seals_of(folder)
+    found, broken = [], []
+    for path in sorted(folder.sealed.glob("*.json")):
+        if seals.get(f"sealed/{path.name}") != sha256_of(path):
+            broken.append(path.name)
+            continue
+        label = label_at(path)
+        place = folder.open / label["name"]
+        if label["number"] >= cases or not (place / ANSWER).exists():
+            continue
+        said = answer_at(place)
+        if not is_of(label, said):
+            broken.append(path.name)
+        found.append(outcome_of(label, said))
+    if broken:
+        raise broken_seal(broken, folder.path)
+    return tuple(found)
+
+
+def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
+    concealed = tuple(
+        Concealed(one["effect"], one["place"], one["axis"], {**one["values"], **one["unseen"]})
+        for one in label["truth"]
+    )
+    return Outcome(
+        number=label["number"],
+        seed=label["seed"],
+        kind=label["kind"],
+        bank=label["bank"],
+        axes=tuple(label["axes"]),
+        model=label["concealed"],
+        concealed=concealed,
+        strengths=tuple(label["strengths"]),
+        adds=label["adds"],
+        said=None if "failed" in said else diagnosis_from_json(said["diagnosis"]),
+        channel_errors=said.get("channel_errors", {}),
+        seconds=said.get("cpu_seconds", float("nan")),
+    )
+
+
+def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
+    """Digests of the code that gave the answers; more than one where it changed on the way."""
+    answers = [answer_at(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
+    return tuple(sorted({one["engine"] for one in answers if "engine" in one}))
+
 
 CONTROL_TURNS = 3
 """Each with a seed of its own."""

@@ -11,7 +11,6 @@ from typing import Any
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import label_at, seal
-from study.evaluation.bank.write_cases import truths
 from study.evaluation.challenge import second_engine
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
 from study.evaluation.challenge.draw_case import Case
@@ -20,6 +19,32 @@ from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
 from study.workflows.worker_processes import worker_processes
+
+
+def write_case(folder: Path, name: str, case: Case, *, overwrite: bool = False) -> None:
+    """`name`.h5, `name`.toml and `name`.truth.json. Raises AlreadyThereError, CannotWriteError."""
+    write_recording(folder / f"{name}.h5", case.recording, precision="float32", overwrite=overwrite)
+    write_mechanical_model(folder / f"{name}.toml", case.model, overwrite=overwrite)
+    write_text(folder / f"{name}.truth.json", truth_text(case), overwrite=overwrite)
+
+
+def truth_text(case: Case) -> str:
+    """A JSON list, one entry per effect; empty where the model lacks nothing."""
+    return json.dumps(truths(case), indent=1, allow_nan=False) + "\n"
+
+
+def truths(case: Case) -> list[dict[str, Any]]:
+    return [
+        {
+            "effect": truth.effect,
+            "place": truth.place,
+            "axis": truth.axis,
+            "values": truth.values,
+            "unseen": truth.unseen,
+        }
+        for truth in case.truth
+    ]
+
 
 SALT_BYTES = 16
 PROCESSOR_S = 60.0

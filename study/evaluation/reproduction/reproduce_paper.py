@@ -1,28 +1,79 @@
 """The published figures 1 to 5 on the simulated omega.3: everything that takes long is kept, and used again."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 
+from analysis.evaluation.reproduction.document import UsedModel
 from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.psychophysics.study_analysis import analyse_study
 from equalizer.identification.frequency_response.coupling_onset import coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, transfer_estimate
+from equalizer.identification.state_space.held_out import HeldOut, held_out
+from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
 from study.errors import LeftError, StudyError
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
-from study.evaluation.reproduction.reproduce_models import ReproducedModel, from_excitation, modelled
 from study.evaluation.reproduction.reproduce_recordings import Recorded, Wanted, recorded
 from study.evaluation.reproduction.reproduction_plan import BETWEEN, ReproductionPlan, Steps
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
-from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.file_errors import CannotWriteError, UnusableFileError
+from study.store.disk.provenance import sha256_of
+from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.protocol_files import read_study_protocol
+from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.results.analyze_data import sensor_frame
 from study.workflows.results.collect_sessions import Collected, collect_sessions
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReproducedModel:
+    """The models behind figure 5: identified once from each recording, and used again by the next run."""
+
+    model: IdentifiedModel
+    """It holds the spring: what is played under the same spring needs no other account of it."""
+    tested: HeldOut | None
+
+    def used(self, name: str) -> UsedModel:
+        """name: of its recording."""
+        quality = self.model.quality
+        assert quality is not None, "every model that is kept or made here has one"
+        return UsedModel(name.replace("_", " "), quality.expected_error, quality.held_out_error, quality.held_out_noise)
+
+
+def modelled(plan: ReproductionPlan, recorded: Recorded, on_share: Callable[[float], None]) -> ReproducedModel:
+    """A file in the way that is not of this recording, order and band, or without its quality, is made again."""
+    path = plan.models / recorded.path.name
+    model = _kept(path, plan, recorded.path)
+    if model is None:
+        path.unlink(missing_ok=True)
+        asked = IdentifyPlan((recorded.path,), path, plan.band_hz, plan.order, with_spring=True)
+        model = identify_model(asked, on_share).model
+    on_share(1.0)
+    return ReproducedModel(model, held_out(model, (from_excitation(recorded.recording),)))
+
+
+def _kept(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
+    try:
+        model = read_identified_model(path) if path.exists() else None
+    except UnusableFileError:
+        return None
+    if model is None or model.quality is None or (model.order, model.band_hz) != (plan.order, plan.band_hz):
+        return None
+    parents = [parent.get("sha256") for parent in model.provenance.get("parents", ())]
+    return model if parents == [sha256_of(source)] else None
+
+
+def from_excitation(recording: Recording) -> Recording:
+    """As the model sees it, the spring a part of the device."""
+    return replace(recording, command=recording.excitation or recording.command)
+
 
 SUBJECT_S, RECORDING_S, MODEL_S, PLAYING_S, BASELINES_S, WRITING_S = 5.0, 2.0, 12.0, 8.0, 12.0, 8.0
 """About what each takes: for the progress alone."""

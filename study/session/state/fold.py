@@ -6,7 +6,7 @@ from dataclasses import replace
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.practice import PracticeState, practice_over, practised
 from protocols.procedure.staircase import begin, finished, step
-from protocols.trial import Phase, TrialStatus, VoidCause
+from protocols.trial import Phase, Trial, TrialStatus, VoidCause
 from study.session.facts.events import (
     AnswerGiven,
     DemoFinished,
@@ -42,7 +42,35 @@ from study.session.state.sitting_state import (
     sit_down_again,
 )
 from study.session.state.state import SessionState, begin_session, current_rule, due, felt, placed, repeats_left
-from study.session.state.trial_row import trial_row
+
+
+def trial_row(opened: SessionOpened, event: TrialPresented, felt: bool | None, repeat_cause: VoidCause | None) -> Trial:
+    """A presentation as the first half of its row in `trials.csv`; answer and measurement come later."""
+    return Trial(
+        subject=opened.subject,
+        session=opened.session,
+        run=event.run,
+        trial=event.trial,
+        attempt=event.attempt,
+        phase=event.phase,
+        frequency_hz=event.frequency_hz,
+        level_n=event.level_n,
+        direction_shown=event.direction,
+        answer=None,
+        correct=None,
+        reversal=False,
+        response_time_s=None,
+        delivered_mps2=None,
+        off_axis_mps2=None,
+        displacement_mm=None,
+        missed_ticks=None,
+        felt=felt,
+        status=TrialStatus.OPEN,
+        angle_deg=event.angle_deg,
+        wanted_mps2=event.wanted_mps2,
+        repeat_cause=repeat_cause,
+    )
+
 
 __all__ = ["apply", "begin_session"]
 

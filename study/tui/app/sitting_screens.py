@@ -10,7 +10,6 @@ from textual.app import App
 from textual.screen import Screen
 
 from study.session.views.views import Reply as TrialReply
-from study.tui.app.drawn_before import forget_drawn_before
 from study.tui.engine.from_engine import Ask, Call, Close, Feedback, FromEngine, LookUpdate, Opened, Preparing, Trouble
 from study.tui.engine.to_engine import Reply, ToEngine
 from study.tui.keys.answer_keys import AnswerKeys
@@ -18,6 +17,21 @@ from study.tui.screens.preparing import PreparingScreen
 
 if TYPE_CHECKING:
     from study.tui.screens.trial import TrialScreen
+from textual._styles_cache import StylesCache
+from textual.widgets import Footer
+
+
+def forget_drawn_before(app: App[Any]) -> None:
+    """What Textual 8.2 keeps of widgets that are gone. Searching it for garbage holds the event loop up: for longer
+    with every trial, and in the end past the half second after which a screen counts as dead. To be called where
+    screens come and go."""
+    # By mistake, a lookup of two colours is cached by the whole drawing of a widget: the last 1024 of them.
+    StylesCache.get_inner_outer.cache_clear()
+    for screen in app.screen_stack:
+        for footer in screen.query(Footer):
+            # A footer that is written anew goes on watching for its old keys, until what they follow changes.
+            footer.mutate_reactive(Footer.compact)
+
 
 OPENING = "Preparing the device: some ten seconds the first time."
 TROUBLE_FOR_S = 8.0

@@ -40,18 +40,16 @@ from study.tui.engine.to_engine import (
     ShowSession,
     Withdraw,
 )
+from study.workflows.results.analysis_files import WrittenAnalysis
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_results
-from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 from study.workflows.trial.display import PersonsHand
 from study.workflows.views.ask_session import ask_session
-from study.workflows.views.list_models import model_words
-from study.workflows.views.list_protocols import protocol_line
-from study.workflows.views.list_sessions import home_view
+from study.workflows.views.list_sessions import home_view, model_words, protocol_line
 from study.workflows.views.view_session import session_view
 
 OPENING = "Preparing the device: some ten seconds the first time."

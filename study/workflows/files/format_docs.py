@@ -16,11 +16,15 @@ from analysis.diagnosis import document
 from analysis.diagnosis.result import real_answer
 from analysis.evaluation.reproduction import document as reproduction_document
 from analysis.psychophysics.thresholds import Threshold
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
+from equalizer.laws.parse import FUNCTIONS, LARGEST, LONGEST, MEMORY
+from equalizer.laws.program import CELLS, DEEPEST
+from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECT_NAMES, EffectParameter
 from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.document.schema import protocol_schema
 from protocols.trial import Trial
+from study.session.facts import log_chain
+from study.session.facts.events import EVENTS
 from study.session.watching.live import Live
 from study.store.disk.csv_rows import columns, in_words
 from study.store.disk.layout import Entry
@@ -29,8 +33,67 @@ from study.store.formats import identified_model_file, mechanical_model_file, re
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files.importing_docs import importing_markdown
-from study.workflows.files.law_docs import LAWS
-from study.workflows.files.session_log_docs import event_schema, session_log_markdown
+
+
+def event_schema() -> dict[str, Any]:
+    """Each event may carry the checksum that the log adds."""
+    schema = EVENTS.json_schema()
+    for event in schema["$defs"].values():
+        if "event" in event.get("properties", {}):
+            event["properties"]["chain"] = {"type": "string", "pattern": f"^[0-9a-f]{{{log_chain.DIGITS}}}$"}
+    return schema
+
+
+def session_log_markdown() -> Iterable[str]:
+    yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
+    yield (
+        "One JSON object per line, appended and never changed; each is a fact of the schema `session_event.json`. "
+        "Times are ISO 8601 with date and UTC offset, durations in seconds, files relative to the session's folder."
+    )
+    yield (
+        f"A line ends with the field `chain`, {log_chain.DIGITS} hexadecimal digits: the first of the SHA-256 of the "
+        "checksum before it, a line feed, and the line's own bytes without this field (nor the comma before it, nor "
+        f"the line end). Before the first line stand {log_chain.DIGITS} zeros. Lines that older versions wrote have no "
+        "`chain` and enter the hash all the same: where such a log goes on, its first checksum covers what came "
+        "before."
+    )
+    yield (
+        "When a session is closed, `seal.json` is written once: number of lines, bytes, the last checksum, and the "
+        "SHA-256 of these bytes. It tells a log whose end was cut off from one that was interrupted. Notes that are "
+        "added after the end are covered by `seal-2.json` and so on. Whatever reads a session checks all of it, and "
+        "`hapteq validate` names the line. A session that is damaged is left out of an analysis, with the reason."
+    )
+    yield (
+        "Checksums and seal have no key: they show damage, and edits by those who do not compute them again. They are "
+        "no proof of who wrote a log, nor against forgery; a copy kept elsewhere is."
+    )
+
+
+_PLAIN = ", ".join(f"`{name}`" for name in FUNCTIONS if name not in MEMORY)
+
+LAWS = "\n\n".join(
+    (
+        f"A law that the catalogue has no name for is an effect `{DISCOVERED_LAW}`. A model says its formula:",
+        "```toml\n[[effect]]\n"
+        f'kind = "{DISCOVERED_LAW}"\naxis = "y"\nacts_on = "force"\nexpression = "-4.1*abs(vy)**1.5*sign(vy)"\n'
+        "```",
+        "In a diagnosis it is the effect's `law`, with `expression`, `variables`, `acts_on` and `axis`. A law of the "
+        "`force` is added to the force at its axis; one of a `command` or `response` takes the place of that "
+        "axis' command or response.",
+        f"The formula has Python's syntax and SI numbers: `+ - * / **`, parentheses, `pi`, and the functions {_PLAIN}. "
+        "Four more remember what was before: `lag(s, tau_s)` (one pole), `play(s, half_width)` (follows s with play), "
+        f"`delay(s, seconds)` (remembered at up to {CELLS} instants), `integral(s)`; the second argument is constant. "
+        "In a force or response they begin as if their signals had always been what they are first, in a command from "
+        "zero.",
+        "Signals are `x`, `vx`, `ax`, `fx` (position, velocity, acceleration, command of the x axis; y, z likewise), "
+        "`t` (seconds from the first sample), or the recording's own channels. Where these do not end in x, y, z, the "
+        "axes are called so in their order. A law of a command knows commands and `t`, one of a response "
+        "knows responses and `t`.",
+        "Numbers with a point or exponent (`4.1`, `1e-3`) are free: a fit may move them. Whole numbers (`2`) belong "
+        f"to the form. A formula has up to {LONGEST} characters and {LARGEST} parts, and up to {DEEPEST} numbers at "
+        "once. It compares nothing: `maximum(x - 0.01, 0)` is a stop, `(1 + sign(vx))/2` is 1 on the way up.",
+    )
+)
 
 
 @dataclass(frozen=True, slots=True)

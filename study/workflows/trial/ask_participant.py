@@ -10,8 +10,7 @@ from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import direction_vector, held_stimulus
 from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
-from study.workflows.trial.release import released
-from study.workflows.trial.sitting import Sitting
+from study.workflows.trial.sitting import Sitting, released
 
 
 @dataclass(frozen=True, slots=True, eq=False)

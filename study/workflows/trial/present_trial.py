@@ -1,22 +1,92 @@
 """One trial: wait for the handle, log, play, ask, log, release, measure, log. Nothing moves before its fact is on the
 disk."""
 
-from protocols.trial import VoidCause
+import math
+from collections.abc import Callable
+
+from protocols.definition.apparatus import Plane
+from protocols.definition.exposure import GateSettings
+from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Played
 from study.session.facts.events import AnswerGiven
-from study.session.state.due_trial import Present
-from study.session.state.state import SessionState
+from study.session.state.due_trial import Present, labels_are_swapped
+from study.session.state.progress import progress
+from study.session.state.state import SessionState, repeats_left
 from study.session.stimulus.delivered import delivered
-from study.session.stimulus.stimulus import direction_vector
-from study.session.views.views import Unanswered
+from study.session.stimulus.stimulus import AXES, direction_vector
+from study.session.views.views import HandleView, Question, Task, Unanswered, picture_of
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
 from study.workflows.trial.ask_participant import Asked, ask_participant
-from study.workflows.trial.await_handle import await_handle
 from study.workflows.trial.judge_trial import cause_of, judge
-from study.workflows.trial.question import question_of
-from study.workflows.trial.release import released
-from study.workflows.trial.sitting import Sitting, record
+from study.workflows.trial.sitting import Sitting, record, released
 from study.workflows.trial.trial_facts import Outcome, known_then, measured, presented, spoiled
+
+
+def question_of(state: SessionState, present: Present) -> Question:
+    """A due trial as the participant sees it: everything that could give the answer away left out."""
+    run = state.runs[present.run]
+    alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
+    return Question(
+        phase=run.phase,  # a catch trial is one of the test run's, as far as anybody can see
+        run_number=1 + alike.index(present.run),
+        runs_in_phase=len(alike),
+        trial_number=present.trial + 1,
+        repeated=present.attempt > 0,
+        time_limit_s=state.protocol.trial.time_limit_s,
+        picture=picture_of(state.protocol.directions, labels_are_swapped(state.protocol, state.opened)),
+        task=Task.INTERVAL if run.phase is Phase.DETECTION else Task.DIRECTION,
+        practice=run.practice,
+        progress=progress(state),
+        repeats_left=repeats_left(state),
+    )
+
+
+def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
+    """None when a trial may start; else why the wait was cut short."""
+    gate = state.protocol.gate
+    if gate.radius_mm <= 0:
+        return None
+    look = _looking(gate, state.protocol.directions.plane, sitting)
+    if gate.still_s <= 0 and look().ready:
+        return None
+    sitting.attendant.begin("waiting for the handle")
+    reply = sitting.display.await_handle(look, sitting.attendant.glance)
+    sitting.attendant.handle_is(True)
+    if reply is None and not look().ready:
+        reply = Unanswered("the wait for the handle ended early", leave=False)
+    if reply is None:
+        return None
+    resolved = sitting.attendant.resolve(reply)
+    return resolved if isinstance(resolved, Unanswered) else None
+
+
+def _looking(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
+    inside_since_s: list[float] = []
+
+    def look() -> HandleView:
+        offset = sitting.attendant.offset_m(sitting.device.look())
+        now_s = sitting.clock.now_s()
+        if offset is None:
+            inside_since_s.clear()
+            sitting.attendant.handle_is(False)
+            return HandleView(False, "The device does not say where its handle is.", (0.0, 0.0), gate.radius_mm)
+        distance_mm = 1000.0 * math.hypot(*offset)
+        inside = distance_mm <= gate.radius_mm
+        if not inside:
+            inside_since_s.clear()
+        elif not inside_since_s:
+            inside_since_s.append(now_s)
+        sitting.attendant.handle_is(inside)
+        ready = inside and now_s - inside_since_s[0] >= gate.still_s
+        first, second = AXES[plane]
+        return HandleView(
+            ready,
+            "Hold it there." if inside else f"Bring the handle {distance_mm:.0f} mm back to the centre.",
+            (1000.0 * offset[first], 1000.0 * offset[second]),
+            gate.radius_mm,
+        )
+
+    return look
 
 
 def present_trial(state: SessionState, present: Present, sitting: Sitting) -> AfterTrial:

@@ -1,10 +1,11 @@
 """The ports of one sitting, and the only way a fact gets into its state: through the log."""
 
+import contextlib
 from dataclasses import dataclass, replace
 
 from equalizer.tracking.feedforward.equalizer import Equalizer
 from study.devices.clock import Clock
-from study.devices.device import Device
+from study.devices.device import Device, Fault, Played
 from study.session.facts.events import Event, NoteTaken
 from study.session.facts.log_time import ClockStep
 from study.session.state.fold import apply
@@ -57,3 +58,12 @@ def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
         event = NoteTaken(utc=sitting.clock.utc(), who=note.who, text=note.text, adverse=note.adverse)
         state = record(state, event, sitting)
     return state
+
+
+def released(sitting: Sitting) -> Played:
+    """Let go after a stimulus, and say at once where the force could not be taken away: before any work on disk."""
+    played = sitting.device.release()
+    if played.health.fault is Fault.FORCE_LEFT:
+        with contextlib.suppress(OSError):
+            sitting.display.trouble(played.health.fault.value)
+    return played

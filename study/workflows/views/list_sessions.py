@@ -1,14 +1,91 @@
 """What lies in a data folder, and what the start screen offers. Reads only."""
 
+import tomllib
 from pathlib import Path
 
+from equalizer.plant.model_quality import quality_brief
+from protocols.definition.study_protocol import StudyProtocol
 from study.devices.opening import DEVICES
-from study.session.views.archive_views import HomeView, SessionLine
+from study.errors import StudyError
+from study.session.views.archive_views import HomeView, ProtocolLine, SessionLine
 from study.session.views.printable import printable, printable_text
+from study.store.disk.toml_text import read_toml_text
+from study.store.formats.identified_model_file import is_identified_model, read_identified_model
+from study.store.formats.protocol_files import ProtocolRefusedError, read_protocol, shipped_protocols
 from study.store.sessions.archive import session_folders
-from study.workflows.views.list_models import model_files, model_words
-from study.workflows.views.list_protocols import protocol_lines
 from study.workflows.views.session_line import session_line
+
+
+def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
+    """The shipped ones first, then files in the data folder and beside it."""
+    places = dict.fromkeys((data.absolute(), data.absolute().parent))
+    found = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
+    lines = (protocol_line(name, data) for name in (*shipped_protocols(), *found))
+    return tuple(line for line in lines if line is not None)
+
+
+def _toml_files(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.glob("*.toml") if path.is_file())
+    except OSError:
+        return []
+
+
+def _says_study(path: Path) -> bool:
+    try:
+        return tomllib.loads(read_toml_text(path, "protocol")).get("kind") == "study"
+    except (StudyError, ValueError, RecursionError):
+        return False
+
+
+def protocol_line(name: str, data: Path) -> ProtocolLine | None:
+    """None for a protocol of another kind. A bad one is offered with its problem, so that nobody misses it."""
+    try:
+        file = read_protocol(name, data)
+    except ProtocolRefusedError as refused:
+        return ProtocolLine(name, f"Cannot be used: {refused.problems[0]}", locked=False)
+    except StudyError as problem:
+        return ProtocolLine(name, f"Cannot be used. {problem.happened}", locked=False)
+    if not isinstance(file.protocol, StudyProtocol):
+        return None
+    equalized = file.protocol.stimulus.quantity == "delivered_acceleration"
+    return ProtocolLine(name, file.protocol.title, file.locked, equalized)
+
+
+def model_files(data: Path) -> tuple[str, ...]:
+    """In the data folder and beside it, latest first."""
+    places = dict.fromkeys((data.absolute(), data.absolute().parent))
+    found = [path for place in places for path in _hdf5_files(place)]
+    return tuple(str(path) for path in sorted(found, key=_changed, reverse=True) if _is_model(path))
+
+
+def model_words(path: str) -> str:
+    """How good it is, in a few words."""
+    try:
+        return quality_brief(read_identified_model(Path(path)).quality)
+    except StudyError as problem:
+        return f"cannot be used: {problem.title}"
+
+
+def _hdf5_files(folder: Path) -> list[Path]:
+    try:
+        return [path for path in folder.glob("*.h5") if path.is_file()]
+    except OSError:
+        return []
+
+
+def _changed(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _is_model(path: Path) -> bool:
+    try:
+        return is_identified_model(path)
+    except StudyError:  # a recording, or no file of ours
+        return False
 
 
 def home_view(data: Path) -> HomeView:

@@ -1,7 +1,7 @@
 from xml.etree import ElementTree
 
+from analysis.figures.picture import inline_svg
 from analysis.figures.style import new_figure
-from analysis.figures.svg import inline_svg
 
 
 def drawn():

@@ -3,8 +3,8 @@ import pytest
 
 from analysis.look.channels import channels_of
 from analysis.look.levels import level_checks, segment_levels
+from analysis.look.overview import resolution
 from analysis.look.plausibility import offsets, units
-from analysis.look.resolution import resolution
 from equalizer.signals.recording import Segment
 
 TWO = (Segment(0, 10_000, "noise", 1.0), Segment(10_000, 20_000, "noise", 2.0))

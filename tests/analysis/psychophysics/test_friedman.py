@@ -1,7 +1,7 @@
 import pytest
 from scipy.stats import friedmanchisquare
 
-from analysis.psychophysics.friedman import friedman
+from analysis.psychophysics.repeated_measures import friedman
 
 RANKED = ((1.0, 2.0, 3.0), (1.5, 2.5, 3.5), (0.1, 0.2, 0.3), (5.0, 6.0, 7.0))
 

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.psychophysics.practice import practice_runs
+from analysis.psychophysics.study_analysis import practice_runs
 from protocols.definition.preparation import PracticeSettings
 from protocols.definition.study_protocol import TrainingSettings
 from protocols.trial import Phase, TrialStatus

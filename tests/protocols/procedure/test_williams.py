@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from protocols.procedure.williams import williams_rows
+from protocols.procedure.schedule import williams_rows
 
 
 @pytest.mark.parametrize("conditions", range(1, 12))

@@ -24,9 +24,8 @@ from study.session.watching.watch_view import (
     WatchedRun,
     WatchView,
 )
-from study.tui.watch.alarm_book import RING_EVERY_S
 from study.tui.watch.watch_app import WatchApp
-from study.tui.watch.watch_screen import NO_NEWS_AFTER_S, UNHEARD_AFTER_S
+from study.tui.watch.watch_screen import NO_NEWS_AFTER_S, RING_EVERY_S, UNHEARD_AFTER_S
 
 HERE = Path(__file__).parent
 UTC = "2026-11-22T10:17:00.000+00:00"

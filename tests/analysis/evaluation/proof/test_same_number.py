@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from analysis.evaluation.proof.same_number import as_said
+from analysis.evaluation.proof.score import as_said
 
 
 @pytest.mark.parametrize(("said", "true"), [(-3.0, 2 * math.pi - 3.0), (0.1, 6.2), (13.0, 0.43)])

@@ -7,9 +7,8 @@ from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismat
 from analysis.evaluation.proof.calibration import calibration
 from analysis.evaluation.proof.detection import detection_strips, seen_from, shares_by_size, what_became_of
 from analysis.evaluation.proof.follow_up import FollowUp
-from analysis.evaluation.proof.miss import is_miss
 from analysis.evaluation.proof.outcome import Concealed, Outcome
-from analysis.evaluation.proof.score import score
+from analysis.evaluation.proof.score import is_miss, score
 from analysis.evaluation.proof.share import pooled, share, statistic
 from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text
 from analysis.figures.proof_pictures import proof_pictures

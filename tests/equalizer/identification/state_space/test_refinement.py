@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from equalizer.identification.state_space.input_matrices import input_matrices
 from equalizer.identification.state_space.modal_form import ModalForm, modal_form
-from equalizer.identification.state_space.refinement import fitted, refine
+from equalizer.identification.state_space.refinement import fitted, input_matrices, refine
 from equalizer.identification.state_space.stable_poles import largest_radius
 from equalizer.identification.state_space.weighted_lines import weighted_lines
 

@@ -13,7 +13,7 @@ from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
 from study.evaluation.bank.follow_up import DRAWN, FURTHER, NEXT, PROPOSED, follow_up
 from study.evaluation.bank.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder, opened
-from study.evaluation.bank.reveal_cases import outcome_of
+from study.evaluation.bank.prove import outcome_of
 from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
 from study.evaluation.challenge.draw_bank import draw
 from study.store.disk.provenance import sha256_of

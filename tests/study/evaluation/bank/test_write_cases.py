@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.evaluation.bank.write_cases import truth_text, write_case
+from study.evaluation.bank.seal_cases import truth_text, write_case
 from study.evaluation.challenge.draw_case import Truth, draw_case
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording

@@ -7,8 +7,7 @@ import pytest
 
 from analysis.evaluation.reproduction.document import ReproductionError, reproduction_from_json
 from study.errors import LeftError, StudyError
-from study.evaluation.reproduction.reproduce_models import modelled
-from study.evaluation.reproduction.reproduce_paper import reproduce_paper
+from study.evaluation.reproduction.reproduce_paper import modelled, reproduce_paper
 from study.evaluation.reproduction.reproduce_recordings import Wanted, recorded
 from study.evaluation.reproduction.reproduction_plan import ReproducedProtocols, ReproductionPlan, Steps
 from study.store.disk.file_errors import UnusableFileError

@@ -6,7 +6,7 @@ from textual.app import App
 from textual.widgets._footer import FooterKey
 
 from study.session.views.views import PlayingNotice
-from study.tui.app.drawn_before import forget_drawn_before
+from study.tui.app.sitting_screens import forget_drawn_before
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.trial import TrialScreen
 

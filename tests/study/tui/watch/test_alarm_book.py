@@ -3,7 +3,7 @@
 import pytest
 
 from study.session.watching.watch_view import Alarm
-from study.tui.watch.alarm_book import RING_EVERY_S, AlarmBook
+from study.tui.watch.watch_screen import RING_EVERY_S, AlarmBook
 
 CLIPPED = Alarm("sensor", "clipped", "10:00")
 QUIET = Alarm("time near", "80 %", "10:00", urgent=False)

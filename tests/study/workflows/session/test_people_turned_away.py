@@ -9,7 +9,7 @@ import pytest
 
 from protocols.definition.preparation import ConsentSettings
 from protocols.document.dumping import dump_protocol
-from protocols.procedure.williams import williams_rows
+from protocols.procedure.schedule import williams_rows
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
 from study.participants.observers import observer_named
@@ -27,7 +27,7 @@ from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.participant_code import unfinished_sessions
+from study.workflows.session.plan_sitting import unfinished_sessions
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.views.list_sessions import session_lines
 from study.workflows.views.view_session import session_view
