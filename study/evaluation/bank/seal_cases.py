@@ -11,9 +11,9 @@ from typing import Any
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import label_at, seal
-from study.evaluation.challenge import second_engine
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
 from study.evaluation.challenge.draw_case import Case
+from study.evaluation.challenge.second_engine import second_engine
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model

@@ -10,9 +10,9 @@ from typing import Literal, cast
 
 import numpy as np
 
-from study.evaluation.challenge import second_engine
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS, Case, Concealed, draw_case
 from study.evaluation.challenge.rig import Rig
+from study.evaluation.challenge.second_engine import second_engine
 
 Kind = Literal["nothing", "single", "pair", "outside", "without"]
 Bank = Literal["main", "dirty", "engine"]

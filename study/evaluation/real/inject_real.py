@@ -18,7 +18,7 @@ from study.evaluation.bank.ask_engine import ask_engine, is_answered
 from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, opened
 from study.evaluation.bank.proof_seals import answer_at, broken_seal, is_of, label_at, seal
 from study.evaluation.bank.seal_cases import settings_text
-from study.evaluation.challenge.injections import fitting_injections, inject, place_of
+from study.evaluation.challenge.injection.injections import fitting_injections, inject, place_of
 from study.evaluation.real.diagnose_real import imported
 from study.evaluation.real.injected_halves import drawn_halves, held_out_change, without_lead
 from study.evaluation.real.real_folder import RealRecording

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.moved_axis import Moved
+from study.evaluation.challenge.injection.moved_axis import Moved
 
 Numbers = Mapping[str, float]
 

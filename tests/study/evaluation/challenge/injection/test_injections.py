@@ -7,9 +7,9 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from study.evaluation.challenge.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.injections import INJECTIONS, fitting_injections, inject, reading_of
-from study.evaluation.challenge.moved_axis import moved_axis
+from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
+from study.evaluation.challenge.injection.injections import INJECTIONS, fitting_injections, inject, reading_of
+from study.evaluation.challenge.injection.moved_axis import moved_axis
 
 RATE_HZ = 1000.0
 

@@ -21,9 +21,9 @@ from study.evaluation.challenge.draw_case import (
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
 from study.evaluation.challenge.hidden import Circumstances, Values
-from study.evaluation.challenge.mujoco_bench import MujocoBench, bare, linear, moved, with_delay
 from study.evaluation.challenge.nominal import as_model, calibrated, retuned
 from study.evaluation.challenge.rig import Rig
+from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, bare, linear, moved, with_delay
 from study.evaluation.challenge.sensor import RANGE_MPS2, read
 
 Build = Callable[[MujocoBench, int, Values], MujocoBench]

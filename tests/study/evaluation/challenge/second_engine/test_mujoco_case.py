@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.evaluation.challenge import second_engine
 from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.draw_case import EFFECTS
 from study.evaluation.challenge.drive_plan import multisine
 from study.evaluation.challenge.hidden import Circumstances
 from study.evaluation.challenge.rig import Rig
+from study.evaluation.challenge.second_engine import second_engine
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 pytest.importorskip("mujoco", reason="the extra `prove` (MuJoCo) is not installed")
@@ -25,7 +25,7 @@ ALONG_X = {
 
 @pytest.fixture(scope="module")
 def bench():
-    from study.evaluation.challenge.mujoco_bench import bare
+    from study.evaluation.challenge.second_engine.mujoco_bench import bare
 
     return bare(draw_bench(np.random.default_rng(50_021)))
 
@@ -43,8 +43,8 @@ def apart(one, other):
 
 @pytest.mark.parametrize("name", ALONG_X)
 def test_both_engines_know_the_same_physics(name, bench, command):
-    from study.evaluation.challenge.mujoco_bench import linear, moved
-    from study.evaluation.challenge.mujoco_case import BUILDERS
+    from study.evaluation.challenge.second_engine.mujoco_bench import linear, moved
+    from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS
 
     free, first = moved(bench, command), Device(linear(bench))
     travel, peak = np.abs(free[1]).max(axis=0), np.abs(free[0]).max(axis=0)
@@ -58,7 +58,7 @@ def test_both_engines_know_the_same_physics(name, bench, command):
 
 
 def test_a_contact_gives_way_as_much_as_its_spring_says(bench):
-    from study.evaluation.challenge.mujoco_bench import moved
+    from study.evaluation.challenge.second_engine.mujoco_bench import moved
 
     play = {"gap": 1e-4, "motor_mass": 0.06, "contact_stiffness": 3e5, "contact_damping": 20.0}
     pushed = np.tile([1.0, 0.0, 0.0], (3000, 1))
@@ -83,6 +83,6 @@ def test_what_the_engine_cannot_express_is_refused():
 
 
 def test_every_effect_of_its_list_can_be_built():
-    from study.evaluation.challenge.mujoco_case import BUILDERS, IN_THE_SENSOR
+    from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS, IN_THE_SENSOR
 
     assert set(second_engine.EFFECTS) == {*BUILDERS, *IN_THE_SENSOR}

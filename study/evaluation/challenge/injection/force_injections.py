@@ -12,8 +12,14 @@ from collections.abc import Callable
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.drive_injections import DRIVE_INJECTIONS, ForceInjection, Numbers, level_of, rms
-from study.evaluation.challenge.moved_axis import Moved
+from study.evaluation.challenge.injection.drive_injections import (
+    DRIVE_INJECTIONS,
+    ForceInjection,
+    Numbers,
+    level_of,
+    rms,
+)
+from study.evaluation.challenge.injection.moved_axis import Moved
 
 SHARP = 0.05
 """Of the rms speed, within which dry friction turns round."""

@@ -12,10 +12,10 @@ import numpy as np
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.drive_injections import ForceInjection
-from study.evaluation.challenge.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.moved_axis import moved_axis
-from study.evaluation.challenge.spoiled_readings import (
+from study.evaluation.challenge.injection.drive_injections import ForceInjection
+from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
+from study.evaluation.challenge.injection.moved_axis import moved_axis
+from study.evaluation.challenge.injection.spoiled_readings import (
     clip,
     cross,
     cubic,

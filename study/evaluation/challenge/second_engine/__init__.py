@@ -1,0 +1,1 @@
+"""Concealed cases from a second physics engine, MuJoCo: other integrator, other friction, other contacts."""
