@@ -44,6 +44,7 @@ SMALL_BESIDE_THEIR_IMPORTER = {
     "analysis/diagnosis/search/by_brief.py",
     "analysis/diagnosis/search/prune.py",
     "equalizer/effects/simulation/low_pass_kernel.py",
+    "study/devices/accelerometer/packet.py",
     "study/devices/block.py",
     "study/devices/glances.py",
     "study/devices/played.py",
