@@ -1,0 +1,38 @@
+"""What docs/architecture.md and docs/contributing.md say of the structure is so."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PACKAGES = ("protocols", "equalizer", "analysis", "study")
+APART = {"study/launcher"}
+"""Installed beside the packages: no room of theirs."""
+
+
+def rooms() -> set[str]:
+    modules = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py") if path.name != "__init__.py"]
+    return {path.parent.relative_to(ROOT).as_posix() for path in modules} - APART
+
+
+def test_every_room_is_in_the_architecture_and_every_room_there_exists():
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    named = re.findall(r"^\| `([a-z0-9_/]+)` \|", text, re.MULTILINE)
+    assert len(named) == len(set(named))
+    assert set(named) == rooms()
+
+
+@pytest.mark.parametrize("page", ["architecture.md", "contributing.md"])
+def test_every_path_in_a_page_exists(page):
+    roots = "|".join((*PACKAGES, "tests", "docs"))
+    paths = re.findall(rf"`((?:{roots})/[a-z0-9_/.]*)`", (DOCS / page).read_text("utf-8"))
+    assert len(paths) > 10
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+@pytest.mark.parametrize("room", sorted(rooms()))
+def test_a_room_says_what_is_in_it(room):
+    said = (ROOT / room / "__init__.py").read_text("utf-8")
+    assert said.startswith('"""') and len(said) > 40
