@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from study.workflows.results.analysis_files import WrittenAnalysis
+from study.workflows.results.written_analysis import WrittenAnalysis
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Results as one JSON document on stdout.")]
 

@@ -40,9 +40,9 @@ from study.tui.engine.to_engine import (
     ShowSession,
     Withdraw,
 )
-from study.workflows.results.analysis_files import WrittenAnalysis
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_results
+from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting

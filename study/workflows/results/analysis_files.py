@@ -1,29 +1,12 @@
 """What an analysis leaves in a folder. Apart from the analysis itself, which loads statistics and plots."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from study.errors import StudyError
 from study.store.disk.json_document import read_json
 from study.store.disk.provenance import sha256_of
 from study.store.disk.real_folder import is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
-
-if TYPE_CHECKING:
-    from analysis.psychophysics.thresholds import Threshold
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenAnalysis:
-    """What an analysis leaves behind, as a value for screen and command line."""
-
-    thresholds: "tuple[Threshold, ...]"
-    table: tuple[str, ...]
-    """Group means by frequency, as lines of text."""
-    warnings: tuple[str, ...]
-    report: Path
-
 
 ANALYSIS_NAME = "analysis"
 """Where an analysis goes, in the folder that was analysed, if nobody says otherwise."""

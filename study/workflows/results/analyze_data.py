@@ -24,8 +24,9 @@ from study.store.formats.recording_file import read_recording
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME, write_thresholds
 from study.store.sessions.written_elsewhere import note_written
 from study.workflows.picture_files import write_pictures
-from study.workflows.results.analysis_files import PAGE_NAME, WrittenAnalysis, written_by_analysis
+from study.workflows.results.analysis_files import PAGE_NAME, written_by_analysis
 from study.workflows.results.collect_sessions import Collected, collect_sessions
+from study.workflows.results.written_analysis import WrittenAnalysis
 
 
 def analyze_data(

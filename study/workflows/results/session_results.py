@@ -21,8 +21,9 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.log_seal import SEAL_NAME, write_seal
 from study.store.sessions.session_lock import locked
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
-from study.workflows.results.analysis_files import ANALYSIS_NAME, WrittenAnalysis
+from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
+from study.workflows.results.written_analysis import WrittenAnalysis
 
 REPORT_NAME = f"{ANALYSIS_NAME}/report.html"
 """The last file that the analysis of a session writes."""

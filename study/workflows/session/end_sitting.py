@@ -8,9 +8,10 @@ from study.session.facts.void_reasons import TOO_BUSY
 from study.session.views.counted import answers_are
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import locked
-from study.workflows.results.analysis_files import ANALYSIS_NAME, WrittenAnalysis, is_analysis_of
+from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.results.fold_session import FoldedSession
 from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables
+from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import Conducted
 from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
