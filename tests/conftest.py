@@ -140,9 +140,10 @@ def compiled_stub(vendor, tmp_path_factory) -> Path:
 
 @pytest.fixture
 def stub(vendor, compiled_stub, tmp_path, monkeypatch):
-    """A device of its own in wall time, which the driver finds as it finds the real library."""
+    """A device of its own in wall time, which the driver finds as it finds the real library, and accepted for hands."""
     monkeypatch.setenv("FDSDK", str(tmp_path / "sdk"))
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "none.toml"))
+    vendor.accept("omega.3")
     with vendor.copied(compiled_stub, tmp_path / "sdk") as one:
         yield one
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
+from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
 from study.devices.force_dimension.connect import make_ready
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import Library
@@ -90,6 +92,12 @@ class Stub:
         drops_after_s = make_ready(handle, model, cap_n, None)
         info: DeviceInfo = info_of(handle, handle.library, model, None)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, TrueSensor(self) if sensed else None, rests)
+
+
+def accept(device: str, on: str = "", details: str = "serial 4242, firmware 2.41, SDK 3.17.5.0") -> None:
+    """As an operator would have, today or on that day."""
+    today = datetime.now(UTC).date().isoformat()
+    write_acceptance(Acceptance(device, details, "the tests", on or today, 0.5, 0.03))
 
 
 class TrueSensor:

@@ -28,6 +28,13 @@ def doctor(
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="First wait until the handle is put into its calibration position.")
     ] = False,
+    accept: Annotated[
+        str | None,
+        typer.Option(
+            metavar="OPERATOR",
+            help="With no hand on the handle: prove with 0.5 N that the device lets go, and unlock it for hands.",
+        ),
+    ] = None,
     calibrate_sensor: Annotated[
         str | None,
         typer.Option(
@@ -55,6 +62,10 @@ def doctor(
         typer.echo(json.dumps(_document(examination), indent=2))
     else:
         _say(examination)
+    if accept is not None:
+        from study.workflows.checks.examine_setup import accept as sign
+
+        typer.echo(sign(device, examination, accept), err=True)
     if examination.exit_code:
         raise typer.Exit(examination.exit_code)
 

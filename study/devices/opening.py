@@ -3,7 +3,10 @@
 The heavy parts (numba above all) are imported when a device is opened, so that the command line starts at once.
 """
 
+import contextlib
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceSettings
@@ -79,3 +82,25 @@ def calibrate_accelerometer(port: str, baud: int, before_each: Callable[[str], N
     from study.devices.accelerometer.six_positions import calibrate_on_table
 
     return calibrate_on_table(port, baud, before_each)
+
+
+def accept_device(name: str, settings: DeviceSettings, clock: Clock, operator: str) -> str:
+    """Hold a small force with no hand on the handle, stop the loop on purpose, and sign that the device let go.
+
+    What was written, in a sentence. Raises `DeviceError`. What else is to be fine, the caller has found fine before.
+    """
+    from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
+    from study.devices.force_dimension.force_proof import FORCE_N, prove_force_goes
+    from study.devices.rigs_by_name import RIGS_BY_NAME
+    from study.devices.safe import SafeDevice
+
+    rig: Any = RIGS_BY_NAME[name](replace(settings, hand_on_handle=False), 0)
+    try:
+        device = SafeDevice(rig, replace(settings, hand_on_handle=False), clock)
+        with contextlib.closing(device):
+            gone_after_s = prove_force_goes(device, rig)
+    finally:
+        rig.close()
+    today = clock.utc()[:10]
+    path = write_acceptance(Acceptance(device.info.name, device.info.details, operator, today, FORCE_N, gone_after_s))
+    return f"{device.info.name}: a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"

@@ -69,6 +69,7 @@ class ForceDimensionRig:
         self._pressed: frozenset[int] = frozenset()
         self._sending = threading.Lock()
         self._sent_s, self._sent_zero = time.monotonic(), True
+        self._withheld_until_s = 0.0
         self._failure: DeviceError | None = None
         self._closed, self._let_go = threading.Event(), False
         if rests and drops_force_after_s > 0:
@@ -99,6 +100,8 @@ class ForceDimensionRig:
 
     def write(self, force_n: FloatArray) -> None:
         x, y, z = (float(component) for component in force_n)
+        if time.monotonic() < self._withheld_until_s:
+            return
         norm = math.sqrt(x * x + y * y + z * z)
         if norm == 0.0:
             self._write_zero()
@@ -117,7 +120,21 @@ class ForceDimensionRig:
         finally:
             self._sending.release()
 
+    def withhold(self, seconds: float) -> float:
+        """As if the loop had stopped: for so long nothing is sent, zeros neither. When the last force was sent, s."""
+        with self._sending:
+            self._withheld_until_s = time.monotonic() + seconds
+            return self._sent_s
+
+    def force_on(self) -> bool:
+        """Whether the device takes forces just now, as it says. From any thread. Raises `DeviceError`."""
+        try:
+            return self._handle.status().force_on
+        except LibraryError as error:
+            raise self._failed(f"The library says: {error}") from error
+
     def close(self) -> None:
+        self._withheld_until_s = 0.0
         self._closed.set()
         got = self._sending.acquire(timeout=LOCK_S)
         try:

@@ -1,9 +1,11 @@
 """Builds the rig of a named device: library, device, watchdog and its proof, gravity compensation."""
 
 import time
+from datetime import UTC, datetime
 
 from study.devices.accelerometer.serial_reader import SerialAccelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
+from study.devices.force_dimension.acceptance import check_accepted
 from study.devices.force_dimension.connect import failed, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, read_lab
@@ -37,11 +39,13 @@ def _rig(
 ) -> ForceDimensionRig:
     handle = open_model(library, model)
     try:
+        info = info_of(handle, library, model, lab.effective_mass_kg)
+        if settings.hand_on_handle:
+            check_accepted(info, datetime.now(UTC).date())
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
         drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
         if drops_after_s > 0:
             prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
-        info = info_of(handle, library, model, lab.effective_mass_kg)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
         handle.let_go()

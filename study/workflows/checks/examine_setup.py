@@ -7,8 +7,8 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import examine_device, open_device
-from study.errors import DeviceError, ExitCode
+from study.devices.opening import accept_device, examine_device, needs_real_time, open_device
+from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
@@ -20,6 +20,9 @@ from study.workflows.device_settings import device_settings
 
 PROTOCOL = "direction_threshold"
 """Its limits are those that the device is opened with."""
+
+NOT_NEEDED = ("Accelerometer",)
+"""It measures, and nothing of the force depends on it."""
 
 SPARE_S = 5.0
 """Beyond the timing's length, before the safety layer ends it."""
@@ -58,7 +61,7 @@ def examine_setup(
 def _examine_device(
     name: str, timing_s: float, on_progress: Callable[[float], None]
 ) -> tuple[DeviceReport, Timing | None]:
-    clock, settings = RealClock(), _settings(timing_s)
+    clock, settings = RealClock(), _settings(name, timing_s)
     driver = examine_device(name)
     report = DeviceReport(name, simulated=False, findings=driver)
     if any(finding.wrong for finding in driver):
@@ -81,9 +84,22 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
     return replace(timing, findings=(*timing.findings, load))
 
 
-def _settings(timing_s: float) -> DeviceSettings:
+def _settings(name: str, timing_s: float) -> DeviceSettings:
     """As for a study, but without the centring spring: nothing is to move while the loop is timed."""
     settings = device_settings(read_study_protocol(PROTOCOL).protocol)
     longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
     limits = replace(settings.limits, longest_hold_s=longest_s)
-    return replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
+    still = replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
+    return replace(still, hand_on_handle=False) if needs_real_time(name) else still
+
+
+def accept(name: str, examination: Examination, operator: str) -> str:
+    """Sign that the device may be held, after an examination with its timing. Raises `DeviceError`, WrongUseError."""
+    if not needs_real_time(name):
+        raise WrongUseError("There is nothing to accept", f"{name!r} moves no hand.", "Leave --accept out.")
+    timing = examination.timing
+    hinders = [finding for finding in examination.findings if finding.wrong and finding.name not in NOT_NEEDED]
+    if timing is None or hinders:
+        found = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
+        raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
+    return accept_device(name, _settings(name, 0.0), RealClock(), operator)

@@ -8,6 +8,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.force_dimension import connect
+from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.usb import Plugged
 from study.devices.opening import REAL, open_device
 from study.errors import DeviceError, ExitCode
@@ -43,7 +44,8 @@ def test_it_opens_says_what_it_is_and_ends_braked(stub, opened, rigs):
 
 
 @pytest.mark.parametrize(("name", "system_type"), [("omega6", 36), ("omega7", 35), ("delta3", 63), ("sigma7", 104)])
-def test_the_vendor_s_other_devices_open_by_their_names(stub, opened, name, system_type):
+def test_the_vendor_s_other_devices_open_by_their_names(stub, vendor, opened, name, system_type):
+    vendor.accept(MODELS[name].name)
     stub.set("type", system_type)
     with opened(name) as device:
         assert device.info.name.replace(".", "") == name

@@ -1,0 +1,127 @@
+"""A device is locked for hands until an operator has signed that it lets go, and again when it changes."""
+
+import contextlib
+import json
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from study.cli.main import main
+from study.devices.clock import RealClock
+from study.devices.force_dimension import force_proof, watchdog_proof
+from study.devices.force_dimension.acceptance import VALID_FOR, acceptance_file
+from study.devices.opening import accept_device, open_device
+from study.errors import DeviceError
+from study.workflows.checks import examine_setup
+
+TODAY = datetime.now(UTC).date()
+
+
+@pytest.fixture
+def locked(stub):
+    acceptance_file().unlink()
+    return stub
+
+
+def open_for_a_hand(rigs) -> None:
+    open_device("omega3", rigs.SETTINGS, RealClock(), 1).close()
+
+
+def refused(rigs) -> str:
+    with pytest.raises(
+        DeviceError, match=r"omega\.3 is locked for hands.*hapteq doctor --device omega3 --accept"
+    ) as no:
+        open_for_a_hand(rigs)
+    return no.value.happened
+
+
+def test_what_was_never_accepted_opens_for_no_hand(locked, rigs):
+    assert "There is no acceptance of it" in refused(rigs)
+    assert locked.safe and locked.get("opened") == 0
+    with contextlib.closing(open_device("omega3", replace(rigs.SETTINGS, hand_on_handle=False), RealClock(), 1)):
+        assert locked.get("force_on")
+
+
+@pytest.mark.parametrize(
+    ("details", "said"),
+    [
+        ("serial 4243, firmware 2.41, SDK 3.17.5.0", "serial 4243"),
+        ("serial 4242, firmware 2.40, SDK 3.17.5.0", "firmware 2.40"),
+        ("serial 4242, firmware 2.41, SDK 3.16.1.0", "SDK 3.16.1.0"),
+    ],
+)
+def test_another_device_firmware_or_library_voids_it(stub, vendor, rigs, details, said):
+    vendor.accept("omega.3", details=details)
+    assert f"Another was accepted (omega.3, {details})" in refused(rigs) and said in details
+
+
+def test_it_expires_and_does_not_begin_in_the_future(stub, vendor, rigs):
+    vendor.accept("omega.3", on=(TODAY - VALID_FOR).isoformat())
+    open_for_a_hand(rigs)
+    for day in (TODAY - VALID_FOR - timedelta(days=1), TODAY + timedelta(days=2)):
+        vendor.accept("omega.3", on=day.isoformat())
+        assert f"It was accepted on {day}" in refused(rigs)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "hapteq-acceptance"}', "null", "\x00"])
+def test_a_file_that_is_no_acceptance_unlocks_nothing(stub, rigs, text):
+    acceptance_file().write_text(text)
+    assert "is no acceptance" in refused(rigs)
+
+
+def without_spring(rigs):
+    return replace(rigs.SETTINGS, spring_frequency_hz=0.0)
+
+
+@pytest.fixture
+def patient(stub, monkeypatch):
+    """The firmware waits longer, since the computer of the tests is late; so does the proof."""
+    stub.set("watchdog_stretch", 10)
+    for module in (watchdog_proof, force_proof):
+        monkeypatch.setattr(module, "MARGIN_S", 0.7)
+    monkeypatch.setattr(force_proof, "WITHHELD_S", 2.0)
+    return stub
+
+
+@pytest.mark.real_time
+def test_a_device_that_lets_go_under_force_is_accepted_and_then_opens(locked, patient, rigs):
+    said = accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
+    assert "a force of 0.5 N was gone" in said
+    document = json.loads(acceptance_file().read_text())
+    assert (document["operator"], document["device"], document["force_n"]) == ("Ada", "omega.3", 0.5)
+    assert 0.25 < document["gone_after_s"] < 2.0
+    assert 0.4 < locked.get("peak_n") < 1.0
+    assert locked.safe
+    open_for_a_hand(rigs)
+
+
+@pytest.mark.real_time
+def test_a_device_whose_force_stays_is_not(locked, patient, rigs, monkeypatch):
+    """Its watchdog passes the proof at opening, and fails under force."""
+    prove = force_proof.prove_force_goes
+
+    def broken(device, rig) -> float:
+        locked.set("watchdog_works", 0)
+        return prove(device, rig)
+
+    monkeypatch.setattr(force_proof, "prove_force_goes", broken)
+    with pytest.raises(DeviceError, match="was not accepted"):
+        accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
+    assert not acceptance_file().exists()
+    assert locked.safe and locked.get("peak_n") < 1.0
+
+
+@pytest.mark.parametrize("arguments", [["--timing", "0"], ["--timing", "0.1"]])
+def test_without_timing_or_with_something_wrong_nothing_is_signed(locked, tmp_path, monkeypatch, arguments):
+    if arguments[1] != "0":
+        locked.set("powered", 0)
+    called: list[str] = []
+    monkeypatch.setattr(examine_setup, "accept_device", lambda *_: called.append("signed"))
+    assert main(["doctor", "--device", "omega3", "--data", str(tmp_path), "--accept", "Ada", *arguments]) == 3
+    assert not called and not acceptance_file().exists()
+    assert locked.safe
+
+
+def test_a_simulated_device_needs_no_acceptance(tmp_path):
+    assert main(["doctor", "--data", str(tmp_path), "--timing", "0", "--accept", "Ada"]) == 2
