@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from study.devices.opening import DEVICES
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
@@ -143,7 +144,8 @@ def test_a_data_folder_that_is_not_there_is_empty(tmp_path, name):
         "direction_training",
         "equalized_threshold",
     ]
-    assert view.devices == ("simulated",)
+    assert view.devices == DEVICES
+    assert view.devices[0] == "simulated"
 
 
 def test_protocols_beside_the_data_are_offered_and_bad_ones_with_their_problem(data, small_text):
