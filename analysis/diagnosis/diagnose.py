@@ -38,7 +38,7 @@ from analysis.diagnosis.types import Mapper, Patience, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.law_entry import LawEntry, kept_effects
 from equalizer.effects.placing import place_of_effect
-from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
 WEIGHED = ("force_deadband", "force_saturation")
@@ -164,7 +164,9 @@ class _Seen:
 
 def _arena(look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
     measure = look.chosen.measure
-    tuning = tuning_of(look.model, measure.records[0].recording.command.channels)
+    recording = measure.records[0].recording
+    model = with_units_of(look.model, recording.command.units, recording.response.units)
+    tuning = tuning_of(model, recording.command.channels)
     return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 
 

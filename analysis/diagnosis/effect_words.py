@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from analysis.diagnosis.document import Estimate
 from analysis.diagnosis.unit_wording import percent_text, value_text
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
+from equalizer.signals.unit_system import UnitSystem
 
 _BARE = "{}"
 
@@ -181,12 +182,13 @@ def _words(effect: str) -> EffectWords | None:
     return EFFECT_WORDS.get(effect) if law is None else law.words
 
 
-def si_unit(effect: str, parameter: str, rotational: bool) -> str:
+def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
     """Of a parameter; 1 where it is not known."""
     if effect in LAW_WORDS:
-        return LAW_WORDS[effect].units.get(parameter, ("1", "1"))[rotational]
+        linear, turning = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
+        return turning if system.rotational else system.of(linear)
     known = EFFECTS_BY_NAME.get(effect)
-    units = {} if known is None else {each.name: each.unit_in(rotational, "1") for each in known.parameters}
+    units = {} if known is None else {each.name: each.unit_in(system, "1") for each in known.parameters}
     return units.get(parameter, "1")
 
 

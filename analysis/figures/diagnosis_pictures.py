@@ -15,7 +15,7 @@ def diagnosis_pictures(found: Findings) -> tuple[Picture, ...]:
     """Only what there is data for."""
     # Where a motion is imposed and the force measured, levels are the motion's, in a unit of their own.
     imposed = any(unit.startswith("N") for course in found.courses for unit in course.units)
-    unit = "" if imposed else "N m" if found.given.rotational else "N"
+    unit = "" if imposed else found.given.system.force
     pictures = [*mismatch_map_pictures(found.maps, unit), *state_map_pictures(found.state_maps)]
     pictures += [*signature_pictures(found.signatures)]
     pictures += rivals_pictures(found.explanation, found.axes or ("x", "y", "z"))

@@ -17,6 +17,7 @@ from equalizer.laws.units import FORCE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem
 
 LETTERS, DERIVATIVES, COMMAND = "xyz", ("", "v", "a"), "f"
 LARGEST, STEEPEST = 1e15, 20.0
@@ -55,7 +56,7 @@ def law_effect(law: Law, channels: Channels = Channels()) -> Effect:
     )
 
 
-def law_units(law: Law, channels: Channels, rotational: bool) -> tuple[str, ...]:
+def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
     """Of its free numbers: those that it says, else as far as its formula tells them."""
     if law.units:
         return law.units
@@ -65,7 +66,7 @@ def law_units(law: Law, channels: Channels, rotational: bool) -> tuple[str, ...]
     for letter in LETTERS:
         signals |= {prefix + letter: orders[number] for number, prefix in enumerate(DERIVATIVES)}
         signals[COMMAND + letter] = FORCE
-    return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, rotational)
+    return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
 
 
 def law_values(law: Law) -> Values:

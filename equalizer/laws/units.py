@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from equalizer.laws.tree import Apply, Free, Node, Number, Variable
+from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Dimension = tuple[float, float, float]
 """Powers of the force's unit, of the position's, of the second."""
@@ -17,19 +18,23 @@ def motion_dimension(order: int) -> Dimension:
 
 
 def units_of(
-    tree: Node, numbers: Sequence[float], signals: Mapping[str, Dimension], wanted: Dimension, rotational: bool = False
+    tree: Node,
+    numbers: Sequence[float],
+    signals: Mapping[str, Dimension],
+    wanted: Dimension,
+    system: UnitSystem = LINEAR,
 ) -> tuple[str, ...]:
     """Of p0, p1, … ; `?` where the formula leaves one open, as of one of two factors. wanted: of the law's value."""
     reader = _Reader(numbers, signals)
     for _ in range(2):  # what is found on the right may tell of the left
         reader.assign(tree, wanted)
-    symbols = ("N m", "rad", "s") if rotational else ("N", "m", "s")
+    symbols = (system.force, system.length, "s")
     return tuple(_text(reader.found[place], symbols) if place in reader.found else "?" for place in range(len(numbers)))
 
 
 def _text(dimension: Dimension, symbols: tuple[str, str, str]) -> str:
-    above = [_power(name, power) for name, power in zip(symbols, dimension, strict=True) if power > 0]
-    below = [_power(name, -power) for name, power in zip(symbols, dimension, strict=True) if power < 0]
+    above = [_power(name, power) for name, power in zip(symbols, dimension, strict=True) if power > 0 and name != "1"]
+    below = [_power(name, -power) for name, power in zip(symbols, dimension, strict=True) if power < 0 and name != "1"]
     over = " ".join(above) or "1"
     under = " ".join(below)
     return f"{over}/{f'({under})' if len(below) > 1 else under}" if below else over

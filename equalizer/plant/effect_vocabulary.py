@@ -9,6 +9,8 @@ which numbers it has. Meanings: `gap` is the total play, `width` half the dead b
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from equalizer.signals.unit_system import ROTATIONAL, UnitSystem
+
 Place = Literal["mechanism", "hand", "actuator", "sensor"]
 PLACES: tuple[Place, ...] = get_args(Place)
 
@@ -25,9 +27,11 @@ class EffectParameter:
     optional: bool = False
     """A file may leave it out; needed to play an effect again just as it was fitted."""
 
-    def unit_in(self, rotational: bool, response_unit: str) -> str:
-        """The unit in a model whose response is in `response_unit`."""
-        unit = self.rotational_unit if rotational else self.unit
+    def unit_in(self, system: UnitSystem, response_unit: str) -> str:
+        """The unit in a model of these units whose response is in `response_unit`."""
+        unit = {False: self.unit, True: self.rotational_unit, None: system.of(self.unit)}[system.rotational]
+        if system.rotational is None and self.unit == ROTATIONAL.force:
+            unit = system.force
         if unit == f"1/{RESPONSE}^2":
             return f"1/({response_unit})^2"
         return response_unit if unit == RESPONSE else unit
@@ -67,6 +71,15 @@ def _damping(name: str) -> EffectParameter:
 
 def _mass(name: str) -> EffectParameter:
     return _number(name, "kg", "kg m^2")
+
+
+MATRIX_UNITS = {"mass": _mass("mass"), "damping": _damping("damping"), "stiffness": _stiffness("stiffness")}
+"""Of a model's matrices."""
+
+
+def matrix_unit(part: str, system: UnitSystem) -> str:
+    """part: mass, damping or stiffness."""
+    return MATRIX_UNITS[part].unit_in(system, "1")
 
 
 EFFECT_NAMES: tuple[EffectName, ...] = (

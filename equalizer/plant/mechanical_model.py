@@ -3,8 +3,8 @@
 M a + D v + K q = B u, y = C q (or its rate of change, by `quantity`); plus sensor, actuator and effects.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
 
 DERIVATIVE_OF_QUANTITY = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
@@ -98,6 +99,8 @@ class MechanicalModel:
     tolerance: Tolerance | None = None
     rotational: bool = False
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    units: UnitSystem | None = None
+    """Of its numbers, where commands are currents, say; None = as `rotational` says."""
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness", "input", "output"):
@@ -107,6 +110,10 @@ class MechanicalModel:
         problems = tuple(_problems(self))
         if problems:
             raise MechanicalModelError(problems)
+
+    @property
+    def system(self) -> UnitSystem:
+        return self.units or (ROTATIONAL if self.rotational else LINEAR)
 
     @property
     def coordinates(self) -> int:
@@ -119,6 +126,16 @@ class MechanicalModel:
     @property
     def outputs(self) -> int:
         return int(self.output.shape[0])
+
+
+def with_units_of(model: MechanicalModel, commands: Sequence[str], responses: Sequence[str]) -> MechanicalModel:
+    """The model with the units of its recordings: where its input and output convert nothing, its numbers are in them,
+    whatever they are. commands, responses: their units."""
+    plain = all(np.isin(matrix, (0.0, 1.0)).all() for matrix in (model.input, model.output))
+    found = system_of(commands, responses)
+    if model.units is not None or not plain or found.rotational is not None:
+        return model
+    return replace(model, units=found)
 
 
 def nearest(word: str, allowed: tuple[str, ...]) -> str:

@@ -21,10 +21,14 @@ from equalizer.plant.mechanical_model import (
     nearest,
 )
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem
 
 MATRICES = ("mass", "damping", "stiffness", "input", "output")
 _MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
 _TABLES = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
+
+UNITS = "units"
+"""Of the provenance: of the commands and the motion, where the model's numbers are not in SI."""
 
 Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
 
@@ -49,6 +53,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
         problems.append(f"rotational is {_said(rotational)}; it must be true or false")
     if problems:
         raise MechanicalModelError(tuple(problems))
+    origin = _table(document, "provenance", problems)
     return MechanicalModel(
         name=words["name"],
         quantity=words["quantity"],
@@ -62,7 +67,8 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
         effects=effects,
         tolerance=tolerance,
         rotational=rotational,
-        provenance=_table(document, "provenance", problems),
+        provenance=origin,
+        units=_units(origin),
     )
 
 
@@ -82,9 +88,17 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
         )
     if model.tolerance is not None:
         lines += _section("[tolerance]", asdict(model.tolerance))
-    if model.provenance:
-        lines += _section("[provenance]", model.provenance)
+    origin = {**model.provenance, **({} if model.units is None else {UNITS: asdict(model.units)})}
+    if origin:
+        lines += _section("[provenance]", origin)
     return "\n".join(lines) + "\n"
+
+
+def _units(origin: Mapping[str, Any]) -> UnitSystem | None:
+    """Of numbers that are not in SI, as a program of ours writes them down."""
+    said = origin.get(UNITS)
+    words = {key: value for key, value in said.items() if isinstance(value, str)} if isinstance(said, dict) else {}
+    return UnitSystem(words["force"], words["length"]) if {"force", "length"} <= set(words) else None
 
 
 def _unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:

@@ -36,6 +36,14 @@ CleanOption = Annotated[
     ),
 ]
 
+ForceConstantOption = Annotated[
+    list[float] | None,
+    typer.Option(
+        help="N or N m that an ampere, a volt or a unit of a command gives, where commands are no forces; once for "
+        "all, or once for each."
+    ),
+]
+
 EffectFileOption = Annotated[
     list[Path] | None,
     typer.Option(metavar="EFFECT.py", help="A law of your own to look for, of `hapteq effect`; may be repeated."),
@@ -65,6 +73,7 @@ def diagnose(
     seconds: SecondsOption = None,
     discovery: DiscoveryOption = False,
     effect_file: EffectFileOption = None,
+    force_constant: ForceConstantOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Locate the mismatch, name what is missing, and test it on held-out data.
@@ -77,6 +86,7 @@ def diagnose(
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
+    plan = replace(plan, force_constants=tuple(force_constant or ()))
     with steps("Diagnosing") as show:
         answer = answered(plan, show)
     found = answer.findings

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from study.cli.diagnose import ForceConstantOption
 from study.cli.results import JsonOption
 
 
@@ -13,6 +14,7 @@ def model(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings of one device.", metavar="REC.h5...")],
     out: Annotated[Path, typer.Option(help="The mechanical model to write, MODEL.toml.")],
     structure: Annotated[str, typer.Option(help="auto, mass-spring, two-mode, gravity, massless or motor.")] = "auto",
+    force_constant: ForceConstantOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fit masses, dampers and springs to recordings, and write them with tolerances.
@@ -27,7 +29,7 @@ def model(
         fit_first_model,
     )
 
-    plan = FirstModelPlan(tuple(recordings), out, structure)
+    plan = FirstModelPlan(tuple(recordings), out, structure, tuple(force_constant or ()))
     with late_bar("Model (%)", total=100) as show:
         done = fit_first_model(plan, lambda share: show(round(100 * share)))
     typer.echo(json.dumps(first_model_summary(done), indent=2) if as_json else "\n".join(first_model_lines(done)))

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, PLACES, RESPONSE
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 from equalizer.signals.units import parse_unit
 
 DESIGN = Path(__file__).parents[2].parent / "shared" / "design.md"
@@ -40,7 +41,7 @@ def test_every_unit_is_one_that_files_may_use():
 def test_units_follow_the_model_and_its_response():
     level, cubic = EFFECTS_BY_NAME["coulomb_friction"].main, EFFECTS_BY_NAME["sensor_nonlinearity"].main
     clipping = EFFECTS_BY_NAME["sensor_clipping"].main
-    assert level.unit_in(rotational=False, response_unit="m/s^2") == "N"
-    assert level.unit_in(rotational=True, response_unit="rad") == "N m"
-    assert clipping.unit_in(rotational=False, response_unit="m/s^2") == "m/s^2"
-    assert cubic.unit_in(rotational=False, response_unit="m/s^2") == "1/(m/s^2)^2"
+    assert level.unit_in(system=LINEAR, response_unit="m/s^2") == "N"
+    assert level.unit_in(system=ROTATIONAL, response_unit="rad") == "N m"
+    assert clipping.unit_in(system=LINEAR, response_unit="m/s^2") == "m/s^2"
+    assert cubic.unit_in(system=LINEAR, response_unit="m/s^2") == "1/(m/s^2)^2"

@@ -40,7 +40,6 @@ CROWDED = {
 SMALL_BESIDE_THEIR_IMPORTER = {
     "analysis/diagnosis/discovery/along.py",
     "analysis/diagnosis/result/error_table.py",
-    "analysis/diagnosis/result/unit_doubt.py",
     "analysis/diagnosis/search/by_brief.py",
     "analysis/diagnosis/search/prune.py",
     "equalizer/effects/simulation/low_pass_kernel.py",

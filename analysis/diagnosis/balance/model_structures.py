@@ -15,9 +15,11 @@ from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
 from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.plant.effect_vocabulary import matrix_unit
 from equalizer.plant.linear_simulation import driven_axes
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, with_units_of
 from equalizer.signals.recording import Recording
+from equalizer.signals.unit_system import UnitSystem
 
 Kind = Literal["mass-spring", "two-mode", "gravity", "massless", "motor"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -109,7 +111,14 @@ def structure_of(given: Balanced, kind: Kind) -> StructureFit:
         raise StructureRefused(f"its numbers are no mechanism: {problem}") from problem
     names = given.recording.command.channels
     return StructureFit(
-        kind, model, _numbers(given, fit, parts), tuple(fit.held_out.tolist()), names, FORCE, fit, _remarks(given, kind)
+        kind,
+        model,
+        _numbers(given, fit, (model.system, parts)),
+        tuple(fit.held_out.tolist()),
+        names,
+        FORCE,
+        fit,
+        _remarks(given, kind),
     )
 
 
@@ -128,8 +137,18 @@ def modal(recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[fl
     errors = tuple(one.fit if one.held_out is None else one.held_out for one in fit.errors)
     remarks = (*(f"{text[:1].upper()}{text[1:].rstrip('.')}." for text in fit.remarks),)
     channels = recordings[0].response.channels
-    model = opened(fit.model)
-    return StructureFit(kind, model, _modal_numbers(fit.model, recordings[0]), errors, channels, MOTION, None, remarks)
+    first = recordings[0]
+    model = with_units_of(opened(fit.model), first.command.units, first.response.units)
+    return StructureFit(
+        kind,
+        model,
+        _modal_numbers(replace(fit.model, units=model.units), first),
+        errors,
+        channels,
+        MOTION,
+        None,
+        remarks,
+    )
 
 
 def plainest(fits: Sequence[StructureFit]) -> StructureFit:
@@ -173,6 +192,7 @@ def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
         damping = np.diag(np.diagonal(damping))
     eye = np.eye(len(mass))
     own = [fit.deviations[part] or None for part in PARTS]
+    recording = given.recording
     model = MechanicalModel(
         NAME.format(kind), given.recording.response.quantities[0], mass, damping, stiffness, eye, eye,
         tolerance=Tolerance(own[0], own[1], own[2], None), rotational=given.rotational,
@@ -181,7 +201,7 @@ def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
     assert wide.tolerance is not None
     sizes = wide.tolerance
     stated = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
-    return replace(wide, tolerance=stated)
+    return with_units_of(replace(wide, tolerance=stated), recording.command.units, recording.response.units)
 
 
 def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -191,10 +211,10 @@ def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
 
 
-def _numbers(given: Balanced, fit: JointFit, parts: Sequence[Part]) -> tuple[Number, ...]:
-    names = given.recording.command.channels
+def _numbers(given: Balanced, fit: JointFit, said: tuple[UnitSystem, Sequence[Part]]) -> tuple[Number, ...]:
+    names, (system, parts) = given.recording.command.channels, said
     return tuple(
-        Number(f"{part} {name}", _unit(part, given.rotational), float(fit.matrices[part][k, k]),
+        Number(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
                float(fit.halves[part][k, k]))
         for part in parts
         for k, name in enumerate(names)
@@ -208,18 +228,13 @@ def _modal_numbers(model: MechanicalModel, recording: Recording) -> tuple[Number
     for part, matrix, one in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
         values = np.einsum("ni,nk,ki->i", along, matrix, along)
         for name, value in zip(recording.command.channels, values.tolist(), strict=True):
-            found.append(Number(f"{part} {name}", _unit(part, model.rotational), value, one and 1.96 * one))
+            found.append(Number(f"{part} {name}", matrix_unit(part, model.system), value, one and 1.96 * one))
     inner = model.coordinates - model.inputs
     if inner > 0:
         squares = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real
         swing = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
         found += [Number(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(swing.tolist()), start=1)]
     return tuple(found)
-
-
-def _unit(part: Part, rotational: bool) -> str:
-    units = ("kg m^2", "N m s/rad", "N m/rad") if rotational else ("kg", "N s/m", "N/m")
-    return units[PARTS.index(part)]
 
 
 def _remarks(given: Balanced, kind: Kind) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.observed_parts import parts_of
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.unit_system import system_of
 
 
 def is_reduced(balances: Sequence[Balance]) -> bool:
@@ -96,7 +97,6 @@ def _driven(
     if order == 2:
         for number, (start, stop) in enumerate(parts, begin):
             samples[start:stop] = regression.motions[number].position
-        turning = [unit.startswith("rad") for unit in units]
-        quantities = tuple("angle" if turns else "position" for turns in turning)
-        units = tuple("rad" if turns else "m" for turns in turning)
+        units = tuple(system_of(recording.command.units, (unit,)).length for unit in units)
+        quantities = tuple("angle" if unit == "rad" else "position" for unit in units)
     return replace(measured, samples=samples, quantity=quantities, unit=units).picked(places), order == 2

@@ -36,7 +36,7 @@ def with_laws(searched: Searched, progress: Progress, patient: Patience) -> Sear
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
-        return replace(searched, remarks=(*searched.remarks, _candidate(found, reasons)))
+        return replace(searched, remarks=(*searched.remarks, _candidate(arena, found, reasons)))
     return Searched(arena, checked, judged, errors=None if checked.errors is None else checked.errors[1])
 
 
@@ -69,11 +69,11 @@ def _beats_names(arena: Arena, searched: Searched, found: Discovered) -> bool:
     return all(beats(found.found.after, rival) for rival in rivals)
 
 
-def _candidate(found: Discovered, reasons: tuple[str, ...]) -> str:
+def _candidate(arena: Arena, found: Discovered, reasons: tuple[str, ...]) -> str:
     """A sentence."""
     after, retuned = found.found.after, found.found.retuned
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
-    said = " and ".join(f"F{law.axis} = {law.text} N" for law in laws)
+    said = " and ".join(f"F{law.axis} = {law.text} {arena.tuning.model.system.force}" for law in laws)
     less = float(np.exp(_sealed(after) - _sealed(retuned)))
     gain = f", which leaves {100 * less:.3g} % of the re-tuned model's error on held-out data" if less < 1 else ""
     return (

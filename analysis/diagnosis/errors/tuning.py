@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 
 from analysis.diagnosis.settings import UNSTATED_MODES, UNSTATED_SHARE
+from equalizer.plant.effect_vocabulary import MATRIX_UNITS, matrix_unit
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
@@ -65,7 +66,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
         [np.full(len(pairs), deviation) for deviation in grounded]
         + [np.full(len(modes), relative * more) for more in (1.0, 1.0, DAMPING_PER_MODES)]
     )
-    units = ("kg m^2", "N m s/rad", "N m/rad") if model.rotational else ("kg", "N s/m", "N/m")
+    units = [matrix_unit(part, model.system) for part in MATRIX_UNITS]
     return Tuning(
         model,
         tuple(names),

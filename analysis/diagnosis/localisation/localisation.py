@@ -79,7 +79,7 @@ def _states(
     if best is not None and best.place == "sensor":
         channels = recording.response.channels if best.axis is None else (best.axis,)
         return tied_errors(evidence, recording, cells, channels)
-    return tied_forces(evidence, recording, cells, tuning.model.rotational)
+    return tied_forces(evidence, recording, cells, tuning.model.system)
 
 
 # Where a mismatch can enter a given model: as a force along an axis, or as an error of a sensor.

@@ -16,6 +16,7 @@ from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem
 
 _SEED = 20
 _DRIVEN = 0.02
@@ -23,7 +24,7 @@ _DRIVEN = 0.02
 
 
 def tied_forces(
-    evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], rotational: bool
+    evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], system: UnitSystem
 ) -> tuple[StateMismatch, ...]:
     """Of the missing force along each driven axis that has a significant cell. p-values are corrected for all regions
     that were looked at."""
@@ -33,7 +34,8 @@ def tied_forces(
         if not mine:
             continue
         letter = axis_letter(channel, recording.command.channels)
-        length, speed = ("rad", "ω") if rotational else ("m", "v")
+        length = system.length
+        speed = "ω" if length == "rad" else "v"
         command = evidence.command[:, k]
         states = [
             State("position", letter if len(letter) == 1 else "x", length, evidence.axis_position[:, k]),

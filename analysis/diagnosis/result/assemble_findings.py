@@ -10,6 +10,7 @@ from analysis.diagnosis.document import Diagnosis, Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import without_claim
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
+from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation, localised
 from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
@@ -20,7 +21,7 @@ from analysis.diagnosis.result.findings import BlackBox, Course, Findings, Signa
 from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.result.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.result.signature_curves import Names, signature_of
-from analysis.diagnosis.result.unit_doubt import unit_sentences
+from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.learn_clean_floor import learned_sentence
@@ -67,7 +68,7 @@ def assembled(
         mismatch=maps.rows,
         signatures=_signatures(arena, found, said),
         black_box=_black_box(measure, found, document),
-        remarks=_remarks(learned_sentence(learned, channels), *unit_sentences(courses), *_of_noise(floors)),
+        remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),
         maps=maps.cells,
         local=local,
         floor=floors[0],
@@ -86,12 +87,12 @@ def _black_box(measure: ErrorMeasure, found: Explanation, document: Diagnosis) -
     return black_box(measure, found.retuned, numbers, document.fit.test.after)
 
 
-def _of_noise(floors: tuple[NoiseFloor, ...]) -> list[str]:
-    return [remark for floor in floors for remark in floor.remarks]
-
-
-def _remarks(*sentences: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(filter(None, sentences)))
+def _remarks(
+    learned: str, courses: Sequence[Course], tuning: Tuning, floors: tuple[NoiseFloor, ...]
+) -> tuple[str, ...]:
+    of_noise = (remark for floor in floors for remark in floor.remarks)
+    said = (learned, *unit_sentences(courses), constant_sentence(tuning.model), *of_noise)
+    return tuple(dict.fromkeys(filter(None, said)))
 
 
 def _split_s(measure: ErrorMeasure) -> dict[str, float]:
@@ -193,7 +194,7 @@ def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature
     """Each named effect's, against the final model without it alone."""
     measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
     names = Names(
-        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.rotational
+        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
     )
     hold, drawn = measure.records[0].recording.hold, []
     for number in range(len(fitted.hypothesis.claims)):

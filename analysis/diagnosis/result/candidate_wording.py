@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect
-from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words, si_unit
+from analysis.diagnosis.effect_words import noun_of, numbers_text, place_words, unit_of
 from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import capital, ended
+from equalizer.signals.unit_system import UnitSystem
 
 _FAMILIES = (
     (
@@ -47,7 +48,7 @@ class Device:
 
     single: bool
     """It has one axis, which then needs no name."""
-    rotational: bool
+    system: UnitSystem
 
 
 def class_noun(effect: NamedEffect) -> str:
@@ -95,7 +96,7 @@ def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
         )
         return f"{said} (SI)" if said else ""
-    units = {name: si_unit(candidate.effect, name, device.rotational) for name in candidate.parameters}
+    units = {name: unit_of(candidate.effect, name, device.system) for name in candidate.parameters}
     return numbers_text(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
 
 

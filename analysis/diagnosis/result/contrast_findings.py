@@ -10,7 +10,7 @@ from analysis.diagnosis.contrast.decide import BOUND, Decided
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
-from analysis.diagnosis.effect_words import si_unit
+from analysis.diagnosis.effect_words import unit_of
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.by_contrast import Contrast
 from analysis.diagnosis.search.patience import OUT_OF_TIME
@@ -19,6 +19,7 @@ from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
+from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 MOST = 6
 BESIDE = (
@@ -41,7 +42,7 @@ def with_contrast(whole: Findings, found: Contrast, recording: Recording, beyond
         diagnosis = _with(whole.diagnosis, "partly_explained", (named,), ())
         remarks: tuple[str, ...] = (BY_ITSELF,)
     else:
-        diagnosis = _compared(whole.diagnosis, found.compared, found.decided, recording, whole.given.rotational)
+        diagnosis = _compared(whole.diagnosis, found.compared, found.decided, recording, whole.given.system)
         remarks = (BESIDE.format(beyond), *(() if found.compared.complete else (OUT_OF_TIME,)))
     improved = _improved(whole.given, diagnosis.effects)
     return replace(
@@ -65,10 +66,10 @@ def _with(
 
 
 def _compared(
-    diagnosis: Diagnosis, found: Compared, decided: Decided, recording: Recording, rotational: bool
+    diagnosis: Diagnosis, found: Compared, decided: Decided, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
     best = decided.named
-    named = () if best is None else (_named(best, decided, recording, rotational),)
+    named = () if best is None else (_named(best, decided, recording, system),)
     candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
     verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= AS_ONE else "unexplained"
     fit = Fit(
@@ -86,7 +87,7 @@ def _errors(found: Compared, before: float, after: float) -> Errors:
     return Errors(sizes[0], sizes[0], sizes[1], None)
 
 
-def _named(best: Weighed, decided: Decided, recording: Recording, rotational: bool) -> NamedEffect:
+def _named(best: Weighed, decided: Decided, recording: Recording, system: UnitSystem) -> NamedEffect:
     effect = best.fault.effect
     rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
     return NamedEffect(
@@ -95,7 +96,7 @@ def _named(best: Weighed, decided: Decided, recording: Recording, rotational: bo
         axis=_axis(best, recording),
         share=float(np.clip(best.share, 0.0, 1.0)),
         probability=decided.probability,
-        parameters=_estimates(best, recording, rotational),
+        parameters=_estimates(best, recording, system),
         rivals=rivals,
         class_=(effect, *decided.alike) if decided.alike else (),
     )
@@ -106,8 +107,8 @@ def _axis(weighed: Weighed, recording: Recording) -> str | None:
     return axis_letter(weighed.fault.axis, channels) if weighed.fault.axis in channels else None
 
 
-def _estimates(weighed: Weighed, recording: Recording, rotational: bool) -> dict[str, Estimate]:
-    units = _units(weighed.fault, recording, rotational)
+def _estimates(weighed: Weighed, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
+    units = _units(weighed.fault, recording, system)
     return {
         name: Estimate(
             value, units.get(name, "1"), (value - BOUND * spread, value + BOUND * spread) if spread else None
@@ -116,14 +117,14 @@ def _estimates(weighed: Weighed, recording: Recording, rotational: bool) -> dict
     }
 
 
-def _units(fault: Fault, recording: Recording, rotational: bool) -> Mapping[str, str]:
+def _units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[str, str]:
     """By number. A fault of the sensor counts in what it reads, an offset of the command in what was commanded."""
     if fault.effect in EFFECTS_BY_NAME:
         read = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
-        return {each.name: each.unit_in(rotational, read) for each in EFFECTS_BY_NAME[fault.effect].parameters}
+        return {each.name: each.unit_in(system, read) for each in EFFECTS_BY_NAME[fault.effect].parameters}
     signal = recording.response if fault.place == "sensor" else recording.command
     unit = signal.units[max(fault.site, 0)]
-    stiffness = si_unit(fault.effect, "stiffness", rotational)
+    stiffness = unit_of(fault.effect, "stiffness", system)
     return {"stiffness": stiffness, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
 
 
@@ -154,7 +155,7 @@ def _shown(found: Contrast, recording: Recording) -> NamedEffect | None:
     units = (
         dict.fromkeys(values, unit)
         if effect is None
-        else {parameter.name: parameter.unit_in(False, unit) for parameter in effect.parameters}
+        else {parameter.name: parameter.unit_in(LINEAR, unit) for parameter in effect.parameters}
     )
     known = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
     axis = axis_letter(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None

@@ -31,6 +31,7 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import UnitSystem
 
 _TELLING = 0.005
 """Errors that differ by less are the same to a reader."""
@@ -43,7 +44,7 @@ class Said:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     response_unit: str
-    rotational: bool
+    system: UnitSystem
     quantity: str = "acceleration"
     """Of the response."""
 
@@ -54,7 +55,7 @@ def said_of(recording: Recording, model: MechanicalModel) -> Said:
         recording.command.channels,
         recording.response.channels,
         unit if isinstance(unit, str) else unit[0],
-        model.rotational,
+        model.system,
         model.quantity,
     )
 
@@ -160,9 +161,9 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
 def _units(effect: Effect, values: Values, said: Said) -> dict[str, str]:
     if effect.law is not None:
         law = law_with(effect.law, values)
-        units = law_units(law, Channels(said.inputs, said.outputs, said.quantity), said.rotational)
+        units = law_units(law, Channels(said.inputs, said.outputs, said.quantity), said.system)
         return dict(zip(values, units, strict=True))
-    return {p.name: p.unit_in(said.rotational, said.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
+    return {p.name: p.unit_in(said.system, said.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
 
 
 def _law(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:

@@ -75,5 +75,5 @@ def _unit(effect: str, parameter: str, found: Findings) -> str:
     for known_parameter in known.parameters if known else ():
         if known_parameter.name == parameter:
             response = found.courses[0].units[0] if found.courses else RESPONSE
-            return known_parameter.unit_in(found.given.rotational, response)
+            return known_parameter.unit_in(found.given.system, response)
     return "1"

@@ -17,6 +17,7 @@ from equalizer.effects.simulation.simulator import Played, simulate_mechanism
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Along = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
 
@@ -60,7 +61,7 @@ class Names:
     """Of the response."""
     unit: str
     """Of the response."""
-    rotational: bool = False
+    system: UnitSystem = LINEAR
 
 
 def signature_of(
@@ -86,7 +87,7 @@ def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Na
     force = played.axis_force
     if isinstance(placed.effect.acts, Structure):
         force = _equivalent_force(evidence, played, hold)
-    used, unit = evidence.used > 0, "rad" if names.rotational else "m"
+    used, unit = evidence.used > 0, names.system.length
     unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[along]
     seen, law_seen = (
         _course(position[:, axis], velocity[:, axis], along, evidence.sample_rate_hz)
@@ -99,7 +100,7 @@ def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Na
     law_at, law = binned_law(law_seen[used], force[used, axis])
     return Signature(
         placed.effect.name, names.axes[axis], f"{along} of {names.axes[axis]} ({unit})",
-        f"missing force ({_force_unit(names)})", at, mean, spread, law_at, law,
+        f"missing force ({names.system.force})", at, mean, spread, law_at, law,
     )  # fmt: skip
 
 
@@ -128,7 +129,7 @@ def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signa
     changed = placed.effect.acts.change(command, 1 / evidence.sample_rate_hz, placed.values)
     at, mean, spread = binned(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
     law_at, law = binned_law(command[used], (changed - command)[used])
-    unit = _force_unit(names)
+    unit = names.system.force
     return Signature(
         placed.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})", f"missing force ({unit})",
         at, mean, spread, law_at, law,
@@ -199,7 +200,3 @@ def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArra
 
 def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:
     return max(sites, key=lambda site: float(np.mean(force[:, site] ** 2)))
-
-
-def _force_unit(names: Names) -> str:
-    return "N m" if names.rotational else "N"

@@ -16,6 +16,7 @@ from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.unit_system import system_of
 
 CLOUD = 600
 """Samples that are drawn by themselves."""
@@ -98,7 +99,7 @@ def state_maps(
     channels = recording.command.channels
     letters = tuple(axis_letter(channel, channels) for channel in channels)
     units = recording.command.units
-    turning = any(unit.startswith("rad") for unit in recording.response.units) or units[0].startswith("N m")
+    length = system_of(units, recording.response.units).length
     found = []
     for axis, letter in enumerate(letters):
         if balances:
@@ -108,7 +109,7 @@ def state_maps(
             course, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
         if course is not None:
             said = (letter, units[axis], model, completed)
-            found.append(_maps(course, said, "rad" if turning else "m"))
+            found.append(_maps(course, said, length))
     first = diagnosis.effects[0].axis if diagnosis.effects else None
     return tuple(sorted(found, key=lambda one: (one.axis != first, -one.share)))
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.result.findings import Course
 from analysis.diagnosis.settings import UNIT_CORRELATION, UNIT_FACTOR
+from equalizer.plant.mechanical_model import MechanicalModel
 
 
 def unit_sentences(courses: Sequence[Course]) -> tuple[str, ...]:
@@ -47,3 +48,24 @@ def _words(factor: float) -> str:
 
 def _what(factor: float) -> str:
     return "sign" if -UNIT_FACTOR < factor < -1 / UNIT_FACTOR else "unit"
+
+
+def constant_sentence(model: MechanicalModel) -> str:
+    """Where the commands are no forces: what a reader must know of every number; else empty."""
+    system = model.system
+    if system.known:
+        return ""
+    said = "has no unit" if system.force == "1" else f"is in {system.force}"
+    moves = {"m": ("force", "N"), "rad": ("torque", "N m")}.get(system.length)
+    if moves is None:
+        moved = "has no unit" if system.length == "1" else f"is in {system.length}"
+        return (
+            f"The command {said}, and the motion {moved}: forces, masses and stiffnesses are counted in these, and are "
+            "no N or kg."
+        )
+    per = "" if system.force == "1" else f" per {system.force}"
+    return (
+        f"The command {said}, and nothing says what {moves[0]} that gives: every {moves[0]}, mass, damping and "
+        f"stiffness is to be multiplied by the {moves[0]} constant ({moves[1]}{per}), which is not known; "
+        "--force-constant states it."
+    )

@@ -79,7 +79,7 @@ def answer_of(found: Findings) -> str:
 
 
 def device_of(found: Findings) -> Device:
-    return Device(found.given.inputs == 1, found.given.rotational)
+    return Device(found.given.inputs == 1, found.given.system)
 
 
 _AFTER = ("after", "with it")

@@ -28,11 +28,9 @@ from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
-    FirstModel,
-    first_model_of,
-    fitted_model,
     nothing_to_diagnose,
 )
+from study.workflows.diagnosis.fitted_first import FirstModel, first_model_of, fitted_model
 from study.workflows.worker_threads import worker_threads
 
 SHORT = "too short"

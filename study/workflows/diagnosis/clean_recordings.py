@@ -27,7 +27,7 @@ def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[P
             "Give another recording with --clean, of the device when it was in order.",
             saved="Nothing was written.",
         )
-    beside = read_input(clean, seed)
+    beside = read_input(clean, seed, constants=found.constants)
     try:
         require_alike(
             (found.recordings[0], *beside.recordings),

@@ -26,14 +26,12 @@ from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
-    FirstModel,
-    first_model_of,
-    fitted_model,
     given_model,
     nothing_to_diagnose,
     read_input,
 )
 from study.workflows.diagnosis.effect_file import read_entry
+from study.workflows.diagnosis.fitted_first import FirstModel, first_model_of, fitted_model
 from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 from study.workflows.worker_threads import worker_threads
@@ -67,6 +65,8 @@ class DiagnosePlan:
     """Of processor time, after which the search ends with what it has."""
     discovery: bool = False
     """Laws that have no name are looked for, too."""
+    force_constants: tuple[float, ...] = ()
+    """Of all commands, or each command's own, where these are no forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +106,8 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
     check_names(plan.without)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
-    found = read_input(plan.sources, plan.seed, plain=plan.model is None and not plan.clean)
+    plain = plan.model is None and not plan.clean
+    found = read_input(plan.sources, plan.seed, plain, plan.force_constants)
     clean: DiagnosisInput | None = None
     if plan.clean:
         both = with_clean(found, plan.sources, plan.clean, plan.seed)

@@ -8,6 +8,7 @@ from typing import Any
 from analysis.diagnosis.balance.choose_structure import Choice, first_structure
 from analysis.diagnosis.balance.model_structures import KINDS, Kind, Number, StructureRefused
 from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import nearest
 from study.errors import StudyError, WrongUseError
@@ -24,6 +25,8 @@ class FirstModelPlan:
     recordings: tuple[Path, ...]
     out: Path
     structure: str = "auto"
+    force_constants: tuple[float, ...] = ()
+    """Of all commands, or each command's own, where these are no forces."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +45,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
             TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.", "Give its recordings, REC.h5.",
             saved="Nothing was written.",
         )  # fmt: skip
-    found = read_input(plan.recordings, 1, plain=True)
+    found = read_input(plan.recordings, 1, True, plan.force_constants)
     if weighted(found.recordings):
         raise _refused("A recording was made with a weight on, and the model would hold the weight.")
     try:
@@ -59,7 +62,9 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
     }
     write_mechanical_model(plan.out, replace(choice.fit.model, provenance=origin))
     on_progress(1.0)
-    return FirstModel(plan, choice, (*found.remarks, *choice.fit.remarks))
+    return FirstModel(
+        plan, choice, (*found.remarks, *filter(None, [constant_sentence(choice.fit.model)]), *choice.fit.remarks)
+    )
 
 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:

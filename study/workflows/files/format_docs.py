@@ -19,6 +19,7 @@ from analysis.psychophysics.thresholds import Threshold
 from equalizer.laws.parse import FUNCTIONS, LARGEST, LONGEST, MEMORY
 from equalizer.laws.program import CELLS, DEEPEST
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECT_NAMES, EffectParameter
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE, TABLE_KINDS
 from protocols.document.schema import protocol_schema
@@ -233,7 +234,7 @@ _RESPONSE = "the response's unit"
 
 
 def _parameter(part: EffectParameter) -> str:
-    unit = part.unit_in(False, _RESPONSE)
+    unit = part.unit_in(LINEAR, _RESPONSE)
     return f"`{part.name}` ({unit}, optional)" if part.optional else f"`{part.name}` ({unit})"
 
 
@@ -241,7 +242,7 @@ def _effects() -> str:
     rows = []
     for effect in EFFECT_NAMES:
         numbers = ", ".join(_parameter(part) for part in effect.parameters)
-        turned = ", ".join(part.unit_in(True, _RESPONSE) for part in effect.parameters)
+        turned = ", ".join(part.unit_in(ROTATIONAL, _RESPONSE) for part in effect.parameters)
         rows.append((f"`{effect.name}`", effect.place, numbers, turned))
     return _rows(("effect", "place", "parameters", "rotational units"), rows)
 

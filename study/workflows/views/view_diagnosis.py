@@ -49,7 +49,7 @@ def _device(path: Path) -> Device | None:
         model = read_mechanical_model(path)
     except StudyError:
         return None
-    return Device(model.inputs == 1, model.rotational)
+    return Device(model.inputs == 1, model.system)
 
 
 def _effect(effect: NamedEffect) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ import pytest
 
 from equalizer.effects.discovered_law import Channels, law_units
 from equalizer.laws.law import law_of
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
 
 @pytest.mark.parametrize(
@@ -21,11 +22,11 @@ from equalizer.laws.law import law_of
     ],
 )
 def test_units_of_a_force(text: str, units: tuple[str, ...]):
-    assert law_units(law_of(text, "force", "y"), Channels(), False) == units
+    assert law_units(law_of(text, "force", "y"), Channels(), LINEAR) == units
 
 
 def test_units_of_a_torque_and_of_a_response():
-    assert law_units(law_of("-4.1*vx*abs(vx)", "force", "x"), Channels(("u",), ("q",), "angle"), True) == (
+    assert law_units(law_of("-4.1*vx*abs(vx)", "force", "x"), Channels(("u",), ("q",), "angle"), ROTATIONAL) == (
         "N m s^2/rad^2",
     )
-    assert law_units(law_of("ax + 0.2*ax**3", "response", "x"), Channels(), False) == ("s^4/m^2",)
+    assert law_units(law_of("ax + 0.2*ax**3", "response", "x"), Channels(), LINEAR) == ("s^4/m^2",)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
-from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, noun_of, si_unit
+from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, noun_of, unit_of
 from analysis.diagnosis.result.candidate_wording import (
     SENTENCES,
     Device,
@@ -15,9 +15,10 @@ from analysis.diagnosis.result.candidate_wording import (
 from analysis.diagnosis.result.ceiling_wording import ceiling_sentences
 from analysis.diagnosis.result.findings import Reached
 from analysis.diagnosis.result.wording import effect_title, inseparable_sentence, verdict_sentence
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
 ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
-DEVICE = Device(single=True, rotational=False)
+DEVICE = Device(single=True, system=LINEAR)
 DRY = Candidate("coulomb_friction", "mechanism", "x", {"level": 0.211}, 0.4, 0.62, "the main part is another")
 STICKY = Candidate(
     "viscoelastic_relaxation", "mechanism", "x", {"stiffness": 120.0, "time_constant": 0.02}, 0.2, 0.3,
@@ -64,7 +65,7 @@ def test_sentences_are_few_however_many_candidates_there_are():
 
 
 def test_numbers_have_units_only_where_the_device_is_known():
-    assert candidate_title(DRY, Device(False, True)) == "dry friction on the x drive, 211 mN m"
+    assert candidate_title(DRY, Device(False, ROTATIONAL)) == "dry friction on the x drive, 211 mN m"
     assert candidate_title(DRY) == "dry friction on the x drive, level 0.211 (SI)"
 
 
@@ -76,7 +77,7 @@ def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
     # The numbers of a sensor are in the unit of what it reads.
     numbers = set() if law.place == "sensor" else set(law.words.numbers) - set(law.words.shares)
     assert numbers == set(law.units)
-    assert {si_unit(effect, name, turning) for name in law.units for turning in (False, True)} != {"1"}
+    assert {unit_of(effect, name, system) for name in law.units for system in (LINEAR, ROTATIONAL)} != {"1"}
 
 
 def test_a_class_is_called_by_what_its_laws_have_in_common():

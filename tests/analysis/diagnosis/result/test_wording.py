@@ -20,6 +20,7 @@ from analysis.diagnosis.result.wording import (
 )
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
+from equalizer.signals.unit_system import LINEAR
 
 PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, "near v = 0", 0.8, 1e-9)
 ERRORS = Errors(0.5, 0.36, 0.0266, 0.0265)
@@ -48,7 +49,7 @@ def test_an_effect_is_named_with_its_place_number_and_signature():
 def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out_its_main_number(name):
     assert name.name in EFFECT_WORDS
     assert "_" not in noun_of(name.name)
-    numbers = {p.name: Estimate(0.1234, p.unit_in(False, "m/s^2")) for p in name.parameters}
+    numbers = {p.name: Estimate(0.1234, p.unit_in(LINEAR, "m/s^2")) for p in name.parameters}
     effect = NamedEffect(name.name, name.place, "x", 1.0, 1.0, numbers)
     sentence = effect_sentence(effect, "this is seen")
     assert "12" in sentence.split(":")[0]

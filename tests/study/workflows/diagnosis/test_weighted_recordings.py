@@ -7,7 +7,8 @@ import pytest
 
 from study.errors import StudyError
 from study.store.formats.recording_file import read_recording, write_recording
-from study.workflows.diagnosis.diagnosis_input import fitted_model, read_input
+from study.workflows.diagnosis.diagnosis_input import read_input
+from study.workflows.diagnosis.fitted_first import fitted_model
 
 
 @pytest.fixture

@@ -1,0 +1,46 @@
+"""Commands of a current, a voltage or no unit as forces, where the constant between them was stated."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from equalizer.signals.unit_system import FORCES, system_of
+
+PUSHED = {"m": ("force", "N"), "rad": ("torque", "N m")}
+"""By the motion's unit: what a command is then, and its unit."""
+
+
+class NoForceConstant(ValueError):  # noqa: N818 - an answer that a user reads
+    """The constants do not go with the recording; a sentence without a full stop."""
+
+
+def with_force_constant(recording: Recording, constants: Sequence[float]) -> tuple[Recording, str]:
+    """constants: of all commands, or each command's own, in N or N m per unit of the command. And a sentence."""
+    command, moved = recording.command, system_of(recording.command.units, recording.response.units).length
+    if moved not in PUSHED:
+        raise NoForceConstant(
+            f"the motion is in {moved}: no force constant makes SI of it, so give its unit in the map"
+        )
+    if any(unit in FORCES for unit in command.units):
+        raise NoForceConstant(f"the command is a force already (in {command.units[0]}), so it has no force constant")
+    if len(constants) not in (1, len(command.channels)):
+        raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
+    if not all(np.isfinite(constant) and constant for constant in constants):
+        raise NoForceConstant("a force constant is a number other than 0")
+    quantity, unit = PUSHED[moved]
+    each = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
+
+    def pushed(signal: Signal) -> Signal:
+        return replace(signal, samples=signal.samples * each, quantity=quantity, unit=unit)
+
+    own = recording.excitation
+    fits = own is not None and len(own.channels) == len(command.channels)
+    per = "" if command.units[0] == "1" else f" per {command.units[0]}"
+    said = ", ".join(f"{constant:g}" for constant in constants)
+    return (
+        replace(recording, command=pushed(command), excitation=pushed(own) if own is not None and fits else own),
+        f"The commands were multiplied by the {quantity} constant that was stated, {said} {unit}{per}.",
+    )

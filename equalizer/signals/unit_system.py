@@ -1,0 +1,74 @@
+"""Units of a mechanical model's numbers: those of its commands over those of its motion.
+
+Where a command is a current or has no unit, a mass is no kg: force constants are not known, and are in every number.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+_FACTOR = re.compile(r"(kg|N|m|s)(?:\^(\d+))?$")
+_RATES = ("/s^2", "/s")
+FORCES = ("N", "N m")
+
+
+@dataclass(frozen=True, slots=True)
+class UnitSystem:
+    force: str = "N"
+    """Of a command,"""
+    length: str = "m"
+    """and of a motion's position; ASCII, "1" for a plain number."""
+
+    def of(self, unit: str) -> str:
+        """The same quantity here. unit: SI of a translational model, or what is no unit of a force or motion, which
+        stays."""
+        over, _, under = unit.partition("/")
+        powers = {"N": 0, "m": 0, "s": 0}
+        for part, sign in ((over, 1), (under, -1)):
+            for factor in part.split():
+                found = _FACTOR.match(factor)
+                if found is None and factor != "1":
+                    return unit
+                for name, power in _basic(found[1]) if found else ():
+                    assert found is not None
+                    powers[name] += sign * power * int(found[2] or 1)
+        return self._written(powers["N"], powers["m"], powers["s"])
+
+    def _written(self, force: int, length: int, seconds: int) -> str:
+        named = [(self.force, force), (self.length, length), ("s", seconds)]
+        known = [(f"({name})" if "/" in name else name, power) for name, power in named if name != "1"]
+        over = [
+            _power(name, power) for name, power in sorted(known, key=lambda one: one[0] == self.length) if power > 0
+        ]
+        under = [_power(name, -power) for name, power in known if power < 0]
+        below = f"/({' '.join(under)})" if len(under) > 1 else f"/{under[0]}" if under else ""
+        return f"{' '.join(over) or '1'}{below}"
+
+    @property
+    def known(self) -> bool:
+        """Whether its forces are forces: else every number holds a constant that is not known."""
+        return self.force in FORCES
+
+    @property
+    def rotational(self) -> bool | None:
+        """None for a system that is none of SI."""
+        return {LINEAR: False, ROTATIONAL: True}.get(self)
+
+
+LINEAR, ROTATIONAL = UnitSystem(), UnitSystem("N m", "rad")
+
+
+def system_of(commands: Sequence[str], motions: Sequence[str]) -> UnitSystem:
+    """Units of a recording's commands and responses, those of the first where they differ."""
+    motion = next((motions[0].removesuffix(rate) for rate in _RATES if motions[0].endswith(rate)), motions[0])
+    return UnitSystem(commands[0], motion)
+
+
+def _basic(name: str) -> tuple[tuple[str, int], ...]:
+    return (("N", 1), ("s", 2), ("m", -1)) if name == "kg" else ((name, 1),)
+
+
+def _power(name: str, power: int) -> str:
+    if power == 1:
+        return name
+    return f"{f'({name})' if ' ' in name else name}^{power}"

@@ -1,0 +1,49 @@
+"""Units of a model's numbers follow from those of its commands and its motion."""
+
+import numpy as np
+import pytest
+
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, matrix_unit
+from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
+from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
+
+MOTOR = UnitSystem("A", "rad")
+
+
+def body(gain: float = 1.0) -> MechanicalModel:
+    one = np.eye(1)
+    return MechanicalModel("m", "angle", one, one, one, gain * one, one, rotational=True)
+
+
+@pytest.mark.parametrize(
+    ("system", "units"),
+    [(LINEAR, ("kg", "N s/m", "N/m")), (ROTATIONAL, ("kg m^2", "N m s/rad", "N m/rad")),
+     (MOTOR, ("A s^2/rad", "A s/rad", "A/rad")), (UnitSystem("1", "1"), ("s^2", "s", "1")),
+     (UnitSystem("V", "m"), ("V s^2/m", "V s/m", "V/m"))],
+)  # fmt: skip
+def test_mass_damping_and_stiffness(system, units):
+    assert tuple(matrix_unit(part, system) for part in ("mass", "damping", "stiffness")) == units
+
+
+def test_no_number_of_an_effect_is_a_force_where_the_command_is_none():
+    units = [part.unit_in(MOTOR, "rad") for effect in EFFECT_NAMES for part in effect.parameters]
+    assert not any("N" in unit.split() or "kg" in unit for unit in units)
+    assert EFFECTS_BY_NAME["gravity_torque"].main.unit_in(MOTOR, "rad") == "A"
+
+
+def test_the_motion_is_what_a_speed_or_acceleration_is_the_rate_of():
+    assert [system_of(("N",), (unit,)).length for unit in ("m", "m/s", "m/s^2", "rad/s", "1")] == [
+        "m", "m", "m", "rad", "1",
+    ]  # fmt: skip
+
+
+def test_a_model_takes_its_recordings_units_and_keeps_them_in_a_file():
+    found = with_units_of(body(), ("A",), ("rad",))
+    assert found.system == MOTOR
+    assert parse_mechanical_model(mechanical_model_toml(found)).system == MOTOR
+
+
+def test_a_model_in_si_stays_so():
+    assert with_units_of(body(), ("N m",), ("rad",)).units is None
+    assert with_units_of(body(0.05), ("A",), ("rad",)).system == ROTATIONAL  # its input turns amperes into torques
