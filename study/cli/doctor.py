@@ -19,29 +19,34 @@ NAME_WIDTH = 17
 CALIBRATION_S = 60.0
 
 
+TimingOption = Annotated[
+    float, typer.Option(min=0, max=500, help="How long the 1 kHz loop is timed, with zero force; 0: not at all.")
+]
+CalibrateOption = Annotated[
+    bool, typer.Option("--calibrate", help="First wait until the handle is put into its calibration position.")
+]
+AcceptOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="OPERATOR",
+        help="With no hand on the handle: prove with 0.5 N that the device lets go, and unlock it for hands.",
+    ),
+]
+SensorOption = Annotated[
+    str | None,
+    typer.Option(metavar="PORT", help="Only this: lay the accelerometer on this serial line down in six positions."),
+]
+BaudOption = Annotated[int, typer.Option(min=1, help="Of the accelerometer's serial line.")]
+
+
 def doctor(
     device: DeviceOption = "simulated",
-    timing: Annotated[
-        float, typer.Option(min=0, max=500, help="How long the 1 kHz loop is timed, with zero force; 0: not at all.")
-    ] = 2.0,
+    timing: TimingOption = 2.0,
     data: DataOption = Path("data"),
-    calibrate: Annotated[
-        bool, typer.Option("--calibrate", help="First wait until the handle is put into its calibration position.")
-    ] = False,
-    accept: Annotated[
-        str | None,
-        typer.Option(
-            metavar="OPERATOR",
-            help="With no hand on the handle: prove with 0.5 N that the device lets go, and unlock it for hands.",
-        ),
-    ] = None,
-    calibrate_sensor: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PORT", help="Only this: lay the accelerometer on this serial line down in six positions."
-        ),
-    ] = None,
-    baud: Annotated[int, typer.Option(min=1, help="Of the accelerometer's serial line.")] = 2_000_000,
+    calibrate: CalibrateOption = False,
+    accept: AcceptOption = None,
+    calibrate_sensor: SensorOption = None,
+    baud: BaudOption = 2_000_000,
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation, the device with its sensor, and the 1 kHz timing. Nothing moves."""

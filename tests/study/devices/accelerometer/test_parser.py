@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from study.devices.accelerometer.packet import CHECKED, SIZE, SYNC, crc_of, packed
@@ -36,7 +36,7 @@ def test_whole_packets_come_out_as_they_went_in():
     assert (parser.counts.packets, parser.counts.lost, parser.counts.spoiled_bytes) == (1000, 0, 0)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cuts=st.lists(st.integers(0, 100 * SIZE), max_size=40))
 def test_it_does_not_matter_where_the_bytes_are_torn(cuts):
     data, raw = stream(100)
