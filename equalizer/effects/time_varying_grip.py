@@ -1,6 +1,7 @@
 """A grip that tightens and loosens: the damping and the stiffness towards the ground come and go."""
 
 import numpy as np
+from scipy.signal import czt
 
 from equalizer.effects.effect import ALL_SITES, AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import STEP_S, TIME_S, V_FREE, V_PER_N, X_FREE, X_PER_N, V, X
@@ -9,6 +10,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import Beside, beside_linear, moving
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
@@ -70,14 +72,19 @@ def _values(rate_hz: float, strengths: FloatArray) -> Values:
     return {"rate_hz": rate_hz, "depth": depth, "phase": phase, "stiffness_share": share}
 
 
+def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
+    """The first lines of a transform of so many samples, the last of them zeros: of all lines they are few."""
+    return np.asarray(czt(samples, count, np.exp(-2j * np.pi / size)))
+
+
 def _rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:
     """How often the damping comes and goes: the missing force against the drag, times a wave, at every rate."""
     n = len(force)
     size = _FINER * n
     # Its square is needed at twice as high a line, which a slow clock does not hold.
     last = min(int(FASTEST_HZ / rate * size), size // 4)
-    against = np.conj(np.fft.rfft(np.sum(force * drag, axis=1), size))[: last + 1]
-    square = np.conj(np.fft.rfft(np.sum(drag**2, axis=1), size))[: 2 * last + 1]
+    against = np.conj(_slow_lines(np.sum(force * drag, axis=1), size, last + 1))
+    square = np.conj(_slow_lines(np.sum(drag**2, axis=1), size, 2 * last + 1))
     twice, whole = square[: 2 * last + 1 : 2], float(square[0].real)
     normal = np.empty((last + 1, 3, 3))
     normal[:, 0, 0] = whole

@@ -22,7 +22,7 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     is held there."""
     errors = fitting(measure, fitted.residuals)
     own = own_columns(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
-    columns = np.vstack([known.columns, own])
+    columns = np.vstack([known.whole, own])
     pulls = _stretches(measure, columns, errors)
     middle = pulls @ pulls.T
     t = len(fitted.deviations)

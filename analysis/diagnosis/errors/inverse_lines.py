@@ -49,7 +49,7 @@ def inverse_of(model: MechanicalModel, lines: int, highest_hz: float) -> Callabl
 
 def _learned(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
     """None where a few lines do not foretell the others."""
-    poles = _zeros(model, 2 * np.pi * FAR * highest_hz)
+    poles = zeros_of(model, 2 * np.pi * FAR * highest_hz)
     tried, unit, m = _told_by(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
     right, shapes = inverse_lines(model, tried), _shapes(tried, poles, unit)
     # Forces and positions apart, and each line alike: their entries differ by many orders of magnitude.
@@ -78,7 +78,7 @@ def _numbers(shapes: ComplexArray, right: ComplexArray) -> ComplexArray | None:
     return found if np.all(np.abs(shapes[1::2] @ found - right[1::2]) <= RIGHT_TO) else None
 
 
-def _zeros(model: MechanicalModel, largest: float) -> ComplexArray:
+def zeros_of(model: MechanicalModel, largest: float) -> ComplexArray:
     """(k,), rad/s: of those above the real axis or on it."""
     n, m = model.coordinates, model.inputs
     left, right = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))

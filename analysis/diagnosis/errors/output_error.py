@@ -46,6 +46,14 @@ class Sensitivity:
         products = self.columns @ rows.T
         return products if errors.ndim > 1 else products[:, 0]
 
+    @property
+    def whole(self) -> FloatArray:
+        """(t, samples): of all samples to fit, whichever period they are of."""
+        if self.repeated is None:
+            return self.columns
+        t, short = len(self.columns), int(self.repeated.max(initial=-1)) + 1
+        return self.columns.reshape(t, short, -1)[:, self.repeated].reshape(t, -1)
+
     def _folded(self, errors: FloatArray) -> FloatArray:
         """Periods summed up. errors: (samples,), channel after channel at each instant."""
         assert self.repeated is not None

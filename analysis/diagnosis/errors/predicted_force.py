@@ -1,8 +1,8 @@
 """The force that entered against the force that the model needs along the measured motion, within a band."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self, TypeVar, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from equalizer.signals.signal import FloatArray
 
 EDGE = 0.5
 """Periods of the band's end."""
+_Found = TypeVar("_Found")
 WEAKEST = 1e-3
 """Of what is commanded: an actuator that gives no more gives nothing, and is none."""
 
@@ -39,6 +40,9 @@ class PredictedForce:
     known: tuple[PlacedEffect, ...] = ()
     """What the model's own file names: it is part of every simulation."""
     least: float = 0.0
+    remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
+    """By what and record: what it was found of last, and what was found. Laws are compared on one model, and models on
+    one command."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -72,44 +76,59 @@ class PredictedForce:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         return tuple(
-            self._balance(model, (*self.known, *effects), record, motion).left / self.unit
-            for record, motion in zip(self.records, self.motions, strict=True)
+            self._balance(model, (*self.known, *effects), number).left / self.unit
+            for number in range(len(self.records))
         )
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        return tuple(
-            self._evidence(model, (*self.known, *effects), record, motion)
-            for record, motion in zip(self.records, self.motions, strict=True)
-        )
+        return tuple(self._evidence(model, (*self.known, *effects), number) for number in range(len(self.records)))
 
-    def _balance(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: BandMotion
-    ) -> "_Balance":
+    def _balance(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Balance":
+        record, motion = self.records[number], self.motions[number]
         rate_hz = record.recording.sample_rate_hz
         model = carrying(model, record.recording)
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        needed = needed_force(structure, motion)
-        entered = entered_force(model, record.command, rate_hz, effects, record.recording.hold)
-        within = band_limited(entered, rate_hz, self.band_hz)
+        needed = self._same("needed", number, (structure, motion), lambda: needed_force(structure, motion))
+        entered = self._entered(model, effects, number)
         ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
         course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
-        pushing = within - (needed.force + ahead) / 2
+        pushing = entered.within - (needed.force + ahead) / 2
         added = force_along(structure, effects, course, (record.command, pushing), rate_hz)
         # Both are means over the step that begins at a sample; the needed force is that around it.
-        total = band_limited(entered + added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+        total = entered.around
+        if added.any():
+            total = total + band_limited(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
         # A weaker actuator must not make every error smaller.
         strength = _rms(record.command)
-        weaker = strength / np.maximum(_rms(entered), WEAKEST * strength + np.finfo(float).tiny)
+        weaker = strength / np.maximum(_rms(entered.force), WEAKEST * strength + np.finfo(float).tiny)
         return _Balance(needed, (total - needed.force) * weaker, total)
 
-    def _evidence(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, motion: BandMotion
-    ) -> Evidence:
-        found = self._balance(model, effects, record, motion)
+    def _entered(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Entered":
+        record = self.records[number]
+        rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
+        changed = [one for one in effects if isinstance(one.effect.acts, OnCommand)]
+
+        def found() -> _Entered:
+            force = entered_force(model, record.command, rate_hz, changed, hold)
+            late = band_limited(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+            return _Entered(force, band_limited(force, rate_hz, self.band_hz), late)
+
+        return found() if changed else self._same("entered", number, (model.actuator, record.command), found)
+
+    def _same(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
+        """As it was found last where it was of the very same."""
+        known = self.remembered.get((what, number))
+        if known is None or any(one is not other for one, other in zip(known[0], of, strict=True)):
+            known = of, find()
+            self.remembered[what, number] = known
+        return cast(_Found, known[1])
+
+    def _evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> Evidence:
+        record, found = self.records[number], self._balance(model, effects, number)
         return Evidence(
             model=carrying(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
@@ -127,6 +146,16 @@ class PredictedForce:
 def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
     """At a record's end, where the filter has nothing to look at."""
     return int(EDGE * sample_rate_hz / band_hz)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Entered:
+    """(n, m) each: the force that entered, mean over the step that begins at a sample; within the band; and there, as
+    the mean around the sample."""
+
+    force: FloatArray
+    within: FloatArray
+    around: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,9 +27,10 @@ def fits_by_brief(
     each = guard.over(arena.map_, FITTING)
     fits: list[Fitted] = list(each(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
     if timed:
-        known = sensitivity_at(arena, base.deviations, base.hypothesis)
-        screened = screen(arena.measure, arena.tuning, base, known, timed, guard.over(arena.map_, SCREENING))
-        fits += first_fits(arena, base, known, _promising(base, fits, screened))
+        # What the model's own numbers do repeats all the same.
+        repeats = brief.repeated(known)
+        screened = screen(arena.measure, arena.tuning, base, repeats, timed, guard.over(arena.map_, SCREENING))
+        fits += first_fits(arena, base, repeats, _promising(base, fits, screened))
     # A law that the brief leaves open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
 

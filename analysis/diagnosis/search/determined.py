@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.errors.hypothesis import Number
 from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.brief import brief_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.rivalry import Arena, sensitivity_at
@@ -34,7 +35,10 @@ def final_errors(arena: Arena, found: Explanation) -> FloatArray:
         return found.errors[1]
     fitted = evaluated(arena.measure, arena.tuning, last.fitted.deviations, last.fitted.hypothesis)
     single = arena.tuning.model.coordinates == 1
-    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis, with_forces=single)
+    brief = brief_of(arena, fitted.hypothesis)
+    near = arena if brief is None else brief.arena
+    known = sensitivity_at(near, fitted.deviations, fitted.hypothesis, with_forces=single)
+    known = known if brief is None else brief.repeated(known)
     return standard_errors(arena.measure, arena.tuning, fitted, known)
 
 

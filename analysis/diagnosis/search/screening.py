@@ -49,9 +49,9 @@ def _reached(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.nd
     if not (np.isfinite(strength) and strength > 0):
         return np.inf
     t = len(base.deviations)
-    cross = known.columns @ change
+    cross = known.on(change)
     products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
-    pull = np.concatenate([known.columns @ errors - base.deviations, [float(change @ errors)]])
+    pull = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
     low = np.concatenate([-RETUNING_BOUND - base.deviations, [WEAKEST_START]])
     high = np.concatenate([RETUNING_BOUND - base.deviations, [STRONGEST_START]])
     step = bounded_step(products, pull, low, high)

@@ -35,6 +35,6 @@ def test_all_lines_follow_from_a_few(coupling):
 
 
 def test_where_few_lines_do_not_foretell_the_others_all_are_solved_for(monkeypatch):
-    monkeypatch.setattr(learning, "_zeros", lambda model, largest: np.array([-3.0 + 40.0j]))
+    monkeypatch.setattr(learning, "zeros_of", lambda model, largest: np.array([-3.0 + 40.0j]))
     found = inverse_of(device(8.0), len(LINES), RATE_HZ / 2)(LINES)
     assert np.array_equal(found, inverse_lines(device(8.0), LINES))

@@ -1,8 +1,12 @@
 """One settled period of each segment tells of a law what the whole recording does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.choose_measure import measure_by_force
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
 from analysis.diagnosis.errors.output_error import evaluated, sensitivity
 from analysis.diagnosis.search import brief
@@ -76,8 +80,50 @@ def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
     off = np.abs(found.on(errors) - wanted) / np.outer(scale, scale)
     assert off.max() < 0.02
     assert found.on(errors[0]) == pytest.approx(found.on(errors)[:, 0])
-    each = found.columns.reshape(len(at), -1, record.measured.shape[1])[:, short.stands_in].reshape(len(at), -1)
-    assert found.squares == pytest.approx(each @ each.T)
-    assert found.on(errors) == pytest.approx(each @ errors.T)
+    assert (np.linalg.norm((found.whole - whole.columns) * told, axis=1) < 0.02 * scale).all()
+    assert found.squares == pytest.approx(found.whole @ found.whole.T)
+    assert found.on(errors) == pytest.approx(found.whole @ errors.T)
     turned = np.roll(errors, 100 * record.measured.shape[1], axis=1)
     assert (np.abs(found.on(turned) - wanted) / np.outer(scale, scale)).max() > 0.2
+
+
+@pytest.fixture(scope="module")
+def by_force(lagging):
+    recordings = [record.recording for record in lagging.whole.records]
+    measure = measure_by_force(recordings, lagging.tuning.model, None).measure
+    return replace(lagging, measure=measure.shortened(), whole=measure)
+
+
+def apart_by_force(arena):
+    """(samples,): force that is missing in pieces, less that in the whole, over the latter's rms."""
+    short, measure = brief_of(arena, NOTHING), arena.measure
+    pieces = short.arena.measure.residuals(arena.tuning.model, ())
+    (whole,), places = measure.residuals(arena.tuning.model, ()), np.split(short.kept[0], np.cumsum(lengths(short)))
+    fits = [record.fit for record in short.arena.measure.records]
+    off = [piece[fit] - whole[at][fit] for piece, at, fit in zip(pieces, places, fits, strict=False)]
+    return np.concatenate(off).ravel() / whole[measure.records[0].fit].std()
+
+
+def lengths(short):
+    return [len(record.command) for record in short.arena.measure.records][:-1]
+
+
+def test_forces_are_compared_stretch_by_stretch(by_force):
+    short = brief_of(by_force, NOTHING)
+    assert len(short.arena.measure.records) == 2
+    assert len(short.kept[0]) < 0.7 * len(by_force.measure.records[0].command)
+    assert np.abs(apart_by_force(by_force)).max() < 0.01
+
+
+def test_without_what_lies_around_stretches_forces_would_differ(by_force, monkeypatch):
+    monkeypatch.setattr(brief, "BRIEF_CONSTANTS", 0.0)
+    assert np.abs(apart_by_force(by_force)).max() > 0.05
+
+
+def test_a_period_that_the_record_ends_in_stands_for_none(lagging):
+    (record,) = lagging.measure.records
+    ends = record.recording.segments[0].stop - 300
+    cut = [getattr(record, name)[:ends] for name in ("command", "measured", "fit", "choose", "test")]
+    arena = replace(lagging, measure=lagging.measure.with_records((Observed(record.recording, *cut),)))
+    short = brief_of(arena, NOTHING)
+    assert short is None or short.stands_in.max() < sum(one.fit.sum() for one in short.arena.measure.records)
