@@ -2,19 +2,12 @@
 
 Counted are the hypotheses and open numbers that a diagnosis tries out; each costs at least one simulation of the whole
 recording. Fits, intervals and all that is drawn from them come on top, in our time alone.
-
-With `--against CHECKOUT` (a directory with another commit of this project, as `git worktree add` makes one) the same
-cases are diagnosed by both, one after the other, and the ratios of processor time are printed instead.
 """
 
-import json
-import os
-import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import StateSpace, lsim
@@ -108,41 +101,7 @@ def concealed(number: int) -> Case:
     return draw_case(SEED + number, EFFECTS[number], strength=0.6 if EFFECTS[number] else None)
 
 
-def once(number: int) -> int:
-    """After a first diagnosis of the same case, in which all is compiled and imported."""
-    case = concealed(number)
-    diagnosed(case)
-    report(json.dumps(asdict(diagnosed(case))))
-    return 0
-
-
-def by(checkout: Path, number: int) -> Taken:
-    """In a process of its own, with the packages of that checkout."""
-    said = subprocess.run(
-        [sys.executable, __file__, "--once", str(number)],
-        env={**os.environ, "PYTHONPATH": str(checkout)}, cwd=checkout, check=True, capture_output=True, text=True,
-    )  # fmt: skip
-    return Taken(**json.loads(said.stdout.splitlines()[-1]))
-
-
-def against(other: Path) -> int:
-    ratios = []
-    for number, effects in enumerate(EFFECTS):
-        ours, theirs = by(Path(__file__).parents[2], number), by(other.resolve(), number)
-        ratios.append(theirs.cpu_s / ours.cpu_s)
-        report(
-            f"{' '.join(effects) or 'nothing':18} ours {ours.cpu_s:6.1f} CPU s, {ours.said}; "
-            f"theirs {theirs.cpu_s:6.1f} CPU s, {theirs.said}: {ratios[-1]:.2f} times as long"
-        )
-    report(f"theirs / ours, median: {np.median(ratios):.2f}")
-    return 0
-
-
 def main() -> int:
-    if sys.argv[1:2] == ["--once"]:
-        return once(int(sys.argv[2]))
-    if sys.argv[1:2] == ["--against"]:
-        return against(Path(sys.argv[2]))
     diagnosed(draw_case(SEED, ["coulomb_friction"]), tuple(one.name for one in CATALOGUE[3:]))
     ratios, walls, last = [], [], None
     for number, effects in enumerate(EFFECTS):
