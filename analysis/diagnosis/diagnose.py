@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.contrast.decide import BEYOND
+from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.discovery.join import with_laws
 from analysis.diagnosis.errors.choose_measure import Compared, measure_of
@@ -165,7 +166,7 @@ class _Seen:
 def _arena(look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
     measure = look.chosen.measure
     recording = measure.records[0].recording
-    model = with_units_of(look.model, recording.command.units, recording.response.units)
+    model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
     return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 

@@ -11,6 +11,7 @@ from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retune
 from analysis.diagnosis.result.wording import (
     answer_of,
     confirmation_sentence,
+    device_of,
     effect_sentence,
     effect_title,
     inseparable_sentence,
@@ -86,7 +87,7 @@ def _answer(found: Findings) -> list[Section]:
     points = [
         " ".join(filter(None, (_said(found, one, signatures), inseparable_sentence(one)))) for one in effects
     ]  # fmt: skip
-    after = [remainder_sentence(found.diagnosis), next_experiment_sentence(found.diagnosis)]
+    after = [remainder_sentence(found.diagnosis, device_of(found)), next_experiment_sentence(found.diagnosis)]
     return [Section("What the model lacks", points=(*points, *filter(None, after)))]
 
 
@@ -156,7 +157,7 @@ def _remainder(found: Findings, pictures: Sequence[Picture]) -> Section:
     tables = (mismatch_table("What is left", left),) if left else ()
     return Section(
         "What is still unexplained",
-        paragraphs=(remainder_sentence(found.diagnosis),),
+        paragraphs=(remainder_sentence(found.diagnosis, device_of(found)),),
         pictures=_named(pictures, "remainder"),
         tables=tables,
     )

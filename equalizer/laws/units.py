@@ -28,7 +28,7 @@ def units_of(
     reader = _Reader(numbers, signals)
     for _ in range(2):  # what is found on the right may tell of the left
         reader.assign(tree, wanted)
-    symbols = (system.force, system.length, "s")
+    symbols = (system.force, system.length, system.time)
     return tuple(_text(reader.found[place], symbols) if place in reader.found else "?" for place in range(len(numbers)))
 
 

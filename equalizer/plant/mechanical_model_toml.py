@@ -98,7 +98,11 @@ def _units(origin: Mapping[str, Any]) -> UnitSystem | None:
     """Of numbers that are not in SI, as a program of ours writes them down."""
     said = origin.get(UNITS)
     words = {key: value for key, value in said.items() if isinstance(value, str)} if isinstance(said, dict) else {}
-    return UnitSystem(words["force"], words["length"]) if {"force", "length"} <= set(words) else None
+    return (
+        UnitSystem(words["force"], words["length"], words.get("time", "s"))
+        if {"force", "length"} <= set(words)
+        else None
+    )
 
 
 def _unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:

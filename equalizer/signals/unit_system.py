@@ -18,10 +18,14 @@ class UnitSystem:
     """Of a command,"""
     length: str = "m"
     """and of a motion's position; ASCII, "1" for a plain number."""
+    time: str = "s"
+    """"sample" where no time is known."""
 
     def of(self, unit: str) -> str:
         """The same quantity here. unit: SI of a translational model, or what is no unit of a force or motion, which
         stays."""
+        if unit == "Hz":
+            return unit if self.time == "s" else f"1/{self.time}"
         over, _, under = unit.partition("/")
         powers = {"N": 0, "m": 0, "s": 0}
         for part, sign in ((over, 1), (under, -1)):
@@ -35,7 +39,7 @@ class UnitSystem:
         return self._written(powers["N"], powers["m"], powers["s"])
 
     def _written(self, force: int, length: int, seconds: int) -> str:
-        named = [(self.force, force), (self.length, length), ("s", seconds)]
+        named = [(self.force, force), (self.length, length), (self.time, seconds)]
         known = [(f"({name})" if "/" in name else name, power) for name, power in named if name != "1"]
         over = [
             _power(name, power) for name, power in sorted(known, key=lambda one: one[0] == self.length) if power > 0
@@ -58,10 +62,10 @@ class UnitSystem:
 LINEAR, ROTATIONAL = UnitSystem(), UnitSystem("N m", "rad")
 
 
-def system_of(commands: Sequence[str], motions: Sequence[str]) -> UnitSystem:
+def system_of(commands: Sequence[str], motions: Sequence[str], time: str = "s") -> UnitSystem:
     """Units of a recording's commands and responses, those of the first where they differ."""
     motion = next((motions[0].removesuffix(rate) for rate in _RATES if motions[0].endswith(rate)), motions[0])
-    return UnitSystem(commands[0], motion)
+    return UnitSystem(commands[0], motion, time)
 
 
 def _basic(name: str) -> tuple[tuple[str, int], ...]:

@@ -10,6 +10,7 @@ from analysis.diagnosis.balance.joint_fit import PARTS, JointFit, Part, joint_fi
 from analysis.diagnosis.balance.law import scales_of
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
@@ -29,6 +30,8 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "mass-spring": PARTS,
     "gravity": PARTS,
 }
+STUCK = 1e-6
+"""Of the least mass, and one standard deviation of what nothing tells, where no time is known."""
 GAINED = 0.02
 """Of the plainer structure's error power, and"""
 SURE = 2.0
@@ -180,7 +183,7 @@ def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
     """Raises MechanicalModelError."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
     if kind == "massless":
-        mass = np.diag(_least_mass(given.regressions[0].motions))
+        mass = np.diag(_least_mass(given.regressions[0].motions)) * (STUCK if given.untimed else 1.0)
     problems = tuple(
         f"the {name} is negative ({matrix.diagonal().min():.3g})"
         for name, matrix in (("mass", mass), ("damping", damping))
@@ -201,7 +204,10 @@ def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
     assert wide.tolerance is not None
     sizes = wide.tolerance
     stated = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
-    return with_units_of(replace(wide, tolerance=stated), recording.command.units, recording.response.units)
+    if given.untimed:
+        stated = Tolerance(STUCK, STUCK, sizes.stiffness_n_per_m, None)
+    units = recording.command.units, recording.response.units
+    return with_units_of(replace(wide, tolerance=stated), *units, time_unit(recording))
 
 
 def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

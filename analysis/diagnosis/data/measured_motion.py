@@ -57,3 +57,8 @@ def filled_gaps(samples: FloatArray) -> FloatArray:
         elif not known.any():
             column[:] = 0.0
     return whole
+
+
+def time_unit(recording: Recording) -> str:
+    """ "sample" where no time is known: what hangs on time then hangs on the samples' numbers."""
+    return "sample" if recording.meta.get("time") == "unknown" else "s"

@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import in_closed_loop
-from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.data.measured_motion import has_motion, time_unit
 from analysis.diagnosis.data.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.data.observed import Observed, noise_in_units
 from analysis.diagnosis.data.observed_parts import observed_parts
@@ -97,7 +97,8 @@ def measure_of(
         except np.linalg.LinAlgError:
             if compared == "motion" or not all(has_motion(record.recording, model) for record in records):
                 return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
-    return _by_force(records, model, floors, remarks)
+    band_hz = ORDERED * recordings[0].sample_rate_hz if choice.why == UNTIMED else None
+    return _by_force(records, model, floors, remarks, band_hz)
 
 
 def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> Chosen:
@@ -118,9 +119,7 @@ def _by_force(
 ) -> Chosen:
     known = placed_effects(model, records[0].recording.command.channels, records[0].recording.response.channels)
     views = force_views(records, model, floors, band_hz)
-    said = (
-        f"The forces are compared up to {views.measure.band_hz:.3g} Hz." if np.isfinite(views.measure.band_hz) else ""
-    )
+    said = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
     return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, said))))
 
 
@@ -135,6 +134,8 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
     """The rule of this module's first lines."""
     longest_s = max(len(record.command) / record.recording.sample_rate_hz for record in records)
     holds, motion = holds_itself(model, longest_s), all(has_motion(record.recording, model) for record in records)
+    if motion and any(time_unit(record.recording) != "s" for record in records):
+        return Choice("predicted force", UNTIMED)
     if any(record.recording.meta.get("imposed") for record in records):
         return Choice("predicted force", IMPOSED)
     if not holds and any(in_closed_loop(record.recording) for record in records):
@@ -180,6 +181,12 @@ def _slowest(model: MechanicalModel) -> float:
     return -float(np.linalg.eigvals(motion).real.max())
 
 
+ORDERED = 0.45
+"""Of the sample rate: nearly all that samples without a clock can show."""
+UNTIMED = (
+    "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that hangs on "
+    "speed, acceleration or frequency is known."
+)
 IMPOSED = (
     "The motion was imposed and the force measured, so the force that the model needs along the motion is compared "
     "with the measured one."

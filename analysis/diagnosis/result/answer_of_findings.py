@@ -50,7 +50,7 @@ def answer_of_findings(
         where=localisation_sentences(found.local) if found.maps else (),
         named=named_sentences(found),
         effects=tuple(effect.effect for effect in diagnosis.effects),
-        left=remainder_sentence(diagnosis),
+        left=remainder_sentence(diagnosis, device_of(found)),
         remarks=found.remarks,
         numbers=own_numbers(found, nominal),
         stretches=held_out_stretches(found.courses),

@@ -119,24 +119,25 @@ def inseparable_sentence(effect: NamedEffect) -> str:
     )
 
 
-def remainder_sentence(diagnosis: Diagnosis) -> str:
+def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:
     """What is still unexplained, in the document's order: what misses most of the signal comes first."""
     left = diagnosis.remainder
     if not left:
         return "Nothing significant is left unexplained."
     more = len(left) - _PLACES_NAMED
     rest = f"; and {more} smaller {'place' if more == 1 else 'places'}" if more > 0 else ""
-    return f"Still unexplained: {'; '.join(place_of(row) for row in left[:_PLACES_NAMED])}{rest}."
+    return f"Still unexplained: {'; '.join(place_of(row, device) for row in left[:_PLACES_NAMED])}{rest}."
 
 
-def place_of(mismatch: Mismatch) -> str:
+def place_of(mismatch: Mismatch, device: Device | None = None) -> str:
     """ "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the mismatch (p < 0.0001)"."""
     low, high = mismatch.band_hz
+    band = f" at {low:g} to {high:g} Hz" if device is None or device.system.time == "s" else ""
     level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
     state = f", {mismatch.state}" if mismatch.state else ""
     driven = f", driven by {mismatch.input}{level}" if mismatch.input else ""
     share = f"{share_text(mismatch.share)} of {'the mismatch' if mismatch.state else 'the signal'}"
-    return f"{mismatch.output} at {low:g} to {high:g} Hz{driven}{state}: {share} ({p_text(mismatch.p_value)})"
+    return f"{mismatch.output}{band}{driven}{state}: {share} ({p_text(mismatch.p_value)})"
 
 
 def next_experiment_sentence(diagnosis: Diagnosis) -> str:
@@ -187,7 +188,7 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
         lines += [
             retuned_sentence(moved),
-            remainder_sentence(diagnosis),
+            remainder_sentence(diagnosis, device_of(found)),
             *ceiling_sentences(found.reached),
             black_box_sentence(found.black_box, bool(diagnosis.effects)),
             *candidate_sentences(diagnosis, device_of(found)),

@@ -8,6 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.first_model import first_model, share_within
 from analysis.diagnosis.balance.reduced_recordings import is_reduced, reduced_recordings
 from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.operating_point import about_operating_point
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
@@ -73,6 +74,9 @@ def looks_of(
     if not any(balance.named for balance in balances):
         return
     chosen = measure_of(recordings, model)
+    if time_unit(recordings[0]) != "s":
+        yield Look(model, chosen)
+        return
     if chosen.measure.name == "free simulation" and compared != "force":
         yield Look(model, chosen)
     if compared == "motion":

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.first_model import plain_model
+from analysis.diagnosis.balance.model_structures import StructureRefused, balanced, structure_of
+from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.search.by_balance import balances_of
 from analysis.diagnosis.types import Patience, Progress
@@ -25,6 +28,12 @@ RIGID_SAID = (
 BALANCE_SAID = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
     "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
+)
+
+
+UNTIMED_SAID = (
+    "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
+    "The mass in the file is a floor that no force shows; damping and mass are not known."
 )
 
 
@@ -47,6 +56,8 @@ def first_model_of(
     _require_no_weight(found)
     on_progress("weighing laws in the force balance", 0.0)
     balances = balances_of(found.recordings, frozenset(without), patient)
+    if any(time_unit(each) != "s" for each in found.recordings) and (still := _massless(found.recordings)) is not None:
+        return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, found.recordings[0], "fitted to these recordings")
     if model is not None:
         return FirstModel(model, (BALANCE_SAID,), balances)
@@ -55,6 +66,14 @@ def first_model_of(
         found, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
     )
     return FirstModel(model, remarks, balances)
+
+
+def _massless(recordings: Sequence[Recording]) -> MechanicalModel | None:
+    """None where no motion was measured along the commands."""
+    try:
+        return structure_of(balanced(recordings), "massless").model
+    except (StructureRefused, NoMotionError):
+        return None
 
 
 def fitted_model(

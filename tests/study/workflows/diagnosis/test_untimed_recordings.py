@@ -1,0 +1,69 @@
+"""Where no time is known, forces are compared along positions, and no mass, damping, second or hertz is said."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.document import Mismatch
+from analysis.diagnosis.errors.choose_measure import UNTIMED, measure_of
+from analysis.diagnosis.result.candidate_wording import Device
+from analysis.diagnosis.result.wording import place_of
+from analysis.diagnosis.search.looks import looks_of
+from equalizer.plant.effect_vocabulary import matrix_unit
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput
+from study.workflows.diagnosis.fitted_first import first_model_of
+
+STIFFNESS, FRICTION = 500.0, 2.0
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """A spring with dry friction, in loops of several sizes."""
+    n = np.arange(4000)
+    position = 0.01 * np.sin(2 * np.pi * n / 800) * np.repeat([0.3, 0.6, 1.0, 0.8, 1.0], 800)
+    force = STIFFNESS * position + FRICTION * np.sign(np.gradient(position))
+    force = force + 0.02 * np.random.default_rng(1).standard_normal(len(n))
+    return Recording(
+        "spring", Signal(force[:, None], 1.0, "force", "N", ("fx",)),
+        Signal(position[:, None], 1.0, "position", "m", ("x",)), meta={"time": "unknown"},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def first(recording):
+    given = DiagnosisInput((recording,), ("spring",), (), ())
+    return first_model_of(given, (), lambda: True, lambda what, share: None)
+
+
+def test_the_first_model_is_a_spring(first, recording):
+    assert first.model.stiffness[0, 0] == pytest.approx(STIFFNESS, rel=0.1)  # friction bends it
+    assert first.model.mass[0, 0] < 0.1 and first.model.damping[0, 0] == 0
+    assert "no time is known" in first.remarks[0]
+
+
+def test_friction_is_weighed_and_forces_are_compared_once(first, recording):
+    (balance,) = first.balances
+    assert "coulomb_friction" in {law.law.effect for law in balance.named}
+    (look,) = looks_of((recording,), first.model, first.balances, "auto")
+    assert look.chosen.measure.name == "predicted force"
+    assert look.chosen.remarks == (UNTIMED,)  # no frequency up to which they are compared
+
+
+def test_a_timed_recording_of_the_same_is_played(first, recording):
+    timed = Recording(recording.device, recording.command, recording.response)
+    assert UNTIMED not in measure_of((timed,), first.model).remarks
+
+
+def test_no_unit_holds_a_second(first):
+    system = first.model.system
+    assert [matrix_unit(part, system) for part in ("mass", "damping", "stiffness")] == [
+        "N sample^2/m", "N sample/m", "N/m",
+    ]  # fmt: skip
+    assert (system.of("m/s"), system.of("s"), system.of("Hz")) == ("m/sample", "sample", "1/sample")
+
+
+def test_no_place_is_said_in_hertz(first):
+    row = Mismatch("x", "fx", (0.0, 0.5), None, None, 0.02, 0.0)
+    assert "Hz" not in place_of(row, Device(True, first.model.system))
+    assert "Hz" in place_of(row)
