@@ -5,22 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.data.found_segments import decided_command, found_period
 from analysis.diagnosis.data.periods import look_samples, settled_periods
 from analysis.look.channels import Stretch, rms
 from analysis.look.check import Check
 from analysis.wording import listed, typeset
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.signal import FloatArray
 
 REPEATS = "repeats"
-SHORTEST = 16
-"""Samples of a period."""
-ALIKE, DIPPED = 0.98, 0.7
-"""Correlation of a command with itself a period later, and to which it must have fallen in between."""
 SAME, UNLIKE = 0.02, 0.2
 """Rms by which the command of declared periods may differ, as a share of it."""
 LOUD = 0.3
-MOST_SAMPLES = 2**19
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,49 +46,10 @@ def repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
     marked = [(segment.start, segment.stop) for segment in recording.segments]
     for places in (marked, list(stretches)):  # a segment that was split for a test may hold less than two periods
         start, stop = max(places, key=lambda place: place[1] - place[0], default=(0, 0))
-        if period := found_period(_decided(recording).samples[start:stop]):
+        if period := found_period(decided_command(recording).samples[start:stop]):
             as_said = replace(recording, segments=(Segment(start, stop, "multisine", 0.0, period),))
             return Repeats(period, (start, stop), _noise(as_said, declared=False))
     return Repeats(0, (0, 0), ())
-
-
-def _decided(recording: Recording) -> Signal:
-    excitation = recording.excitation
-    if excitation is None:
-        return recording.command
-    known = excitation.samples[np.isfinite(excitation.samples).all(axis=1)]
-    return excitation if len(known) and np.ptp(known, axis=0).max() > 0 else recording.command
-
-
-def found_period(command: FloatArray) -> int:
-    """The shortest after which the command repeats at least once more; 0 where there is none. command: (n, m)"""
-    used = command[:MOST_SAMPLES]
-    sizes = np.array([rms(column) for column in used.T])
-    if not np.isfinite(used).all() or not (sizes > 0).any() or len(used) < 2 * SHORTEST:
-        return 0
-    scaled = (used[:, sizes > 0] - used[:, sizes > 0].mean(axis=0)) / sizes[sizes > 0]
-    correlation = _correlation(scaled)[: len(used) // 2 + 1]
-    dips = np.flatnonzero(correlation < DIPPED)
-    if not len(dips):
-        return 0
-    after = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
-    if not len(after) or after[0] < SHORTEST:
-        return 0
-    # The top of the first hill that is high enough.
-    last = after[0] + int(np.argmax(np.diff(np.append(after, after[-1] + 2)) > 1))
-    return int(after[0] + np.argmax(correlation[after[0] : last + 1]))
-
-
-def _correlation(samples: FloatArray) -> FloatArray:
-    """(n,): with itself, a number of samples later, by the energy of both where they overlap."""
-    n = len(samples)
-    size = 2 ** int(np.ceil(np.log2(2 * n)))
-    spectrum = np.fft.rfft(samples, size, axis=0)
-    raw = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:n]
-    energy = np.concatenate([[0.0], np.cumsum(np.sum(samples**2, axis=1))])
-    lags = np.arange(n)
-    both = energy[n - lags] * (energy[n] - energy[lags])
-    return np.asarray(raw / np.sqrt(np.maximum(both, np.finfo(np.float64).tiny)))
 
 
 def _noise(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
@@ -143,7 +100,7 @@ def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[C
 def _declared(recording: Recording) -> list[Check | None]:
     """Segments whose command is another one declared period later."""
     return [
-        _kept(_decided(recording).samples[segment.start : segment.stop], segment, number)
+        _kept(decided_command(recording).samples[segment.start : segment.stop], segment, number)
         for number, segment in enumerate(recording.segments, start=1)
         if segment.period and segment.stop - segment.start >= 2 * segment.period
     ]

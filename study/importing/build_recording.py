@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.diagnosis.data.found_segments import with_found_segments
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import recording_problems
 from equalizer.signals.signal import FloatArray, Signal
@@ -77,13 +78,13 @@ def build_recording(
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
             parts.append(_part(wanted, part, said, counter, budget))
-        recording = _joined(wanted, parts, units)
+        recording, repeats = with_found_segments(_joined(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = said.sentences([part.label for part in planned])
-    return Built(recording, (*notes, *_said_of_units(wanted)))
+    return Built(recording, (*notes, *_said_of_units(wanted), *([repeats] if repeats else [])))
 
 
 class _Counter:

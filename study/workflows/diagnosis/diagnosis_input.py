@@ -17,6 +17,7 @@ from analysis.diagnosis.data.belonging import (
 from analysis.diagnosis.data.command_gaps import across_gaps
 from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
 from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.found_segments import with_found_segments
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -64,9 +65,12 @@ def read_input(
         read = tuple(read_recording(source) for source in sources)
         _require_alike(read, _names(sources))
         read, stated = _as_forces(read, constants)
+        read, repeats = _with_segments(read, sources)
         formed, said = plain_form(read) if plain else (read, ())
         driven, gaps = across_gaps(all_force_driven(formed), _names(sources))
-        found = DiagnosisInput(driven, _names(sources), tuple(sources), (*stated, *said, *gaps), constants=constants)
+        found = DiagnosisInput(
+            driven, _names(sources), tuple(sources), (*stated, *repeats, *said, *gaps), constants=constants
+        )
     try:
         require_something(found.recordings, found.names)
         require_different(found.recordings, found.names)
@@ -89,6 +93,16 @@ def _as_forces(
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
     return tuple(recording for recording, _ in found), (found[0][1],)
+
+
+def _with_segments(
+    recordings: Sequence[Recording], sources: Sequence[Path]
+) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """Of parts that repeat, where a recording has none of its own; and what was found."""
+    found = [with_found_segments(recording) for recording in recordings]
+    told = [(source.stem, said) for source, (_, said) in zip(sources, found, strict=True) if said]
+    said = tuple(said if len(sources) == 1 else f"{name}: {said}" for name, said in told)
+    return tuple(recording for recording, _ in found), said
 
 
 def _require_alike(recordings: Sequence[Recording], names: Sequence[str]) -> None:

@@ -114,6 +114,8 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Parts**: several files, or several groups of arrays in one file (`prefix`), go one after another; the state of the
   device jumps between them. `meta/parts` says where each begins and ends. Where names of arrays begin alike (`run1__u`,
   `run1__y`, `run2__u`, ...; `run1/force`, ...) the map that is proposed has a part for each run.
+* **Segments**: where a map states none, or there is no map, each part whose command repeats exactly, three times or
+  more, becomes a segment with that period and its level, and that is said; where nothing repeats none are made.
 * **Names** are understood in headers and in the map that is proposed: force, load, torque, position, displacement,
   stroke, encoder, angle, theta, speed, velocity, omega, acceleration, voltage, current, temperature, pressure,
   humidity, setting, supply, with a unit in brackets or at the end (`displacement_mm`, `omega_rad_s`, `torque_Nm`).

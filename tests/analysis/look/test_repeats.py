@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from analysis.look.repeats import found_period, repeat_checks, repeats
+from analysis.diagnosis.data.found_segments import found_period
+from analysis.look.repeats import repeat_checks, repeats
 from equalizer.signals.recording import Segment
 
 

@@ -137,3 +137,18 @@ def test_what_is_refused_leaves_nothing_behind(tmp_path):
     with pytest.raises(ImportRefusedError, match="runs backwards at sample 5"):
         import_recording(ImportPlan((tmp_path / "a.csv",), None, tmp_path / "r.h5"))
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_tables_whose_command_repeats_get_segments_with_period_and_level(tmp_path):
+    command = np.tile(np.random.default_rng(1).standard_normal(300), 4)
+    for number, level in enumerate((1, 3), start=1):
+        rows = [f"{k / 1000:.3f},{level * u:.6f},{u * u:.6f}" for k, u in enumerate(command)]
+        (tmp_path / f"run_{number}.csv").write_text("time [s],fx [N],ax [g]\n" + "\n".join(rows) + "\n")
+    files = (tmp_path / "run_1.csv", tmp_path / "run_2.csv")
+    done = import_recording(ImportPlan(files, None, tmp_path / "r.h5"))
+    found = read_recording(tmp_path / "r.h5").segments
+    assert [(s.start, s.stop, s.kind, s.period) for s in found] == [
+        (0, 1200, "multisine", 300), (1200, 2400, "multisine", 300)
+    ]  # fmt: skip
+    assert found[1].amplitude == pytest.approx(3 * found[0].amplitude)
+    assert done.notes[-1].startswith("The command repeats exactly, every 300 samples, 4 times or more in each part")

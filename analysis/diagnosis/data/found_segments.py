@@ -1,0 +1,142 @@
+"""Segments of a recording that has none: parts whose command repeats exactly, with their period and level.
+
+A period is only stated where the command itself, sample by sample, is the same one period later, all through the part:
+what was measured with noise, or repeats nearly, is left without. Where no part repeats, nothing is stated at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.observed_parts import MOST_PERIODS, parts_of
+from analysis.diagnosis.data.rounding import rounding_step
+from analysis.wording import listed
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import FloatArray, Signal
+
+SHORTEST = 16
+"""Samples of a period that is looked for."""
+LEAST_WHOLE = 3
+"""Periods of a part: the first holds the transient, and noise shows between two."""
+LEAST_BY_ITSELF = 256
+"""Samples, as many as a diagnosis needs: of a shorter period an odd multiple is stated, for odd lines must stay odd."""
+ALIKE, DIPPED = 0.98, 0.7
+"""Correlation of a command with itself a period later, and to which it must have fallen in between."""
+EXACT = 1e-6
+"""Of its peak, that a command may differ by from one period to the next: rounding of numbers stored in six digits."""
+ROUNDED = 1e-3
+"""Of its rms, that steps of rounding may make where they come about otherwise in another period."""
+MOST_SAMPLES = 2**19
+
+
+def with_found_segments(recording: Recording) -> tuple[Recording, str]:
+    """And a sentence about what was found; the same recording and no sentence where it has segments, or where no part
+    of its command repeats."""
+    if recording.segments:
+        return recording, ""
+    parts = parts_of(recording)
+    decided = decided_command(recording).samples
+    periods = [exact_period(decided[start:stop]) for start, stop in parts]
+    if not any(periods):
+        return recording, ""
+    segments = tuple(
+        Segment(start, stop, _kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
+        for (start, stop), period in zip(parts, periods, strict=True)
+    )
+    return replace(recording, segments=segments), _said(segments)
+
+
+def decided_command(recording: Recording) -> Signal:
+    """What was decided beforehand: the excitation where there is one that moves, else the command."""
+    excitation = recording.excitation
+    if excitation is None:
+        return recording.command
+    known = excitation.samples[np.isfinite(excitation.samples).all(axis=1)]
+    return excitation if len(known) and np.ptp(known, axis=0).max() > 0 else recording.command
+
+
+def exact_period(command: FloatArray) -> int:
+    """Samples after which all of the command is the same again; 0 where it is not, or not often enough. An odd multiple
+    of the shortest, where that is too short to tell anything by itself. command: (n, m)"""
+    period = found_period(command)
+    if not period or len(command) // period < LEAST_WHOLE or not _is_same(command[period:], command[:-period]):
+        return 0
+    if period >= LEAST_BY_ITSELF:
+        return period
+    # As long as more periods are left than decisions are made by; what repeats is alike, so any multiple is a period.
+    times = len(command) // period // (MOST_PERIODS + 1)
+    multiple = period * max(1, times - 1 + times % 2)
+    return multiple if multiple >= LEAST_BY_ITSELF else 0
+
+
+def found_period(command: FloatArray) -> int:
+    """The shortest after which the command repeats, nearly, once more or oftener; 0 where none is. command: (n, m)"""
+    used = command[:MOST_SAMPLES]
+    sizes = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
+    if not np.isfinite(used).all() or not (sizes > 0).any() or len(used) < 2 * SHORTEST:
+        return 0
+    scaled = (used[:, sizes > 0] - used[:, sizes > 0].mean(axis=0)) / sizes[sizes > 0]
+    correlation = _correlation(scaled)[: len(used) // 2 + 1]
+    dips = np.flatnonzero(correlation < DIPPED)
+    if not len(dips):
+        return 0
+    after = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
+    if not len(after) or after[0] < SHORTEST:
+        return 0
+    # The top of the first hill that is high enough.
+    last = after[0] + int(np.argmax(np.diff(np.append(after, after[-1] + 2)) > 1))
+    return int(after[0] + np.argmax(correlation[after[0] : last + 1]))
+
+
+def _correlation(samples: FloatArray) -> FloatArray:
+    """(n,): with itself, a number of samples later, by the energy of both where they overlap."""
+    n = len(samples)
+    size = 2 ** int(np.ceil(np.log2(2 * n)))
+    spectrum = np.fft.rfft(samples, size, axis=0)
+    raw = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:n]
+    energy = np.concatenate([[0.0], np.cumsum(np.sum(samples**2, axis=1))])
+    lags = np.arange(n)
+    both = energy[n - lags] * (energy[n] - energy[lags])
+    return np.asarray(raw / np.sqrt(np.maximum(both, np.finfo(np.float64).tiny)))
+
+
+def _is_same(later: FloatArray, before: FloatArray) -> bool:
+    """Each channel, but for the rounding of its numbers."""
+    if not np.isfinite(later).all() or not np.isfinite(before).all():
+        return False
+    for column, other in zip(later.T, before.T, strict=True):
+        off = np.abs(column - other)
+        if off.max() <= EXACT * np.abs(column).max():
+            continue
+        step = rounding_step(column)
+        if off.max() > 1.5 * step or np.sqrt(np.mean(off**2)) > ROUNDED * np.std(column):
+            return False
+    return True
+
+
+def _kind(command: FloatArray, period: int) -> str:
+    if not period:
+        return "noise"
+    power = np.sum(np.abs(np.fft.rfft(command[:period] - command[:period].mean(axis=0), axis=0)) ** 2, axis=1)
+    return "sine" if power.max() > ALIKE * power.sum() else "multisine"
+
+
+def _peak(command: Signal, start: int, stop: int) -> float:
+    samples = command.samples[start:stop]
+    known = samples[np.isfinite(samples)]
+    return float(np.abs(known).max()) if known.size else 0.0
+
+
+def _said(segments: Sequence[Segment]) -> str:
+    periodic = [segment for segment in segments if segment.period]
+    periods = listed([str(period) for period in sorted({segment.period for segment in periodic})])
+    levels = listed([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])
+    where = (
+        "The command" if len(periodic) == len(segments) else f"In {len(periodic)} of {len(segments)} parts the command"
+    )
+    least = min((segment.stop - segment.start) // segment.period for segment in periodic)
+    return (
+        f"{where} repeats exactly, every {periods} samples, {least} times or more in each part: segments with that "
+        f"period were made, with peaks of {levels} (SI units)."
+    )
