@@ -1,4 +1,4 @@
-"""What makes a recording consistent, and what an analysis may ask of it beyond that."""
+"""What makes a recording consistent."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -9,13 +9,9 @@ from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Recording,
 from equalizer.signals.signal import FloatArray, Signal
 
 
-class MissingSamplesError(ValueError):
-    """An analysis met NaN where it needs every sample."""
-
-
 def recording_problems(recording: Recording) -> tuple[str, ...]:
     """Sentences, one for everything that contradicts the format. Empty = consistent. NaN counts as missing, not as
-    wrong: `require_finite` is for those who cannot use it."""
+    wrong."""
     found = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]
     if recording.time_s is not None:
         found.extend(_time_problems(recording.time_s, len(recording)))
@@ -32,20 +28,6 @@ def signals_of(recording: Recording) -> dict[str, Signal]:
         "condition": recording.condition,
     }
     return {name: signal for name, signal in every.items() if signal is not None}
-
-
-def require_finite(
-    recording: Recording, what_for: str, signals: Sequence[str] = ("command", "response", "position", "excitation")
-) -> None:
-    """Raises MissingSamplesError, with the first place and the number, if any of the signals misses samples."""
-    for name, signal in signals_of(recording).items():
-        missing = np.argwhere(~np.isfinite(signal.samples)) if name in signals else np.empty((0, 2))
-        if len(missing):
-            row, column = (int(index) for index in missing[0])
-            raise MissingSamplesError(
-                f"{what_for} needs every sample, but {name} misses {len(missing)} (the first at sample {row} of "
-                f"channel '{signal.channels[column]}'); leave out the segments with gaps, or record again"
-            )
 
 
 def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]:

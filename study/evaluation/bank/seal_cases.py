@@ -21,19 +21,8 @@ from study.store.formats.recording_file import write_recording
 from study.workflows.worker_processes import worker_processes
 
 
-def write_case(folder: Path, name: str, case: Case, *, overwrite: bool = False) -> None:
-    """`name`.h5, `name`.toml and `name`.truth.json. Raises AlreadyThereError, CannotWriteError."""
-    write_recording(folder / f"{name}.h5", case.recording, precision="float32", overwrite=overwrite)
-    write_mechanical_model(folder / f"{name}.toml", case.model, overwrite=overwrite)
-    write_text(folder / f"{name}.truth.json", truth_text(case), overwrite=overwrite)
-
-
-def truth_text(case: Case) -> str:
-    """A JSON list, one entry per effect; empty where the model lacks nothing."""
-    return json.dumps(truths(case), indent=1, allow_nan=False) + "\n"
-
-
 def truths(case: Case) -> list[dict[str, Any]]:
+    """One entry per effect; empty where the model lacks nothing."""
     return [
         {
             "effect": truth.effect,
