@@ -68,10 +68,7 @@ class Regression:
     def crossed(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each block's sum of squares with numbers fitted to the others."""
         own = parts_of(self.fit, columns)
-        rest = own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]
-        weights = solved(rest, RIDGE)
-        for number in np.flatnonzero((weights[:, list(self.positive)] < 0).any(axis=1)):
-            weights[number] = self._fitted((rest[0][number], rest[1][number]))
+        weights = self._fitted((own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]))
         return errors_of(self.fit, own, weights)
 
     def held_out(self, columns: Sequence[int]) -> FloatArray:
@@ -79,18 +76,22 @@ class Regression:
         return errors_of(self.test, parts_of(self.test, columns), self._fitted(total(self.fit, columns)))
 
     def _fitted(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Least squares in which the axis has no mass and no damping below zero."""
-        free = np.ones(len(products[1]), dtype=np.bool_)
-        found = np.zeros(len(products[1]))
-        for _ in self.positive:
-            found[:] = 0.0
-            found[free] = solved((products[0][np.ix_(free, free)], products[1][free]), RIDGE)
-            below = [place for place in self.positive if found[place] < 0]
-            if not below:
+        """(..., c), of (..., c, c) and (..., c): least squares in which the axis has no mass and no damping below
+        zero."""
+        gram, pull = products
+        found = solved(products, RIDGE)
+        places = list(self.positive)
+        bound: Mask = np.zeros_like(found, dtype=np.bool_)
+        for _ in range(len(places) - 1):
+            below = found[..., places] < 0
+            if not below.any():
                 break
-            free[below] = False
-            found[below] = 0.0
-        return found
+            bound[..., places] |= below
+            for fixed in np.unique(bound.reshape(-1, bound.shape[-1]), axis=0):
+                if fixed.any():
+                    at = (bound == fixed).all(axis=-1)
+                    found[at] = _without(gram[at], pull[at], fixed)
+        return np.where(bound, 0.0, found)
 
     def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
         """Per motion, (kept samples,): the force that the columns do not explain."""
@@ -98,6 +99,14 @@ class Regression:
         return tuple(
             force - rows[:, list(columns)] @ found for force, rows in zip(self.force, self.columns, strict=True)
         )
+
+
+def _without(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
+    """As `solved`, with fixed columns of no weight."""
+    free = np.flatnonzero(~fixed)
+    found = np.zeros_like(pull)
+    found[..., free] = solved((gram[..., free[:, None], free], pull[..., free]), RIDGE)
+    return found
 
 
 def regression_of(
