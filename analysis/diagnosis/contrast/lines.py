@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.contrast.taken import Taken
 from analysis.diagnosis.settings import STEP_FACTOR
-from equalizer.effects.starts.lattice import lattice_step
+from equalizer.effects.starts.lattice import lattice_step, own_step
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 
@@ -77,8 +77,9 @@ def steps_of(faulty: Sequence[Taken], clean: Sequence[Taken]) -> Line | None:
     steps, say nothing."""
     for channel in range(faulty[0].command.shape[1]):
         here, usual = (np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean))
-        step, own = lattice_step(here), lattice_step(usual) or 0.0
-        if step is not None and step > STEP_FACTOR * own and len(np.unique(usual)) > 2 * len(np.unique(here)):
+        step = lattice_step(here)
+        many = len(np.unique(usual)) > 2 * len(np.unique(here))
+        if many and step is not None and step > STEP_FACTOR * own_step(usual, step):
             return Line("force_quantization", "actuator", (channel,), {"step": step})
     return None
 

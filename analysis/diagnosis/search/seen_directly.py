@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, clai
 from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.starts.lattice import lattice_step
+from equalizer.effects.starts.lattice import lattice_step, own_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -18,6 +18,10 @@ ALIKE = 1e-3
 """Share of a step by which those of channels may differ that have the same."""
 LONG_RUNS = 2.0
 """Repeats in a row, on average, as they are where half of all samples are lost: more is play, or a sensor at rest."""
+CATCHES_UP = 0.75
+"""Times the median step that the one after lost samples must be: a reading that play held goes half of one or less."""
+STRETCHES = 3
+"""Of each sound recording: what is usual in any of them is no fault."""
 SAME = 1e-9
 """Share of its largest reading by which a channel's readings at a limit may differ."""
 
@@ -27,7 +31,8 @@ def seen_directly(
 ) -> tuple[Hypothesis, ...]:
     """At most one: rounded readings also repeat and have a largest value. effects: those that may be named."""
     known = {effect.name: effect for effect in effects}
-    new, sound = _readings(recordings), [_readings([recording]) for recording in clean]
+    new = _readings(recordings)
+    sound = [part for recording in clean for part in np.array_split(_readings([recording]), STRETCHES) if len(part)]
     for name, look in (("quantization", _steps), ("sensor_clipping", _limit), ("lost_samples", _twice)):
         found = look(new, sound)
         if found is not None:
@@ -54,8 +59,7 @@ def _steps(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     found = {}
     for c in range(new.shape[1]):
         step = lattice_step(new[:, c])
-        usual = max((lattice_step(readings[:, c]) or 0.0 for readings in sound), default=0.0)
-        if step is not None and step > STEP_FACTOR * usual:
+        if step is not None and all(step > STEP_FACTOR * own_step(readings[:, c], step) for readings in sound):
             found[c] = step
     alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
     return _where(found, alike and len(found) == new.shape[1], new.shape[1], "step")
@@ -96,10 +100,18 @@ def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
     repeated = _repeats(new)
     usual = max(float(_begun(_repeats(readings)).mean()) for readings in sound) * len(repeated)
     begun = int(_begun(repeated).sum())
-    if not _unusual(begun, usual) or repeated.sum() > LONG_RUNS * begun:
+    if not _unusual(begun, usual) or repeated.sum() > LONG_RUNS * begun or not _catches_up(new, repeated):
         return None
     fraction = (float(repeated.sum()) - usual) / len(repeated)
     return tuple(range(new.shape[1])), {"fraction": fraction}
+
+
+def _catches_up(values: FloatArray, repeated: Mask) -> bool:
+    """After samples were lost, a reading steps as far as ever, or further; where play held it, it begins to move."""
+    sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
+    after = repeated[:-1] & ~repeated[1:]
+    other = ~repeated[:-1] & ~repeated[1:]
+    return bool(np.median(sizes[after]) > CATCHES_UP * np.median(sizes[other])) if after.any() and other.any() else True
 
 
 def _repeats(values: FloatArray) -> Mask:

@@ -47,6 +47,13 @@ def lattice_step(values: FloatArray) -> float | None:
     return step if lattice_offset(values, step) is not None else None
 
 
+def own_step(values: FloatArray, other: float) -> float:
+    """The step of a lattice that values lie on; 0 = none. other: a step that is asked for where there are too many
+    different values to tell a lattice from them alone."""
+    own = lattice_step(values)
+    return own if own is not None else other if lattice_offset(values, other) is not None else 0.0
+
+
 def staircase_step(values: FloatArray, noise: float) -> float | None:
     """The step of a staircase under noise, from the ripple that it leaves in the histogram; None without one."""
     span = float(np.ptp(values))

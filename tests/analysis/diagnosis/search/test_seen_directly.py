@@ -97,3 +97,27 @@ def test_play_before_the_sensor_is_neither_a_limit_nor_lost_samples():
         return found
 
     assert seen(spoiled(recording(2, 0.0), play), recording(1, 0.0)) == []
+
+
+def test_a_sound_device_that_moves_shows_the_lattice_that_it_has_at_rest_too():
+    """An encoder of fine steps takes nearly as many values as there are samples while it moves, and five at rest."""
+    at = np.arange(6000)
+    moving, resting = 1e-5 * np.round(3e4 * np.sin(at / 900)), 1e-5 * np.round(2.2 * np.sin(at / 300))
+    clean, new = (spoiled(recording(1), lambda y, c=course: c[:, None]) for course in (moving, resting))
+    assert seen(new, clean) == []
+    coarse = spoiled(recording(1), lambda y: 1e-3 * np.round(300 * np.sin(at / 900))[:, None])
+    assert seen(coarse, clean)[0][0] == "quantization"
+
+
+def test_play_that_is_crossed_in_a_few_samples_has_lost_none():
+    """It begins to move slowly, where a reading that was lost is caught up with."""
+    smooth = np.sin(np.arange(6000) / 5.0) + np.sin(np.arange(6000) / 7.3)
+    held, read = np.empty(6000), smooth[0]
+    for k, here in enumerate(smooth):
+        read = np.clip(read, here - 0.005, here + 0.005)
+        held[k] = read
+    clean = spoiled(recording(1), lambda y: smooth[::-1, None].copy())
+    assert seen(spoiled(recording(2), lambda y: held[:, None]), clean) == []
+    lost = smooth.copy()
+    lost[2::3] = smooth[1::3]
+    assert seen(spoiled(recording(2), lambda y: lost[:, None]), clean)[0][0] == "lost_samples"
