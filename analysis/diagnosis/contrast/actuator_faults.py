@@ -7,7 +7,7 @@ import numpy as np
 from scipy.fft import irfft, rfft
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.fault import Fault, Told, Undo, Variant, sized
+from analysis.diagnosis.contrast.fault import Fault, Numbers, Told, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
 from equalizer.effects.simulation.slew_kernel import follow
 from equalizer.signals.band_limited import odd_continued, straight
@@ -20,6 +20,8 @@ AROUND = (0.75, 1.35)
 LONGEST = 0.3
 """Of the period of the command's middle frequency, that it comes late: beyond, late is no word for it."""
 GRID = 12
+BEGUN = (0.0, 0.25, 0.5)
+"""Share of a drift that had come before the recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +74,16 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
         Variant((axis.of(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
                 told=lambda x, rate: 2 * x),
     ])  # fmt: skip
-    drift = axis.fault("force_gain_drift", [
-        Variant((axis.of(lambda u, rate: u * (1 + np.linspace(0.0, 1.0, len(u)))),),
-                lambda s: {"change": gain(float(s[0])) - 1}, -0.9, 20.0,
-                told=lambda x, rate: x * (1 + np.linspace(0.0, 1.0, len(x)))[:, None]),
-    ])  # fmt: skip
-    yield replace(drift, varies=True)
+    drifts = [_drifting(axis, begun, lambda s: {"change": gain(float(s[0])) - 1}) for begun in BEGUN]
+    yield replace(axis.fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
+
+
+def _drifting(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
+    def ramp(samples: FloatArray) -> FloatArray:
+        return 1 + np.linspace(begun, 1.0, len(samples))
+
+    undo = axis.of(lambda u, rate: u * ramp(u))
+    return Variant((undo,), numbers, -0.9, 20.0, told=lambda x, rate: x * ramp(x)[:, None])
 
 
 def _delayed(axis: _Axis, time_s: float) -> Variant:

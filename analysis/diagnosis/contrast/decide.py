@@ -13,10 +13,15 @@ from analysis.diagnosis.contrast.stream import FOLDS
 BEYOND = 5.0
 """Times the largest gain between stretches of one set that a fault must gain. By hand: of six public
 devices in order, two halves differed by up to 3.7 times."""
+STEADY = 0.4
+"""Share of a gain that its lower end must be where the sets differ no more than stretches of one do. By hand: 0.16 to
+0.37 where two halves in order had another delay by chance; 0.47 for a damper that is hardly seen."""
 MAIN = 0.4
 """Share of what sets the sets apart that a name must explain: with less, the main part is another's."""
 ALMOST = 0.1
-"""Share of a fault's gain by which a rival must stay behind to be told from it."""
+"""Share of a fault's gain by which a rival must stay behind to be told from it,"""
+WORSE = 0.25
+"""or of what the fault leaves: where a gain is large, a tenth of it is many times that. By hand."""
 MOST_ALIKE = 4
 """Faults of a class; more of them tell nothing."""
 BOUND = float(t.ppf(0.975, FOLDS - 1))
@@ -42,12 +47,12 @@ class Decided:
 
 def decide(found: Compared, responses: int) -> Decided:
     """responses: how many channels there are."""
-    reasons = [(law, _why_not(law, found.differ)) for law in found.weighed]
+    reasons = [(law, _why_not(law, found.differ_but_for(law))) for law in found.weighed]
     sure = [law for law, why in reasons if why == ""]
     others = tuple((law, why) for law, why in reasons if law.gain > 0 and why)
     if not sure:
         return Decided(None, (), 0.0, others)
-    best = _plainest(sure)
+    best = _plainest(sure, found)
     rivals = [law for law in sure if law is not best]
     told_apart_from = [rival for rival in rivals if not _refines(rival, best)]
     alike = tuple(rival for rival in told_apart_from if _alike(best, rival, found))
@@ -74,21 +79,22 @@ def _refines(other: Weighed, best: Weighed) -> bool:
     return best.fault.effect in other.fault.simpler and best.fault.axis == other.fault.axis
 
 
-def _plainest(sure: Sequence[Weighed]) -> Weighed:
-    """The one that leaves least; of those that do nearly as well, one that it holds as a special case."""
+def _plainest(sure: Sequence[Weighed], found: Compared) -> Weighed:
+    """The one that leaves least; of those that these data cannot tell from it, one that it holds as a special case."""
     best = min(sure, key=lambda each: float(each.errors.sum()))
     for law in sure:
-        if _refines(best, law) and law.gain >= (1 - ALMOST) * best.gain:
+        if _refines(best, law) and _alike(best, law, found):
             return law
     return best
 
 
 def _why_not(weighed: Weighed, differ: bool) -> str:
-    """differ: whether the sets do by more than stretches of one. What changes in the course of a recording is not to be
-    weighed between stretches of the faulty set, and asks for that."""
+    """differ: whether the sets do by more than stretches of one. Where they do not, a fault must gain in all blocks
+    alike."""
     if weighed.gain < LEAST or weighed.gain_low <= 0:
         return "its gain is not larger than what varies between stretches"
-    if weighed.fault.varies and not differ:
+    steady = weighed.gain_low >= STEADY * weighed.gain
+    if not differ and not steady:
         return "stretches of one set differ as much as the sets do"
     if weighed.gain <= BEYOND * weighed.usual:
         return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
@@ -106,8 +112,9 @@ def _distance(weighed: Weighed, name: str) -> float:
 def _alike(best: Weighed, other: Weighed, found: Compared) -> bool:
     behind = other.errors - best.errors
     drawn = drawn_of(len(behind))
-    whole = float(found.plain.sum() - best.errors.sum())
-    return bool(behind.sum() <= ALMOST * whole or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
+    left = float(best.errors.sum())
+    least = min(ALMOST * (float(found.plain.sum()) - left), WORSE * left)
+    return bool(behind.sum() <= least or np.quantile(behind[drawn].sum(axis=1), LEVEL) <= 0)
 
 
 def _first(best: Weighed, rivals: Sequence[Weighed]) -> float:

@@ -16,7 +16,13 @@ Told = Callable[[FloatArray, float], FloatArray]
 """Of columns (n, k) that tell a command, at a rate."""
 
 
+Unit = Callable[[int], float]
+"""Of every how many samples are kept."""
 Numbers = Callable[[FloatArray], dict[str, float]]
+
+
+EVERY = -1
+"""Site of a fault that all channels have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +36,7 @@ class Variant:
     least: float = -np.inf
     most: float = np.inf
     """Of each size: about 1 where undoing is not linear in it."""
-    unit: float = 1.0
+    unit: Unit = lambda step: 1.0
     """What is told of a faulty sensor changes by this factor: else a gain that makes every error small would win."""
     told: Told | None = None
     """What the recorded command would be told to be, where that is known from what is told without the fault. Undoing

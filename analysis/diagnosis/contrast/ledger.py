@@ -57,6 +57,11 @@ class Grams:
             begin += len(at)
         return found
 
+    def undone(self, sizes: FloatArray) -> FloatArray:
+        """(blocks, width, width): of the rows with sizes undone."""
+        spread = self.spread(sizes)
+        return np.asarray(spread @ self.blocks @ spread.T)
+
     def part(self, blocks: Sequence[int]) -> FloatArray:
         return np.asarray(self.blocks[list(blocks)].sum(axis=0))
 
@@ -99,6 +104,11 @@ def fitted(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
             break
         sizes = moved
     return Fit(sizes, sum((_errors(pair, sizes) for pair in pairs), np.zeros(1)))
+
+
+def left_with(pairs: Sequence[Pair], sizes: FloatArray) -> float:
+    """What these sizes leave."""
+    return float(sum(_errors(pair, sizes).sum() for pair in pairs))
 
 
 def _start(variant: Variant) -> FloatArray:

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from analysis.diagnosis.contrast.actuator_faults import AROUND, GRID, at_times, late_times, later, middle_hz
-from analysis.diagnosis.contrast.fault import Fault, Undo, Variant, sized
+from analysis.diagnosis.contrast.actuator_faults import AROUND, BEGUN, GRID, at_times, late_times, later, middle_hz
+from analysis.diagnosis.contrast.fault import EVERY, Fault, Numbers, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
 from equalizer.effects.simulation.bristle_kernel import bent
 from equalizer.signals.signal import FloatArray
@@ -22,24 +23,31 @@ BENT = (0.02, 0.06, 0.15, 0.3)
 """Share of its largest reading by which that is off."""
 PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """As SHIFTS, of a gap before the sensor."""
+TURNED = 0.05
+"""Of a gap, by which a reading goes back that turns round."""
 FASTEST = 0.05
 """No clock is further off."""
+IN_UNITS = ("sensor_offset", "sensor_drift")
+"""Faults that only channels of one unit can have alike."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Channel:
-    number: int
+    numbers: tuple[int, ...]
+    """That have the fault: a channel, or all that there are."""
     name: str
     rms: float
     top: float
 
-    def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
-        return Fault(effect, "sensor", self.name, self.number, tuple(variants))
+    def fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
+        site = self.numbers[0] if self.name else EVERY
+        return Fault(effect, "sensor", self.name, site, tuple(variants), simpler)
 
     def of(self, read: Read) -> Undo:
         def undo(taken: Taken) -> Taken:
             response = taken.response.copy()
-            response[:, self.number] = read(response[:, self.number], taken.rate_hz)
+            for number in self.numbers:
+                response[:, number] = read(response[:, number], taken.rate_hz)
             return replace(taken, response=response)
 
         return undo
@@ -48,15 +56,9 @@ class _Channel:
 def sensor_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fault]:
     """parts: of all that is compared, which the grids span."""
     whole = np.concatenate([part.response[:, number] for part in parts])
-    channel = _Channel(number, name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
+    channel = _Channel((number,), name, float(np.std(whole)) or 1.0, float(np.abs(whole).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
-    times = late_times(longest.response[:, number], longest.rate_hz)
-    yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
-    shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
-    yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
-    yield replace(channel.fault("sensor_drift", [_drift(channel, shift) for shift in shifts]), varies=True)
-    yield channel.fault("logger_offset", [_late(channel, time_s) for time_s in times])
-    yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
+    yield from _shared(channel, longest, longest.response[:, number])
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_bent(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_bent(channel, share, 2, "square") for share in shares])
@@ -64,25 +66,65 @@ def sensor_faults(number: int, name: str, parts: Sequence[Taken]) -> Iterator[Fa
     for other in range(longest.response.shape[1]):
         if other != number:
             yield _heard(channel, other)
+
+
+def faults_of_all(parts: Sequence[Taken]) -> Iterator[Fault]:
+    """That all channels have alike: of one supply, one filter, one logger. parts: as above."""
+    whole = np.vstack([part.response for part in parts])
+    sizes = np.std(whole, axis=0)
+    largest = int(np.argmax(sizes))
+    top = float(np.abs(whole).max(initial=0.0)) or 1.0
+    channel = _Channel(tuple(range(whole.shape[1])), "", float(sizes[largest]) or 1.0, top)
+    longest = max(parts, key=lambda part: len(part.response))
+    alike = len(set(longest.recording.response.units)) == 1
+    for fault in _shared(channel, longest, longest.response[:, largest]):
+        if alike or fault.effect not in IN_UNITS:
+            yield fault
+
+
+def _shared(channel: _Channel, longest: Taken, course: FloatArray) -> Iterator[Fault]:
+    """Faults that one channel may have, or all. course: (n,) of the longest part."""
+    times = late_times(course, longest.rate_hz)
+    yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
+    shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
+    yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
+    drifts = [_drift(channel, shift, begun) for shift in shifts for begun in BEGUN]
+    yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
+    yield channel.fault("logger_offset", [_late(channel, time_s) for time_s in times])
+    yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz) for time_s in times])
     seconds = len(longest.response) / longest.rate_hz
-    least = 0.02 / middle_hz(longest.response[:, number], longest.rate_hz) / seconds
+    least = 0.02 / middle_hz(course, longest.rate_hz) / seconds
     rates = [side * float(rate) for rate in least * np.geomspace(0.2, 100.0, GRID) for side in (1.0, -1.0)]
     clocks = [_other_clock(channel, rate) for rate in rates if abs(rate) < FASTEST]
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
 def _play(channel: _Channel, gap: float) -> Variant:
-    """What is read stays behind by half the gap, which it takes the whole gap to turn round."""
-    undo = channel.of(lambda y, rate: y + 0.5 * gap * np.sign(bent(y, 0.05 * gap)))
-    return Variant((undo,), sized("gap", gap), *WIDELY)
+    return Variant((channel.of(lambda y, rate: _driven(y, gap)),), sized("gap", gap), *WIDELY)
+
+
+def _driven(y: FloatArray, gap: float) -> FloatArray:
+    """What drives a reading through a gap: half of it ahead. It turns round at the reading's extreme, at first slowly,
+    and has crossed the gap where the reading turns round, too."""
+    side = np.sign(bent(y, TURNED * gap))
+    ahead = 0.5 * side
+    turns = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
+    for begin, turn in pairwise([0, *turns.tolist()]):
+        course = side[turn - 1] * y[begin:turn]
+        top = begin + int(np.argmax(course))
+        left = top + int(np.flatnonzero(course[top - begin :] > course.max() - TURNED * gap)[-1])
+        crossed = (np.arange(top, turn) - top) / max(left - top, 1)
+        ahead[top:turn] = side[turn - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
+    return np.asarray(y + gap * ahead)
 
 
 def _heard(channel: _Channel, other: int) -> Fault:
     """Another channel in this one."""
+    (own,) = channel.numbers
 
     def undo(taken: Taken) -> Taken:
         response = taken.response.copy()
-        response[:, channel.number] -= taken.response[:, other]
+        response[:, own] -= taken.response[:, other]
         return replace(taken, response=response)
 
     return channel.fault("cross_axis_sensitivity", [Variant((undo,), sized("from_next"))])
@@ -90,15 +132,15 @@ def _heard(channel: _Channel, other: int) -> Fault:
 
 def _gain(channel: _Channel, gain: float) -> Variant:
     undo = channel.of(lambda y, rate: y / gain)
-    return Variant((undo,), lambda s: {"gain": 1 / (1 + float(s[0]) * (1 / gain - 1))}, *AROUND, gain)
+    return Variant((undo,), lambda s: {"gain": 1 / (1 + float(s[0]) * (1 / gain - 1))}, *AROUND, lambda step: gain)
 
 
 def _offset(channel: _Channel, shift: float) -> Variant:
     return Variant((channel.of(lambda y, rate: y - shift),), sized("offset", shift), *WIDELY)
 
 
-def _drift(channel: _Channel, total: float) -> Variant:
-    undo = channel.of(lambda y, rate: y - total * np.linspace(0.0, 1.0, len(y)))
+def _drift(channel: _Channel, total: float, begun: float) -> Variant:
+    undo = channel.of(lambda y, rate: y - total * np.linspace(begun, 1.0, len(y)))
     return Variant((undo,), sized("total", total), *WIDELY)
 
 
@@ -112,7 +154,15 @@ def _lag(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
     """A low pass y += share (x - y) from sample to sample, taken back exactly."""
     kept = float(np.exp(-1 / (time_s * rate_hz)))
     undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1], y[:-1]])) / (1 - kept))
-    return Variant((undo,), lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}, *AROUND, 1 - kept)
+    numbers: Numbers = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
+    return Variant((undo,), numbers, *AROUND, lambda step: _mean_gain(kept, step))
+
+
+def _mean_gain(kept: float, step: int) -> float:
+    """Of the low pass, as a mean of logarithms over what every so many samples hold: by so much it makes smaller what
+    cannot be foretold (Kolmogorov's formula for the error of the best prediction of a next sample)."""
+    turn = np.pi / step * (np.arange(256) + 0.5) / 256
+    return float(np.exp(np.mean(np.log((1 - kept) / np.abs(1 - kept * np.exp(-1j * turn))))))
 
 
 def _bent(channel: _Channel, share: float, power: int, number: str) -> Variant:
@@ -151,4 +201,4 @@ def turned_sensor() -> Fault:
 
     undo = tuple(of(np.array(turn)) for turn in TURNS)
     variant = Variant(undo, lambda s: {"degrees": float(np.degrees(np.linalg.norm(s)))})
-    return Fault("sensor_misalignment", "sensor", "", -1, (variant,))
+    return Fault("sensor_misalignment", "sensor", "", EVERY, (variant,))

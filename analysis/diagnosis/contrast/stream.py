@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.fault import Fault, Variant
+from analysis.diagnosis.contrast.fault import EVERY, Fault, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.ledger import Grams, Places, weights_of
 from analysis.diagnosis.contrast.step_base import StepBase
@@ -115,7 +115,7 @@ def _colour(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
 def changed_rows(stream: Stream, side: Side, fault: Fault, variant: Variant) -> list[tuple[FloatArray, ...]]:
     """Rows with each size of 1 undone."""
     found = []
-    tells = _made_by(stream.base) == (fault.place, fault.site)
+    tells = fault.place == (made := _made_by(stream.base))[0] and fault.site in (made[1], EVERY)
     if tells and variant.told is not None and isinstance(stream.base, ForceBase):
         rate_hz = stream.base.rate_hz
         return [tuple(np.hstack([part[:, :1], variant.told(part[:, 1:], rate_hz)]) for part in side.rows)]
@@ -123,9 +123,14 @@ def changed_rows(stream: Stream, side: Side, fault: Fault, variant: Variant) -> 
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
         rows = stream.base.rows(undone, side.rows if still else None)
-        unit = variant.unit * (_weaker(side, rows) if fault.place == "actuator" else 1.0) if tells else 1.0
+        unit = variant.unit(_kept_of(stream.base)) if tells else 1.0
+        unit *= _weaker(side, rows) if tells and fault.place == "actuator" else 1.0
         found.append(rows if unit == 1.0 else tuple(unit * part for part in rows))
     return found
+
+
+def _kept_of(base: Base) -> int:
+    return base.step if isinstance(base, StepBase) else 1
 
 
 def _made_by(base: Base) -> tuple[str, int]:

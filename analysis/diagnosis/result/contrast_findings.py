@@ -28,8 +28,8 @@ BESIDE = (
     "stretches of either."
 )
 NOT_COMPARED = (
-    "The recordings could not be compared with the clean ones: too little was recorded without gaps, or the fits broke "
-    "down. What is said here is of the model alone."
+    "The recordings could not be compared with the clean ones: too little was recorded without gaps, one of them "
+    "hardly moves, or the fits broke down. What is said here is of the model alone."
 )
 BY_ITSELF = "This is seen in the readings themselves, and not in those of the clean recordings; no model was asked."
 

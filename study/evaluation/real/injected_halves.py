@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.compare import bases_of
+from analysis.diagnosis.contrast.bases import bases_of
 from analysis.diagnosis.contrast.ledger import weights_of
 from analysis.diagnosis.contrast.stream import Base
 from analysis.diagnosis.contrast.taken import Taken, taken_of

@@ -185,6 +185,80 @@ def test_a_body_alone_cannot_tell_a_mass_from_a_gain():
     assert {"force_gain", "sensor_gain"} <= names | {"" if answer.named is None else answer.named.fault.effect}
 
 
+def read_as(seed: int, made) -> Recording:
+    """The device in order, its position read otherwise. made: of readings (n,)."""
+    whole = recording(seed)
+    return replace(whole, response=replace(whole.response, samples=made(whole.response.samples[:, 0])[:, None]))
+
+
+def behind(gap: float):
+    """A reading that is driven through a gap."""
+
+    def made(y: FloatArray) -> FloatArray:
+        found, read = np.empty_like(y), y[0]
+        for k, here in enumerate(y):
+            read = min(max(read, here - gap / 2), here + gap / 2)
+            found[k] = read
+        return found
+
+    return made
+
+
+def test_play_before_a_sensor_is_named_with_its_gap():
+    found = decided(read_as(2, behind(0.008)))
+    assert found.named is not None and found.named.fault.effect == "sensor_play"
+    assert found.named.values["gap"] == pytest.approx(0.008, rel=0.2)
+
+
+def test_a_drift_that_began_before_the_recording_is_no_offset():
+    found = decided(read_as(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
+    assert found.named is not None and found.named.fault.effect == "sensor_drift"
+
+
+def test_an_offset_is_no_drift():
+    found = decided(read_as(2, lambda y: y + 0.03))
+    best = found.named or found.others[0][0]
+    assert best.fault.effect == "sensor_offset" and "sensor_drift" not in found.alike
+
+
+def in_turns(seed: int, late: FloatArray) -> Recording:
+    """Two masses on springs, read late: by how many samples, per sixth of the recording."""
+    random = np.random.default_rng(seed)
+    push = lfilter([0.1], [1.0, -0.9], random.standard_normal((3000, 2)), axis=0)
+    moved = np.column_stack([lfilter([0.0, 0.02], [1.0, -1.9, 0.92 + 0.01 * k], push[:, k]) for k in range(2)])
+    moved += 0.002 * moved.std() * random.standard_normal(moved.shape)
+    at = np.arange(3000.0) - np.repeat(late, 500)
+    read = np.column_stack([np.interp(at, np.arange(3000.0), each) for each in moved.T])
+    return Recording(
+        "rig",
+        Signal(push, RATE_HZ, "force", "N", ("fx", "fy")),
+        Signal(read, RATE_HZ, "displacement", "m", ("x", "y")),
+    )
+
+
+def test_a_logger_that_reads_all_channels_late_is_named_once():
+    found = compared([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), patient)
+    assert found is not None
+    answer = decide(found, 2)
+    assert answer.named is not None
+    assert (answer.named.fault.effect, answer.named.fault.axis) == ("logger_offset", "")
+    assert answer.named.values["offset"] == pytest.approx(2 / RATE_HZ, rel=0.25)
+
+
+def test_a_logger_that_is_late_now_and_then_in_both_sets_is_not_named():
+    faulty, clean = in_turns(2, np.array([0, 2, 1, 2, 0, 2.0])), in_turns(1, np.array([0, 0, 2, 0, 1, 0.0]))
+    found = compared([faulty], [clean], frozenset(), patient)
+    assert found is not None
+    assert decide(found, 2).named is None
+
+
+def test_recordings_of_rest_and_of_motion_are_not_compared():
+    """What a device does at rest is foretold by no recording of its motion."""
+    resting = read_as(2, lambda y: 0.01 * y)
+    assert compared([resting], [recording(1)], frozenset(), patient) is None
+    assert compared([recording(1)], [resting], frozenset(), patient) is None
+
+
 def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none():
     clean = taken_of([recording(1)])
     found = hum_of(taken_of([recording(2, "mains_hum", 2e-5)]), clean)
