@@ -137,10 +137,11 @@ def _weighed(
     taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _size(regression)))
     small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
     why_not = _why_not(law, values, (gain, low, share, told), alike) or (small if taken < OF_SIGNAL else "")
+    chosen = ""
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))
-        law = replace(law, effect=PLAYED_AS[law.effect])
-    return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not)
+        chosen, law = law.effect, replace(law, effect=PLAYED_AS[law.effect])
+    return Weighed(number, law, values or {}, gain, low, share, alike, likely, why_not, chosen)
 
 
 def _plainer(effect: str) -> tuple[str, ...]:

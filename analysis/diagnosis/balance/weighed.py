@@ -31,6 +31,8 @@ class Weighed:
     """Share of resampled blocks in which none of them leaves less."""
     why_not: str
     """Empty where it is to be named."""
+    stands_for: str = ""
+    """The law that was chosen, where no simulation plays it and this one is fitted in its place."""
 
     @property
     def named(self) -> bool:

@@ -38,6 +38,8 @@ _FAMILIES = (
 )  # fmt: skip
 """What laws that act alike are called together: short, in a sentence of its own, and which they are."""
 
+REFINED = "it holds the named law as a special case, and what it allows beyond that brings nothing on held-out data"
+"""Why a law that refines the named one is passed over."""
 SENTENCES = 3
 """Candidates that are said in sentences; the document and the page's table have them all."""
 
@@ -75,6 +77,16 @@ def class_sentence(effect: NamedEffect) -> str:
         f"{capital(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
         f"well on held-out data. The numbers are those of {noun_of(effect.effect)}."
     )
+
+
+def refinement_sentence(effect: NamedEffect) -> str:
+    """Of laws that hold the named one as a special case; empty where none was weighed."""
+    names = [noun_of(rival.effect) for rival in effect.rivals if rival.why_not == REFINED]
+    if not names:
+        return ""
+    said = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+    hold = "refine it, and bring" if len(names) > 1 else "refines it, and brings"
+    return f"{capital(said)} {hold} nothing on held-out data."
 
 
 def _family(effect: NamedEffect) -> tuple[str, str] | None:

@@ -9,12 +9,21 @@ from analysis.diagnosis.balance.weigh import SMALL, Balance
 from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
 from analysis.diagnosis.effect_words import noun_of, place_of
+from analysis.diagnosis.result.candidate_wording import REFINED
 from analysis.diagnosis.result.findings import Reached
 from analysis.diagnosis.search.by_balance import CONSTANTS
 from analysis.wording import listed
+from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 
 MOST = 6
+REFINING = {
+    "drifting_friction": ("coulomb_friction",),
+    "condition_dependent_friction": ("coulomb_friction",),
+    "drifting_force": ("constant_force",),
+}
+"""Laws that no simulation plays, and what each holds as a special case."""
+ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """Where one response was measured, a late command is as good as a late reading."""
 
@@ -38,7 +47,11 @@ def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: t
         for effect in diagnosis.effects
         if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
-    named = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
+    named = {
+        (name, effect.axis)
+        for effect in effects
+        for name in (effect.effect, *effect.class_, *(one.effect for one in effect.rivals if one.why_not == REFINED))
+    }
     found = [
         _candidate(item, axis_letter(channels[axis], channels))
         for axis, item in sorted(
@@ -113,12 +126,14 @@ def _with_class(effect: NamedEffect, found: tuple[Weighed, float] | None) -> Nam
         late = effect.effect in LATE
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
     weighed, share = found
+    said = {rival.effect for rival in effect.rivals}
+    others = tuple(name for name in weighed.alike if name == weighed.stands_for or not refines(name, effect.effect))
     rivals = tuple(
-        Rival(name, 0.0, True, "as good in its place on held-out data")
+        Rival(name, 0.0, name in others, ALIKE if name in others else REFINED)
         for name in weighed.alike
-        if name not in {rival.effect for rival in effect.rivals}
+        if name not in said
     )
-    alike = (effect.effect, *weighed.alike) if weighed.alike else ()
+    alike = (effect.effect, *others) if others else ()
     return replace(
         effect,
         share=share,
@@ -126,6 +141,12 @@ def _with_class(effect: NamedEffect, found: tuple[Weighed, float] | None) -> Nam
         rivals=(*effect.rivals, *rivals),
         class_=alike,
     )
+
+
+def refines(effect: str, plain: str) -> bool:
+    """Whether a law holds another as a special case."""
+    known = EFFECTS[effect].simpler if effect in EFFECTS else REFINING.get(effect, ())
+    return plain in known
 
 
 def _candidate(weighed: Weighed, axis: str) -> Candidate:

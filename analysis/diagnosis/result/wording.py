@@ -6,11 +6,13 @@ from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
 from analysis.diagnosis.found_law import law_text
 from analysis.diagnosis.result.candidate_wording import (
+    REFINED,
     Device,
     best_candidate_sentence,
     candidate_sentences,
     class_noun,
     class_sentence,
+    refinement_sentence,
 )
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence, ceiling_sentences
 from analysis.diagnosis.result.findings import Findings
@@ -95,12 +97,16 @@ def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
     return tuple(
         f"{capital(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): {ended(rival.why_not)}"
         for rival in effect.rivals
-        if not rival.inseparable
+        if not rival.inseparable and rival.why_not != REFINED
     )
 
 
 def inseparable_sentence(effect: NamedEffect) -> str:
-    """Empty where the data single one out."""
+    """With what only refines it; empty where the data single one out."""
+    return " ".join(filter(None, (_inseparable(effect), refinement_sentence(effect))))
+
+
+def _inseparable(effect: NamedEffect) -> str:
     if effect.class_:
         return class_sentence(effect)
     others = [rival for rival in effect.rivals if rival.inseparable]
