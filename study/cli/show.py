@@ -31,9 +31,10 @@ def show(
 ) -> None:
     """Facts, thresholds, warnings and staircases of a session; verdict, effects and fit of a diagnosis; or channels,
     segments and facts of a recording."""
+    from study.importing.arrays.arrays import ARRAYS, TABLES
     from study.store.disk.hdf5_file import is_hdf5
 
-    if Path(what).is_file() and is_hdf5(Path(what)):
+    if Path(what).is_file() and (is_hdf5(Path(what)) or Path(what).suffix.lower() in (*TABLES, *ARRAYS)):
         _show_recording(Path(what), as_json)
         return
     document = Path(what) / "diagnosis.json" if (Path(what) / "diagnosis.json").is_file() else Path(what)

@@ -1,5 +1,6 @@
 """Maps by name, by path, and those that fit a folder of recordings."""
 
+import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,14 +13,20 @@ from study.importing.arrays.arrays import read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import names_in
 from study.importing.expressions.namespace import of_file
-from study.importing.map_format.import_map import ImportMap
-from study.importing.map_format.map_errors import ImportProblemError, suggestion
+from study.importing.header_map import header_map, header_problems
+from study.importing.map_format.import_map import CsvMap, ImportMap
+from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggestion
 from study.importing.map_format.map_files import part_files
 from study.importing.map_format.map_toml import KIND, is_map, parse_map
+from study.importing.map_skeleton import map_skeleton
+from study.store.disk.hdf5_file import format_of, is_hdf5
 from study.store.disk.toml_text import read_toml_text
+from study.store.formats.recording_layout import FORMAT
 
 NO_DATA = (".toml", ".md")
 """Kinds of files that lie beside data."""
+_NUMBER = re.compile(r"\d+")
+_SHOWN = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +97,40 @@ def map_of_files(paths: Sequence[Path]) -> MapFile | None:
         if set(entry.files) == set(paths) and _fits(entry)
     ]
     return found[0] if len(found) == 1 else None
+
+
+def map_by_header(folder: Path) -> FoundMap:
+    """Of a folder that no map is for: the header of its files, where their names are alike but for numbers and say what
+    is what. Raises WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
+    data = sorted((path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_in_order)
+    none = f"No map is for the files of the folder {folder.name}: there is none in it, and none of ours fits"
+    if not data:
+        raise _unclear(f"{none}.", "Give the files.")
+    if any(is_hdf5(path) and format_of(path) == FORMAT for path in data):
+        raise _unclear(
+            f"{none}; recordings of ours are in it.", "Give these recordings, to hapteq import, look or diagnose."
+        )
+    if len({_NUMBER.sub("#", path.name) for path in data}) > 1:
+        shown = ", ".join(path.name for path in data[:_SHOWN])
+        raise _unclear(
+            f"{none}; nor are they parts of one recording by their names ({shown}{', ...' if data[_SHOWN:] else ''}).",
+            "Give the files that belong together, in their order; or a map with --map.",
+        )
+    arrays = read_arrays(data[0], CsvMap())
+    wanted = header_map(arrays)
+    if wanted is None:
+        raise MapNeededError(folder.name, f"{none}; {'; '.join(header_problems(arrays))}", map_skeleton(arrays))
+    return FoundMap(MapFile(folder.name, wanted, "", folder), tuple(data))
+
+
+def _unclear(happened: str, do_now: str) -> WrongUseError:
+    return WrongUseError("Which recording is meant?", happened, do_now, saved=NOTHING_WRITTEN)
+
+
+def _in_order(path: Path) -> tuple[tuple[bool, int, str], ...]:
+    """rec_2 before rec_10."""
+    pieces = re.split(r"(\d+)", path.name)
+    return tuple((piece.isdigit(), int(piece) if piece.isdigit() else 0, piece) for piece in pieces)
 
 
 def _is_map_file(path: Path) -> bool:

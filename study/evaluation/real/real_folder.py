@@ -7,7 +7,7 @@ from pathlib import Path
 from analysis.reports.real_report import Trouble
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.errors import StudyError
-from study.importing.map_library import FoundMap, find_map
+from study.importing.map_library import FoundMap, find_map, map_by_header
 from study.importing.model_library import model_for
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
@@ -75,12 +75,10 @@ def read_real_folder(folder: Path) -> RealFolder:
     troubles: list[Trouble] = []
     for each in inner or [folder]:
         try:
-            found = _recordings(each, find_map(each))
+            found = _recordings(each, find_map(each) or (map_by_header(each),))
         except (StudyError, OSError) as problem:
             troubles.append(Trouble(each.name, _said(problem)))
             continue
-        if not found:
-            troubles.append(Trouble(each.name, "no map is for its files: there is none in it, and none of ours fits."))
         recordings += found
     return RealFolder(tuple(recordings), tuple(troubles))
 

@@ -20,6 +20,7 @@ from study.store.disk.regular_file import open_regular
 Array = npt.NDArray[Any]
 KINDS = ".csv, .txt, .tsv, .dat (tables), .npz, .npy, .mat, .h5 and .hdf5"
 TABLES = (".csv", ".txt", ".tsv", ".dat")
+ARRAYS = (".npz", ".npy", ".mat")
 
 _CHECK = "Check the file; nothing else can be read from it."
 

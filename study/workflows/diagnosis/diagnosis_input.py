@@ -23,8 +23,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
-from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.session_as_recordings import session_recordings
+from study.workflows.recording.import_recording import recording_from
 
 STILL = 1e-9
 """Of its value: what changes by less is the rounding of numbers."""
@@ -62,14 +62,19 @@ def read_input(
             session.spring_n_per_m,
         )  # fmt: skip
     else:
-        read = tuple(read_recording(source) for source in sources)
+        taken = [recording_from(source) for source in sources]
+        read = tuple(recording for recording, _ in taken)
         _require_alike(read, _names(sources))
         read, stated = _as_forces(read, constants)
         read, repeats = _with_segments(read, sources)
         formed, said = plain_form(read) if plain else (read, ())
         driven, gaps = across_gaps(all_force_driven(formed), _names(sources))
         found = DiagnosisInput(
-            driven, _names(sources), tuple(sources), (*stated, *repeats, *said, *gaps), constants=constants
+            driven,
+            _names(sources),
+            tuple(sources),
+            (*_notes(taken), *stated, *repeats, *said, *gaps),
+            constants=constants,
         )
     try:
         require_something(found.recordings, found.names)
@@ -93,6 +98,10 @@ def _as_forces(
             saved="Nothing was written.",
         ) from refusal  # fmt: skip
     return tuple(recording for recording, _ in found), (found[0][1],)
+
+
+def _notes(taken: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(note for _, notes in taken for note in notes))
 
 
 def _with_segments(

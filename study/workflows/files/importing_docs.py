@@ -90,8 +90,10 @@ This page is made from the code (`python -m study.workflows.files.format_docs do
 hapteq import run1.npz run2.npz --map MAP.toml --out rec.h5    # any arrays, by a map
 hapteq import run1.csv --out rec.h5                            # names say it: time [s],fx [N]; t_s, fx_N, x_mm
 hapteq import data.mat --out rec.h5 > MAP.toml                 # nothing says it: a map for this file, to be completed
-hapteq import FOLDER --out rec.h5                              # the map in the folder, or the one of ours that fits
+hapteq import FOLDER --out rec.h5                              # its map, ours that fits, or numbered tables by header
 ```
+
+`hapteq look`, `show`, `diagnose` and `model` also take a file whose names say all as it is, imported in memory.
 
 CSV and other tables, NPZ, NPY, MAT (both kinds) and HDF5 are read. The recording is in SI units, all channels on one
 uniform rate ([file formats](formats.md)). What was done to the samples is printed and kept in the recording

@@ -90,7 +90,8 @@ def _unknown(content: FileContent) -> tuple[str, str]:
         case ".toml":
             return "TOML file", _toml_problem(content)
         case ".csv":
-            return "table", f"its header, '{','.join(content.header)}', is none of ours; {KNOWN}"
+            header = ",".join(content.header)
+            return "table", f"its header, '{header}', is none of ours; {KNOWN}; a table of others goes to hapteq import"
     return "unknown file", f"nothing here knows this file; {KNOWN}"
 
 

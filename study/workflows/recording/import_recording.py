@@ -9,13 +9,13 @@ from typing import Any
 
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording
-from study.errors import WrongUseError
-from study.importing.arrays.arrays import read_arrays
+from study.errors import StudyError, WrongUseError
+from study.importing.arrays.arrays import ARRAYS, TABLES, read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap, ImportMap
 from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportRefusedError, MapNeededError
-from study.importing.map_library import NO_DATA, MapFile, find_map, map_of_files, read_map
+from study.importing.map_library import NO_DATA, MapFile, find_map, map_by_header, map_of_files, read_map
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.hdf5_file import format_of, is_hdf5
 from study.store.disk.provenance import gather_provenance
@@ -86,6 +86,24 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
     return _by_header(files, on_progress)
 
 
+def recording_from(path: Path) -> tuple[Recording, tuple[str, ...]]:
+    """A recording of ours, or a table or arrays of others through the import, in memory; and what that did. Raises
+    StudyError."""
+    foreign = path.suffix.lower() in (*TABLES, *ARRAYS) or (path.is_file() and is_hdf5(path) and not format_of(path))
+    if not foreign:
+        return read_recording(path), ()
+    try:
+        found = read_foreign((path,), None)
+    except MapNeededError as needed:
+        raise StudyError(
+            needed.title,
+            needed.happened,
+            f"hapteq import {path} --out REC.h5 > MAP.toml prints one: complete it, import with --map MAP.toml, and "
+            "give REC.h5.",
+        ) from needed
+    return found.recording, (f"{path.name} is no recording of ours: it was imported in memory.", *found.notes)
+
+
 def _inside(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
     """Files, and of a folder those that the map is for. Maps and notes beside the data are no data."""
     found: list[Path] = []
@@ -110,13 +128,14 @@ def _by_found_map(folder: Path, on_progress: Progress) -> Foreign:
     found = find_map(folder)
     if len(found) == 1:
         return _by_map(found[0].source, found[0].files, on_progress)
+    if not found:
+        by_header = map_by_header(folder)
+        return _with_header(by_header.source.map, by_header.files, on_progress)
     listed = "; ".join(f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in found)
     raise WrongUseError(
         "Which recording is meant?",
-        f"The folder {folder.name} makes {len(found)} recordings: {listed}."
-        if found
-        else f"No map is for the files of the folder {folder.name}: there is none in it, and none of ours fits.",
-        "Give the files, and the map with --map." if found else "Give one file, to be told what a map for it would be.",
+        f"The folder {folder.name} makes {len(found)} recordings: {listed}.",
+        "Give the files, and the map with --map.",
         saved=NOTHING_WRITTEN,
     )
 
@@ -142,6 +161,10 @@ def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
         return replace(found, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *found.notes))
     if wanted is None:
         raise MapNeededError(files[0].name, "; ".join(header_problems(arrays)), map_skeleton(arrays))
+    return _with_header(wanted, files, on_progress)
+
+
+def _with_header(wanted: ImportMap, files: Sequence[Path], on_progress: Progress) -> Foreign:
     built = build_recording(wanted, files, on_progress)
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
     return Foreign(built.recording, tuple(files), "header", "", (f"Taken from the header: {told}.", *built.notes))

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,8 @@ from analysis.look.overview import Overview, overview
 from analysis.reports.look_report import pictures_of, render_look_report
 from study.local_clock import local_now
 from study.store.disk.text_file import write_text
-from study.store.formats.recording_file import read_recording
 from study.workflows.picture_files import write_pictures
+from study.workflows.recording.import_recording import recording_from
 
 PAGE_NAME = "report.html"
 
@@ -21,10 +21,13 @@ Progress = Callable[[float], None]
 
 
 def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
-    """Raises StudyError for a file that is no recording."""
+    """Recordings, and tables of others whose header says all. Raises StudyError for a file that is neither."""
     found = []
     for count, path in enumerate(paths, start=1):
-        found.append(overview(path.stem, read_recording(path)))
+        recording, notes = recording_from(path)
+        if notes:
+            recording = replace(recording, meta={**recording.meta, "import": {"notes": list(notes)}})
+        found.append(overview(path.stem, recording))
         on_progress(count / len(paths))
     return tuple(found)
 

@@ -7,7 +7,7 @@ from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.formats.recording_file import read_recording, write_recording
-from study.workflows.recording.import_recording import ImportPlan, import_recording
+from study.workflows.recording.import_recording import ImportPlan, import_recording, recording_from
 
 T = np.arange(200) / 1000
 TABLE = "time [s],fx [N],ax [g]\n" + "\n".join(f"{t:.3f},{np.sin(99 * t):.6f},{t * t:.9f}" for t in T) + "\n"
@@ -80,6 +80,37 @@ def test_a_folder_that_no_map_is_for_is_wrong_use(tmp_path):
     (tmp_path / "a.csv").write_text("x\n1\n")
     with pytest.raises(WrongUseError, match="No map is for the files of the folder"):
         import_recording(ImportPlan((tmp_path,), None, tmp_path / "r.h5"))
+
+
+def write_runs(folder, *names):
+    folder.mkdir()
+    for name in names:
+        (folder / name).write_text(TABLE)
+
+
+def test_a_folder_of_numbered_tables_is_imported_by_their_header_in_order(tmp_path):
+    write_runs(tmp_path / "fold", "rec_10.csv", "rec_2.csv", "rec_1.csv")
+    done = import_recording(ImportPlan((tmp_path / "fold",), None, tmp_path / "r.h5"))
+    assert [part["file"] for part in done.recording.meta["parts"]] == ["rec_1.csv", "rec_2.csv", "rec_10.csv"]
+    assert done.notes[0] == "Taken from the header: fx as command, ax as response."
+
+
+def test_of_a_folder_of_other_names_it_is_said_that_they_are_no_parts(tmp_path):
+    write_runs(tmp_path / "fold", "before.csv", "after.csv")
+    with pytest.raises(WrongUseError, match=r"parts of one recording by their names \(after\.csv, before\.csv\)"):
+        import_recording(ImportPlan((tmp_path / "fold",), None, tmp_path / "r.h5"))
+
+
+def test_a_table_of_others_is_looked_at_and_read_as_it_is(tmp_path):
+    (tmp_path / "a.csv").write_text(TABLE)
+    found, notes = recording_from(tmp_path / "a.csv")
+    assert (found.command.channels, found.response.unit) == (("fx",), "m/s^2")
+    assert notes[0] == "a.csv is no recording of ours: it was imported in memory."
+    write_recording(tmp_path / "r.h5", found)
+    assert recording_from(tmp_path / "r.h5")[1] == ()
+    (tmp_path / "b.csv").write_text(TABLE.replace("fx [N]", "knob"))
+    with pytest.raises(StudyError, match=r"Nothing says what 'knob' is\. hapteq import .*b\.csv --out REC\.h5"):
+        recording_from(tmp_path / "b.csv")
 
 
 def test_a_folder_of_several_recordings_asks_which(tmp_path):
