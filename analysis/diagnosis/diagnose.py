@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.balances import balances_of
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.measured_motion import time_unit
@@ -21,7 +22,7 @@ from analysis.diagnosis.result.contrast_findings import with_contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import state_maps
-from analysis.diagnosis.search.by_balance import balances_of, borne_out, leaves_open, searched_by_balance
+from analysis.diagnosis.search.by_balance import borne_out, leaves_open, searched_by_balance
 from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, hums_low, known_to_repeat
 from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation

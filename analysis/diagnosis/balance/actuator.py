@@ -30,7 +30,7 @@ from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.structures import Searched
-from analysis.diagnosis.balance.weigh import LEAST_BLOCKS, MOST_ALIKE, Balance, weigh
+from analysis.diagnosis.balance.weigh import MOST_ALIKE, Balance, judged_by, weigh
 from analysis.diagnosis.balance.weighed import Weighed, drawn_of, gain_of
 from analysis.diagnosis.types import Patience
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -60,7 +60,7 @@ class _Turned:
         fit, test = self._blocks(self._rows(law, laws))
         columns = list(range(len(fit[0].pull)))
         whole = total(fit, columns)
-        if judged and len(test) >= LEAST_BLOCKS:
+        if judged and judged_by(self.searched.regression) is self.searched.regression.test:
             weights = solved(whole, RIDGE)
             return np.array([error_of(part_of_block(block, columns), weights, block.power) for block in test])
         found = []
@@ -107,7 +107,7 @@ def balance_of(
 ) -> Balance:
     """Of laws of the motion, along what a law of the command lets through where one is named."""
     balance = weigh(search_beside_linear(motions, axis, rotational, without, patient))
-    actuator = actuator_of(balance.searched, without)
+    actuator = actuator_of(balance.searched, without) if balance.tested else None
     if actuator is None:
         return balance
     weighed = actuator.weighed

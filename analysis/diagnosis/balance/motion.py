@@ -23,6 +23,8 @@ from equalizer.signals.signal import FloatArray, Signal
 
 OVERSAMPLED = 4.0
 """Samples that are kept per period of the band's end."""
+MOVING = 0.99
+"""Of the speed's mean square, up to where the device moves."""
 EDGE = 0.5
 """Periods of the band's end at either end of a part that the filter does not see whole."""
 
@@ -118,6 +120,24 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
         _motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels)
         for record, samples, condition in zip(records, filled, conditions, strict=True)
     )
+
+
+def moving_band_hz(motions: Sequence[Motion]) -> float:
+    """The highest frequency at which a channel moves to speak of; inf without a clock."""
+    if not np.isfinite(motions[0].band_hz):
+        return np.inf
+    ends = []
+    for column in range(len(motions[0].channels)):
+        power, frequency_hz = [], []
+        for motion in motions:
+            speed = motion.velocity[:, column]
+            power.append(np.abs(rfft(speed - speed.mean())) ** 2 / len(speed))
+            frequency_hz.append(rfftfreq(len(speed), 1 / motion.rate_hz))
+        every, where = np.concatenate(power), np.concatenate(frequency_hz)
+        order = np.argsort(where)
+        below = np.cumsum(every[order])
+        ends.append(float(where[order][min(np.searchsorted(below, MOVING * below[-1]), len(where) - 1)]))
+    return max(ends)
 
 
 def _motion(

@@ -1,5 +1,7 @@
 """Which of the structures that a search ranked is taken: the plainest that tells as much, by folds alone."""
 
+from collections.abc import Sequence
+
 from analysis.diagnosis.balance.regression import Regression, of_everything
 from analysis.diagnosis.balance.structures import Searched, Structure, better
 
@@ -13,7 +15,9 @@ def plainest_structure(searched: Searched) -> Structure:
     """The structure of fewest numbers that leaves hardly more than the best."""
     allowed = searched.best.error + PLAIN * (searched.linear.error - searched.best.error)
     enough = [each for each in searched.ranked if each.error <= allowed]
-    plain = min(enough, key=lambda each: (_numbers(searched.regression, each), each.error), default=searched.linear)
+    plain = min(
+        enough, key=lambda each: (numbers_of(searched.regression, each.laws), each.error), default=searched.linear
+    )
     ceiling = of_everything(searched.regression, range(searched.regression.columns[0].shape[1]))[0]
     while (richer := _further(searched, plain, ceiling)) is not None:
         plain = richer
@@ -28,14 +32,14 @@ def _further(searched: Searched, plain: Structure, ceiling: float) -> Structure 
         for each in searched.ranked
         if set(plain.laws) < set(each.laws) and each.error <= allowed and better(plain, each)
     ]
-    return min(more, key=lambda each: (_numbers(searched.regression, each), each.error), default=None)
+    return min(more, key=lambda each: (numbers_of(searched.regression, each.laws), each.error), default=None)
 
 
-def _numbers(regression: Regression, structure: Structure) -> int:
-    """The width within which a dry friction turns round counts for none; a weight on a lever takes the place of the
-    spring, whose number is then none."""
+def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
+    """How many laws have. The width within which a dry friction turns round counts for none; a weight on a lever takes
+    the place of the spring, whose number is then none."""
     count = 0
-    for number in structure.laws:
+    for number in laws:
         law, place = regression.laws[number], regression.places[number]
         count += place.stop - place.start + (0 if law.effect == "coulomb_friction" else len(law.numbers))
         count -= law.effect == "gravity_torque"

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.law import Law
-from analysis.diagnosis.balance.plainest_structure import NOTABLE, plainest_structure
+from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression, of_everything
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
 from analysis.diagnosis.balance.weighed import DRAWS, Weighed, drawn_of, gain_of
@@ -36,6 +36,8 @@ MENDS = "it acts like a named law, and may only mend its shape"
 MOST_ALIKE = 4
 """Effects of a class; more of them tell nothing."""
 LEAST_BLOCKS = 4
+STILL = 0.01
+"""Share of the speed's mean square, where it is fitted, below which samples that are held back test nothing."""
 FAMILIES = (
     {"coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
      "position_dependent_friction", "drifting_friction", "quadratic_damping"},
@@ -63,6 +65,8 @@ class Balance:
     ceiling: float
     """and of all laws together."""
     complete: bool
+    tested: bool = True
+    """Whether what is held back moves enough to test by, or the folds do."""
 
     @property
     def named(self) -> tuple[Weighed, ...]:
@@ -76,6 +80,9 @@ class Balance:
 
 def weigh(searched: Searched) -> Balance:
     regression = searched.regression
+    if not judged_by(regression):
+        alone = float(np.sqrt(searched.linear.error / _size(regression)))
+        return Balance(searched, searched.linear, (), (), alone, alone, alone, searched.complete, tested=False)
     chosen = plainest_structure(searched)
     held = _held_out(regression, chosen.laws)
     linear = _held_out(regression, ())
@@ -103,23 +110,36 @@ def family_of(effect: str) -> set[str]:
     return next((family for family in FAMILIES if effect in family), {effect})
 
 
-def _judging(regression: Regression) -> tuple[Block, ...]:
-    return regression.test if len(regression.test) >= LEAST_BLOCKS else regression.fit
+def judged_by(regression: Regression) -> tuple[Block, ...]:
+    """The blocks that laws are judged by: those held back, where the device moves in them; else those to fit, each by
+    numbers fitted to the others, where several of them move; else none: a single move tests nothing."""
+    fit, test = (_speeds(regression, blocks) for blocks in (regression.fit, regression.test))
+    if len(test) >= LEAST_BLOCKS and test.mean() >= STILL * fit.mean():
+        return regression.test
+    several = float(fit.sum()) ** 2 >= LEAST_BLOCKS * float(fit @ fit)
+    return regression.fit if several or len(regression.test) < LEAST_BLOCKS else ()
+
+
+def _speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
+    """(blocks,): mean square of the driven motion's speed, over its scale's."""
+    speed = len(regression.motions[0].channels) + regression.beside.own
+    return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
 
 
 def _size(regression: Regression) -> float:
-    return max(sum(block.signal for block in _judging(regression)), 1e-300)
+    return max(sum(block.signal for block in judged_by(regression) or regression.fit), 1e-300)
 
 
 def _held_out(regression: Regression, laws: Sequence[int]) -> FloatArray:
     columns = regression.chosen(laws)
-    return regression.held_out(columns) if len(regression.test) >= LEAST_BLOCKS else regression.crossed(columns)
+    held = judged_by(regression) is regression.test
+    return regression.held_out(columns) if held else regression.crossed(columns)
 
 
 def _ceiling(regression: Regression, held: FloatArray) -> float:
     """No more than what the chosen structure leaves."""
     crossed, blocks = of_everything(regression, range(regression.columns[0].shape[1]))
-    whole = float(blocks.sum()) if len(regression.test) >= LEAST_BLOCKS else crossed
+    whole = float(blocks.sum()) if judged_by(regression) is regression.test else crossed
     return min(whole, float(held.sum()))
 
 
@@ -172,7 +192,9 @@ def _alike(
         behind = _held_out(regression, laws) - held
         if own.effect not in _plainer(effect):
             first &= behind[drawn].sum(axis=1) >= 0
-        if float(behind.sum()) <= ALMOST * gained:
+        # Of two that do as well, the plainer: what acts otherwise and has more numbers must leave less.
+        more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
+        if float(behind.sum()) <= (0.0 if more and effect not in family_of(own.effect) else ALMOST * gained):
             alike.append((float(behind.sum()), effect))
     return tuple(effect for _, effect in sorted(alike)), float(first.mean())
 

@@ -26,6 +26,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
+FEW_CYCLES = "cycles of what was commanded, which is too short"
+
 
 class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
     """`problems`: one sentence each, without a full stop."""
@@ -79,10 +81,8 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> 
                 "the rest of it is missing, or has the role of a test"
             )
         elif cycles < LEAST_CYCLES:
-            problems.append(
-                f"the recording holds about {cycles:.2g} cycles of what was commanded, which is too short; at least "
-                f"{LEAST_CYCLES:g} are needed, one part to fit and one to test"
-            )
+            needed = f"at least {LEAST_CYCLES:g} are needed, one part to fit and one to test"
+            problems.append(f"the recording holds about {cycles:.2g} {FEW_CYCLES}; {needed}")
         elif (sure := answer(recordings)) is not None and sure < ANSWER_DEVIATIONS:
             problems.append(
                 "the responses have nothing to do with the commands: what they share is no more than noise shares with "

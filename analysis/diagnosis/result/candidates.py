@@ -102,7 +102,7 @@ def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tupl
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
         laws = [law.place for law in balance.laws if law.law.effect in names]
         rms = balance.error_of(laws) if laws else balance.linear
-        found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws)))
+        found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested))
     return tuple(found)
 
 

@@ -35,6 +35,11 @@ def ceiling_sentences(reached: Sequence[Reached]) -> tuple[str, ...]:
 
 def _ceiling(one: Reached, single: bool) -> str:
     along = "" if single else f" along {one.axis}"
+    if not one.tested:
+        return (
+            f"In the force balance{along}, no law could be tested: the device moves once, and next to nothing moves in "
+            "what was held back. Record several moves, or hold one of them back."
+        )
     alone = (
         f"In the force balance{along}, on held-out data, mass, damping and stiffness alone leave "
         f"{error_text(one.linear)} of the force"

@@ -78,6 +78,8 @@ class Reached:
     ceiling: float
     """and with all laws together."""
     any_named: bool
+    tested: bool = True
+    """What was held back moves enough to test laws by."""
 
     @property
     def share(self) -> float:

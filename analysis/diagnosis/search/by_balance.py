@@ -9,14 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.actuator import NO_COLUMN, balance_of
-from analysis.diagnosis.balance.linear_part import search_beside_linear
-from analysis.diagnosis.balance.motion import NoMotionError, motions_of
+from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.structures import values_of
-from analysis.diagnosis.balance.weigh import Balance, family_of, weigh
+from analysis.diagnosis.balance.weigh import Balance, family_of
 from analysis.diagnosis.balance.weighed import Weighed
-from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import Tuning
@@ -28,9 +25,7 @@ from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_step import without_step
 from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
-from analysis.diagnosis.types import Patience
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 CONSTANT = "constant_force"
@@ -40,20 +35,6 @@ VAGUE = 1.96 * INTERVAL_FACTOR
 """Standard errors of a logarithm from which an interval reaches a number that is none."""
 HELD_BY_SIMULATION = 0.9
 """Times the re-tuned model's held-out error that the completed one may leave at most, in the measure that suits."""
-
-
-def balances_of(recordings: Sequence[Recording], without: frozenset[str], patient: Patience) -> tuple[Balance, ...]:
-    """One per command; none where no motion was measured, or too little of it."""
-    try:
-        motions = motions_of(observed_parts(recordings, len(recordings[0].response.channels)))
-        turning = any(unit.startswith("rad") for signal in (recordings[0].response,) for unit in signal.units)
-        turning |= any(unit.startswith("N m") for unit in recordings[0].command.units)
-        axes = range(len(recordings[0].command.channels))
-        if any(recording.meta.get("imposed") for recording in recordings):
-            return tuple(weigh(search_beside_linear(motions, axis, turning, without, patient)) for axis in axes)
-        return tuple(balance_of(motions, axis, turning, without, patient) for axis in axes)
-    except (NoMotionError, np.linalg.LinAlgError):
-        return ()
 
 
 def searched_by_balance(arena: Arena, balances: Sequence[Balance], repeats: bool) -> Searched | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.plain_form import plain_form
 from analysis.diagnosis.data.belonging import (
+    FEW_CYCLES,
     NothingToDiagnose,
     require_alike,
     require_different,
@@ -76,12 +77,20 @@ def read_input(
             (*_notes(taken), *stated, *repeats, *said, *gaps),
             constants=constants,
         )
+    said = _few_cycles(found, plain)
+    return _moving_position(same_position(replace(found, remarks=(*found.remarks, *said))))
+
+
+def _few_cycles(found: DiagnosisInput, plain: bool) -> tuple[str, ...]:
+    """A remark where no model is given: what cannot be tested is then not named. Raises StudyError."""
     try:
-        require_something(found.recordings, found.names)
         require_different(found.recordings, found.names)
+        require_something(found.recordings, found.names)
     except NothingToDiagnose as refusal:
-        raise nothing_to_diagnose(refusal.problems) from refusal
-    return _moving_position(same_position(found))
+        if not plain or not all(FEW_CYCLES in problem for problem in refusal.problems):
+            raise nothing_to_diagnose(refusal.problems) from refusal
+        return tuple(f"{_begun(problem)}." for problem in refusal.problems)
+    return ()
 
 
 def _as_forces(

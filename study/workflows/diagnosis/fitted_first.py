@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.diagnosis.balance.balances import balances_of
 from analysis.diagnosis.balance.first_model import plain_model
 from analysis.diagnosis.balance.model_structures import StructureRefused, balanced, structure_of
 from analysis.diagnosis.balance.motion import NoMotionError
@@ -12,7 +13,6 @@ from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.carried_weight import weighted
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
-from analysis.diagnosis.search.by_balance import balances_of
 from analysis.diagnosis.types import Patience, Progress
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused

@@ -19,7 +19,7 @@ def axes(module_at) -> ModuleType:
 @pytest.fixture(scope="session")
 def balance_of():
     """Of a recording, one per axis."""
-    from analysis.diagnosis.search.by_balance import balances_of
+    from analysis.diagnosis.balance.balances import balances_of
     from analysis.diagnosis.search.patience import always
 
     return lambda recording, without=(): balances_of([recording], frozenset(without), always)

@@ -235,6 +235,14 @@ def test_a_position_that_stands_still_is_left_out_and_it_is_said(tmp_path, recor
     assert found.remarks == ("Position x never changes: the position was left out of the comparison.",)
 
 
+def test_few_cycles_are_a_remark_where_no_model_is_given_and_else_refused(tmp_path, recording):
+    step = (np.arange(len(recording.command.samples)) > 2000)[:, None] * np.ones(recording.command.samples.shape)
+    write_recording(tmp_path / "step.h5", replace(recording, command=replace(recording.command, samples=step)))
+    with pytest.raises(StudyError, match="cycles of what was commanded"):
+        read_input((tmp_path / "step.h5",), seed=1)
+    assert any("cycles of what was commanded" in said for said in read_input((tmp_path / "step.h5",), 1, True).remarks)
+
+
 def test_names_of_files_and_effects_keep_their_letters(files, findings, tmp_path, made):
     rubbing = replace(made.device(1), effects=(ModelEffect("coulomb_friction", "q", {"level": 0.1}),))
     write_mechanical_model(tmp_path / "model.toml", rubbing)
