@@ -236,11 +236,12 @@ def test_a_position_that_stands_still_is_left_out_and_it_is_said(tmp_path, recor
 
 
 def test_few_cycles_are_a_remark_where_no_model_is_given_and_else_refused(tmp_path, recording):
-    step = (np.arange(len(recording.command.samples)) > 2000)[:, None] * np.ones(recording.command.samples.shape)
-    write_recording(tmp_path / "step.h5", replace(recording, command=replace(recording.command, samples=step)))
+    count, channels = recording.command.samples.shape
+    slow = np.sin(2 * np.pi * 1.5 * np.arange(count) / count)[:, None] * np.ones(channels)
+    write_recording(tmp_path / "slow.h5", replace(recording, command=replace(recording.command, samples=slow)))
     with pytest.raises(StudyError, match="cycles of what was commanded"):
-        read_input((tmp_path / "step.h5",), seed=1)
-    assert any("cycles of what was commanded" in said for said in read_input((tmp_path / "step.h5",), 1, True).remarks)
+        read_input((tmp_path / "slow.h5",), seed=1)
+    assert any("cycles of what was commanded" in said for said in read_input((tmp_path / "slow.h5",), 1, True).remarks)
 
 
 def test_names_of_files_and_effects_keep_their_letters(files, findings, tmp_path, made):
