@@ -109,24 +109,37 @@ def _pushing_responses(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _still(recordings: Recordings) -> tuple[Recordings, str]:
-    """Commands beyond the motions that never change: no gain of theirs can be known."""
+    """Commands that never change: nothing of their axis can be known. The motion of an axis is left out with its
+    command, where there is one for each."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([each.command.samples for each in recordings])
     samples = samples[np.isfinite(samples).all(axis=1)]
-    if len(command.channels) <= len(response.channels) or not len(samples):
+    if len(command.channels) < len(response.channels) or not len(samples):
         return recordings, ""
     kept = np.flatnonzero(np.ptp(samples, axis=0) > STILL * np.abs(samples).max(axis=0)).tolist()
     if len(kept) in (0, len(command.channels)):
         return recordings, ""
+    paired = len(command.channels) == len(response.channels)
     left = [name for k, name in enumerate(command.channels) if k not in kept]
+    gone = [name for k, name in enumerate(response.channels) if k not in kept] if paired else []
+    also = f" with {listed(gone)}, which no command moves" if gone else ""
     return (
-        tuple(
-            replace(each, command=each.command.picked(kept),
-                    excitation=None if each.excitation is None else _same(each.excitation, each.command, kept))
-            for each in recordings
-        ),
-        f"{listed(left)} among the commands never {_verb(left, 'changes')}, and {_verb(left, 'was')} left out.",
-    )  # fmt: skip
+        tuple(_with_axes(each, kept, paired) for each in recordings),
+        f"{listed(left)} among the commands never {_verb(left, 'changes')}, and {_verb(left, 'was')} left out{also}.",
+    )
+
+
+def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording:
+    """Of some commands; paired: and of the responses, and positions, in the same places."""
+    command, position, excitation = recording.command, recording.position, recording.excitation
+    alike = position is not None and len(position.channels) == len(recording.response.channels)
+    return replace(
+        recording,
+        command=command.picked(kept),
+        excitation=None if excitation is None else _same(excitation, command, kept),
+        response=recording.response.picked(kept) if paired else recording.response,
+        position=position.picked(kept) if paired and alike and position is not None else position,
+    )
 
 
 def _verb(names: Sequence[str], one: str) -> str:

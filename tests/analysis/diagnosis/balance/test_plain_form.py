@@ -101,15 +101,20 @@ def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(leve
     assert summed.startswith("u2 drives the same motion as u1")
 
 
-def test_commands_that_never_change_stay_where_each_has_a_motion():
-    """A device that was driven along each axis in turn."""
+def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
+    """A device of two axes of which only the first was driven."""
     push = smooth(2000, 1)
     recording = of(
         [("fx", "force", "N", push), ("fy", "force", "N", np.zeros(2000))],
         [("x", "velocity", "m/s", speed_of(push)), ("y", "velocity", "m/s", 1e-3 * smooth(2000, 3))],
     )
 
-    assert plain_form((recording,)) == ((recording,), ())
+    (found,), said = plain_form((recording,))
+
+    assert (found.command.channels, found.response.channels) == (("fx",), ("x",))
+    assert said == ("fy among the commands never changes, and was left out with y, which no command moves.",)
+    in_turn = replace(recording, command=replace(recording.command, samples=recording.command.samples[:, ::-1]))
+    assert plain_form((recording, in_turn)) == ((recording, in_turn), ())
 
 
 def test_of_motions_of_several_kinds_the_lowest_is_kept():
