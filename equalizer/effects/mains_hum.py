@@ -18,6 +18,8 @@ BLOCKS, STEADY = 12, 0.8
 """Parts of a recording in which a tone must have the same amplitude and phase, and how nearly."""
 PLAYED = 0.1
 """Of a command's rms, that a tone in it must have to be meant."""
+MAINLY, MOST_TIMES = 0.5, 9
+"""The same for half of a command's power; such a tone distorted has lines at up to so many times its frequency."""
 
 
 def _hummed(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], of: Values) -> FloatArray:
@@ -54,13 +56,21 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _played(evidence: Evidence, frequency_hz: float) -> bool:
-    """Whether a command holds the tone throughout: then it is no hum."""
+    """Whether a command holds the tone throughout, or is little else than a tone of which it is a harmonic: then it is
+    no hum."""
+    return _holds(evidence, frequency_hz, PLAYED) or any(
+        _holds(evidence, frequency_hz / times, MAINLY) for times in range(2, MOST_TIMES + 1)
+    )
+
+
+def _holds(evidence: Evidence, frequency_hz: float, least: float) -> bool:
+    """least: amplitude of the tone, a half of it, over the command's rms."""
     turn = np.exp(-2j * np.pi * frequency_hz * np.arange(len(evidence.command)) / evidence.sample_rate_hz)
     share = (
         np.abs(turn @ evidence.command) / len(turn) / np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-300)
     )
     steady = [_steadiness(command, evidence, frequency_hz) for command in evidence.command.T]
-    return any(each > PLAYED and two > STEADY for each, two in zip(share, steady, strict=True))
+    return any(each > least and two > STEADY for each, two in zip(share, steady, strict=True))
 
 
 def _loudest(residual: FloatArray, evidence: Evidence, line: int) -> int:

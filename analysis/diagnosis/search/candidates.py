@@ -1,6 +1,7 @@
 """Candidate hypotheses: every effect of the catalogue at every axis or channel, with starting values from the data."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,12 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 CLOCK_DRIFT = "clock_drift"
+WITHIN: dict[str, dict[str, Literal["travel", "command"]]] = {
+    "cogging": {"pitch": "travel"},
+    "force_deadband": {"width": "command"},
+    "force_saturation": {"limit": "command"},
+}
+"""Numbers that cannot be larger than what was recorded."""
 
 
 def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = map) -> tuple[Hypothesis, ...]:
@@ -33,7 +40,21 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
         return found
 
     each: list[list[Hypothesis]] = list(map_(of_effect, catalogue))  # type: ignore[arg-type]
-    return tuple(hypothesis for found in each for hypothesis in found)
+    return tuple(hypothesis for found in each for hypothesis in found if within_data(hypothesis, evidence))
+
+
+def within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
+    """Whether the newest effect's numbers lie within what was recorded: no ripple repeats within less than its pitch of
+    travel, no dead band or limit lies beyond the largest command."""
+    claim, used = hypothesis.claims[-1], evidence.used > 0
+    for placed in hypothesis.of_claim(len(hypothesis.claims) - 1):
+        for name, reached in WITHIN.get(claim.effect.name, {}).items():
+            course = (evidence.axis_position if reached == "travel" else evidence.command)[used]
+            course = course[:, list(placed.sites)]
+            size = np.ptp(course, axis=0) if reached == "travel" else np.abs(course).max(axis=0)
+            if np.isfinite(size).all() and placed.values[name] > float(size.max(initial=0.0)) > 0:
+                return False
+    return True
 
 
 def _all(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:

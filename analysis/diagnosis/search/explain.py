@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
 from analysis.diagnosis.errors.output_error import Fitted, evaluated, gather_evidence
 from analysis.diagnosis.search.brief import brief_of
 from analysis.diagnosis.search.by_brief import fits_by_brief
-from analysis.diagnosis.search.candidates import CLOCK_DRIFT, candidates, clock_drift_by_trial
+from analysis.diagnosis.search.candidates import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
 from analysis.diagnosis.search.contest import contest, refine
 from analysis.diagnosis.search.families import excludes
 from analysis.diagnosis.search.no_answer import silences
@@ -155,7 +155,12 @@ def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -
     step.at(0.6)
     contenders = contest(arena, base, fits)
     return plainest_first(
-        [contender for contender in contenders if not silences(arena.measure, base, contender.fitted)]
+        [
+            contender
+            for contender in contenders
+            if not silences(arena.measure, base, contender.fitted)
+            and within_data(contender.fitted.hypothesis, evidence)
+        ]
     )
 
 
