@@ -82,7 +82,7 @@ def read_input(
 
 
 def _few_cycles(found: DiagnosisInput, plain: bool) -> tuple[str, ...]:
-    """A remark where no model is given: what cannot be tested is then not named. Raises StudyError."""
+    """A remark where no model is given, as of a real recording, for which there is no other. Raises StudyError."""
     try:
         require_different(found.recordings, found.names)
         require_something(found.recordings, found.names)
