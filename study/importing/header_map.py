@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from study.importing.arrays.arrays import Arrays
 from study.importing.map_format.import_map import ChannelMap, ClockMap, ImportMap
-from study.importing.map_format.signal_words import Named, named, open_roles, roles_of
+from study.importing.map_format.signal_words import Named, named, open_roles, plain_names, roles_of
 
 _TIME = re.compile(r"(t|time|zeit|temps)(_?(s|ms|us))?", re.IGNORECASE)
 
@@ -21,12 +21,12 @@ def header_map(arrays: Arrays) -> ImportMap | None:
     channels = tuple(
         ChannelMap(
             role=role,
-            name=column.name,
+            name=name,
             value=column.header,
             unit=column.unit,
             quantity="" if column.unit else column.quantity,
         )
-        for column, role in zip(rest, roles_of(rest) or (), strict=True)
+        for column, role, name in zip(rest, roles_of(rest) or (), plain_names(rest), strict=True)
     )
     return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,))
 

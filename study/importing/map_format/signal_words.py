@@ -57,6 +57,18 @@ class Named:
         return not self.doubt
 
 
+def plain_names(columns: Sequence[Named]) -> list[str]:
+    """Names without the unit at their end (`displacement_in` is `displacement`, for samples go to SI), where that is
+    sure and no two columns would be called alike."""
+    plain = [_without_unit(column) for column in columns]
+    return [name if plain.count(name) == 1 else column.name for name, column in zip(plain, columns, strict=True)]
+
+
+def _without_unit(column: Named) -> str:
+    before, unit = _unit_at_end(column.name)
+    return before if unit and unit == column.unit and not column.doubt else column.name
+
+
 def unit_in(header: str) -> tuple[str, str]:
     """Name and unit in brackets; the unit is empty where the header says none."""
     match = _BRACKETED.fullmatch(header)
@@ -69,7 +81,7 @@ def named(header: str) -> Named:
     name, unit = unit_in(header)
     words = [_QUANTITY[part.lower()] for part in _WORD.findall(name) if part.lower() in _QUANTITY]
     word = words[-1] if words else ""  # the last says it: a load angle is an angle
-    told = unit or _unit_at_end(name)
+    told = unit or _unit_at_end(name)[1]
     try:
         known = parse_unit(told)
     except UnknownUnitError:
@@ -148,8 +160,9 @@ def _by_quantity(columns: Sequence[Named]) -> dict[str, SignalRole]:
     return by_quantity
 
 
-def _unit_at_end(name: str) -> str:
-    """`displacement_mm`, `omega_rad_s`, `a_mps2`: the longest end that is a unit; empty where none is."""
+def _unit_at_end(name: str) -> tuple[str, str]:
+    """`displacement_mm`, `omega_rad_s`, `a_mps2`: the name before, and the longest end that is a unit; all of the name,
+    and nothing, where none is."""
     parts = name.split("_")
     for first in range(1, len(parts)):
         text = "_".join(parts[first:])
@@ -160,5 +173,5 @@ def _unit_at_end(name: str) -> str:
             parse_unit(text)
         except UnknownUnitError:
             continue
-        return text if text != "1" else ""
-    return ""
+        return ("_".join(parts[:first]), text) if text != "1" else (name, "")
+    return name, ""

@@ -62,6 +62,21 @@ def test_arrays_of_one_length_whose_names_say_units_need_no_map(tmp_path):
     ]
 
 
+@pytest.mark.parametrize(
+    ("header", "names"),
+    [
+        ("t_s,load_lbf,displacement_in,accel_ft/s^2", ["load", "displacement", "accel"]),
+        ("time_s,MotorTorque_Nm,omega_rad_s,theta_rad", ["MotorTorque", "omega", "theta"]),
+        ("time [s],fx [N],force_x_N,pos_x_mm [mm]", ["fx", "force_x", "pos_x"]),
+        ("t_s,force_N,position_mm,position_in", ["force", "position_mm", "position_in"]),
+    ],
+)
+def test_a_channel_does_not_keep_a_unit_in_its_name_that_it_is_no_longer_in(tmp_path, header, names):
+    found = header_map(arrays(tmp_path, header))
+    assert found is not None
+    assert [channel.name for channel in found.channel] == names
+
+
 def test_arrays_of_several_lengths_are_not_guessed_at(tmp_path):
     np.savez(tmp_path / "a.npz", t_s=np.arange(20.0), force_N=np.ones(20), position_mm=np.ones(10))
     assert header_map(read_arrays(tmp_path / "a.npz", CsvMap())) is None
