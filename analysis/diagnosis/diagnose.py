@@ -17,11 +17,13 @@ from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.assemble_findings import assembled
-from analysis.diagnosis.result.candidates import linear_remarks, reached_of, with_balances
+from analysis.diagnosis.result.candidates import beside_given, linear_remarks, reached_of, with_balances
 from analysis.diagnosis.result.contrast_findings import with_contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import state_maps
+from analysis.diagnosis.result.unconfirmed import unconfirmed_of
+from analysis.diagnosis.search.beside_given import weighed_beside
 from analysis.diagnosis.search.by_balance import borne_out, leaves_open, searched_by_balance
 from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, hums_low, known_to_repeat
 from analysis.diagnosis.search.determined import determined
@@ -101,6 +103,11 @@ def diagnose(
     seen = _by_search(recordings, look, settings, map_, progress, balances)
     if settings.discovery and not settings.fitted:
         seen = replace(seen, searched=with_laws(seen.searched, progress, settings.patient))
+    if not settings.fitted and not settings.clean:
+        progress("weighing laws in the force balance", 0.9)
+        repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
+        beside = weighed_beside(recordings, look.model, seen.searched, repeats, settings.patient)
+        seen, balances = replace(seen, searched=beside.searched), beside.balances
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 
@@ -232,10 +239,15 @@ def _assembled(
     searched, names = seen.searched, names_of_parts(recordings, settings.names)
     found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
     whole = assembled(replace(searched, found=found), look.chosen.floors, names, seen.floor)
-    diagnosis = with_balances(whole.diagnosis, balances, recordings[0].command.channels)
+    channels = recordings[0].command.channels
+    if settings.fitted:
+        diagnosis = with_balances(whole.diagnosis, balances, channels)
+    else:
+        found_too = unconfirmed_of(searched.unconfirmed, whole.black_box, recordings[0], look.model)
+        diagnosis = beside_given(whole.diagnosis, balances, found_too, channels)
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
-    linear = linear_remarks(balances, recordings[0].command.channels)
+    linear = linear_remarks(balances, channels) if settings.fitted else ()
     remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *searched.remarks, *linear, *whole.remarks)))
-    reached = reached_of(diagnosis, balances, recordings[0].command.channels)
+    reached = reached_of(diagnosis, balances, channels)
     maps = state_maps(diagnosis, balances, whole.evidence, recordings[0])
     return replace(whole, diagnosis=diagnosis, remarks=remarks, reached=reached, state_maps=maps)

@@ -94,6 +94,10 @@ class NamedEffect:
         Field(alias="class", description="Laws that these data cannot part, this one first; empty where they can."),
     ] = ()
     law: Annotated[FoundLaw | None, Field(description=f"Of a {DISCOVERED_LAW}, or of one that was kept.")] = None
+    held_out_gain: Annotated[
+        Estimate | None,
+        Field(description="Share of the error power on data that nothing was fitted to that goes with it; 95 %."),
+    ] = None
 
     @model_validator(mode="after")
     def _as_in_the_vocabulary(self) -> Self:
@@ -195,7 +199,8 @@ def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain values, without format and version."""
     plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
     effects, candidates = plain["effects"], plain["candidates"]
-    left_out = [(effect, "class") for effect in effects] + [(entry, "law") for entry in (*effects, *candidates)]
+    left_out = [(effect, optional) for effect in effects for optional in ("class", "held_out_gain")]
+    left_out += [(entry, "law") for entry in (*effects, *candidates)]
     for entry, optional in ((plain, "candidates"), *left_out):
         if not entry[optional]:
             del entry[optional]

@@ -17,6 +17,10 @@ RIDGE = 1e-10
 """Of the mean power of a column, against columns that are the same or are nothing but rounding in some blocks."""
 
 
+Prior = tuple[FloatArray, FloatArray] | None
+"""What is known of the first columns' weights: its precision and its pull (k,), as products would hold them."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
     """A stretch of samples: products of columns with themselves and with the force."""
@@ -82,11 +86,30 @@ def solved(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
     return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(count), pull[..., None])[..., 0])
 
 
+def solved_without(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
+    """As `solved`, with fixed columns of no weight."""
+    free = np.flatnonzero(~fixed)
+    found = np.zeros_like(pull)
+    found[..., free] = solved((gram[..., free[:, None], free], pull[..., free]), RIDGE)
+    return found
+
+
 def shrunk(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
     """As `solved`, with columns that are not free shrunk."""
     gram, pull = products
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
     return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, pull[..., None])[..., 0])
+
+
+def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
+    """As if so much had been seen of the first columns' weights. products: (..., c, c) and (..., c)."""
+    if prior is None:
+        return products
+    gram, pull = products[0].copy(), products[1].copy()
+    first = np.arange(len(prior[0]))
+    gram[..., first, first] += prior[0]
+    pull[..., first] += prior[1]
+    return gram, pull
 
 
 def error_of(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from analysis.diagnosis.balance.regression import Regression, of_everything
+from analysis.diagnosis.balance.everything import of_everything
+from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import Searched, Structure, better
 
 PLAIN = 0.1

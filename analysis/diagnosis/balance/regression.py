@@ -14,21 +14,20 @@ import numpy as np
 from analysis.diagnosis.balance.blocks import (
     RIDGE,
     Block,
+    Prior,
     blocks_of,
     column_scale,
     errors_of,
     parts_of,
-    shrunk,
     solved,
+    solved_without,
     total,
+    with_prior,
 )
 from analysis.diagnosis.balance.law import Beside, Law
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
-
-RIDGES = tuple(10.0**exponent for exponent in range(-8, 1))
-"""Of the mean power of a column: shrinkages of the sum of all laws, of which folds choose."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +54,10 @@ class Regression:
     """Per motion, (kept samples,)"""
     fit: tuple[Block, ...]
     test: tuple[Block, ...]
+    prior: Prior = None
+    """Of a given model's numbers."""
+    mass: float | None = None
+    """Of a given model; None = the weight of the own acceleration."""
 
     def chosen(self, laws: Sequence[int]) -> list[int]:
         """Columns of the base and of laws; one of the command, below zero, has none."""
@@ -78,7 +81,7 @@ class Regression:
     def _fitted(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
         """(..., c), of (..., c, c) and (..., c): least squares in which the axis has no mass and no damping below
         zero."""
-        gram, pull = products
+        gram, pull = products = with_prior(products, self.prior)
         found = solved(products, RIDGE)
         places = list(self.positive)
         bound: Mask = np.zeros_like(found, dtype=np.bool_)
@@ -90,7 +93,7 @@ class Regression:
             for fixed in np.unique(bound.reshape(-1, bound.shape[-1]), axis=0):
                 if fixed.any():
                     at = (bound == fixed).all(axis=-1)
-                    found[at] = _without(gram[at], pull[at], fixed)
+                    found[at] = solved_without(gram[at], pull[at], fixed)
         return np.where(bound, 0.0, found)
 
     def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
@@ -101,23 +104,22 @@ class Regression:
         )
 
 
-def _without(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
-    """As `solved`, with fixed columns of no weight."""
-    free = np.flatnonzero(~fixed)
-    found = np.zeros_like(pull)
-    found[..., free] = solved((gram[..., free[:, None], free], pull[..., free]), RIDGE)
-    return found
-
-
 def regression_of(
-    motions: Sequence[Motion], axis: int, laws: Sequence[Law], turns: bool, beside: Beside | None = None
+    motions: Sequence[Motion],
+    axis: int,
+    laws: Sequence[Law],
+    turns: bool,
+    beside: Beside | None = None,
+    bases: Sequence[FloatArray] | None = None,
 ) -> Regression:
-    """turns: see `Scales`. beside: None = the force drives the motion of its own number. Laws whose columns are next to
-    nothing, or not finite, are left out."""
+    """turns: see `Scales`. beside: None = the force drives the motion of its own number. bases: per motion (n, k), in
+    place of mass, damping and stiffness. Laws whose columns are next to nothing, or not finite, are left out.
+    """
     d = len(motions[0].channels)
     beside = beside or Beside(min(axis, d - 1))
     aims = [each.reduced(each.force[:, [axis]])[:, 0] for each in motions]
-    parts = [[_base(each, turns, beside.laws) for each in motions]]
+    linear = [_linear(each, turns, beside.laws) for each in motions] if bases is None else bases
+    parts = [[_based(each, columns) for each, columns in zip(motions, linear, strict=True)]]
     kept, places, begin = [], [], parts[0][0].shape[1]
     base = begin
     for law in laws:
@@ -134,7 +136,8 @@ def regression_of(
     mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
     own = beside.own
     return Regression(
-        tuple(motions), axis, tuple(kept), beside, base, (2 if turns else 3) * d, (own, d + own, own), tuple(places),
+        tuple(motions), axis, tuple(kept), beside, base, (2 if turns else 3) * d if bases is None else base - 1,
+        (own, d + own, own) if bases is None else (0,), tuple(places),
         scale, rows, tuple(aims),
         blocks_of(rows, aims, fit, (scale, mean)), blocks_of(rows, aims, test, (scale, mean)),
     )  # fmt: skip
@@ -144,23 +147,13 @@ def signal_power(blocks: Sequence[Block]) -> float:
     return sum(block.signal for block in blocks)
 
 
-def of_everything(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:
-    """All of these columns together, shrunk towards the base alone as much as folds ask for: its crossed error, and
-    each test block's. What no sum of a few laws should be expected to beat: a ceiling."""
-    free = np.array([k < regression.base for k in columns])
-    own = parts_of(regression.fit, columns)
-    whole = own[0].sum(axis=0), own[1].sum(axis=0)
-    rest = whole[0] - own[0], whole[1] - own[1]
-    errors = [float(errors_of(regression.fit, own, shrunk(rest, ridge, free)).sum()) for ridge in RIDGES]
-    best = int(np.argmin(errors))
-    found = shrunk(whole, RIDGES[best], free)
-    return errors[best], errors_of(regression.test, parts_of(regression.test, columns), found)
-
-
-def _base(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
+def _linear(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
     """turns: where a shaft goes round and round, no spring holds it."""
     more = [law.columns(motion, law.numbers) for law in beside]
-    linear = np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
+    return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
+
+
+def _based(motion: Motion, linear: FloatArray) -> FloatArray:
     return np.hstack([motion.reduced(linear), np.ones((len(linear[:: motion.step]), 1))])
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.balance.given_base import GivenBase, based_on, takes_enough
 from analysis.diagnosis.balance.law import Beside, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
@@ -54,18 +55,24 @@ def search_structures(
     rotational: bool,
     without: frozenset[str],
     patient: Patience,
-    beside: Beside | None = None,
+    beside: Beside | GivenBase | None = None,
 ) -> Searched:
     """without: effects that are not to be considered. beside: None = mass, damping and stiffness alone."""
     if not any(each.kept(each.fit).any() for each in motions):
         raise NoMotionError("too little of the motion is to be fitted to")
     scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
     turns = any(each.turns for each in scales)
-    held = {(law.key, law.numbers) for law in (beside.laws if beside else ())}
+    held = {(law.key, law.numbers) for law in (beside.laws if isinstance(beside, Beside) else ())}
     laws = [
         law for law in laws_of(motions, rotational) if law.effect not in without and (law.key, law.numbers) not in held
     ]
-    first = regression_of(motions, axis, laws, turns, beside)
+    if isinstance(beside, GivenBase):
+        first = based_on(motions, axis, laws, beside)
+        if not takes_enough(first, beside.least):
+            alone = _linear(first)
+            return Searched(first, alone, alone, (alone,), True)
+    else:
+        first = regression_of(motions, axis, laws, turns, beside)
     if "cogging" not in without:
         first = _with_pitches(first, scales, ())
         grown = _grown(first, [_linear(first)])
@@ -141,7 +148,8 @@ def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, flo
     """Each law's numbers with all of them fitted together; None where its signs are not physics."""
     columns = regression.chosen(laws)
     weights = regression.weights(columns)
-    mass, begin, found = float(weights[regression.beside.own]), regression.base, []
+    mass = float(weights[regression.beside.own]) if regression.mass is None else regression.mass
+    begin, found = regression.base, []
     for number in laws:
         law, place = regression.laws[number], regression.places[number]
         count = place.stop - place.start

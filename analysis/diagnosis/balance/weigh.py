@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.blocks import Block
+from analysis.diagnosis.balance.everything import of_everything
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
-from analysis.diagnosis.balance.regression import Regression, of_everything
+from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
 from analysis.diagnosis.balance.weighed import DRAWS, Weighed, drawn_of, gain_of
 from equalizer.effects.catalogue import EFFECTS

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.noise_floor import NoiseFloor
-from analysis.diagnosis.document import Diagnosis, Mismatch
+from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import without_claim
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
@@ -21,6 +21,7 @@ from analysis.diagnosis.result.findings import BlackBox, Course, Findings, Signa
 from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
 from analysis.diagnosis.result.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.result.signature_curves import Names, signature_of
+from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
@@ -128,7 +129,7 @@ def _document(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.standing)),
-        effects=named_effects(found, errors[len(tuning.names) :], said) if judged.named else (),
+        effects=_named(searched, errors[len(tuning.names) :], said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -139,6 +140,16 @@ def _document(
         error=measure.name,
         next_experiment=None if proposal is None else proposal.document,
     )
+
+
+def _named(searched: Searched, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
+    """With their gains on held-out data, where samples were compared."""
+    arena, found = searched.arena, searched.found
+    effects = named_effects(found, errors, said)
+    if found.statistic is not None or len(found.steps) != len(effects):
+        return effects
+    between = [arena.confirmed(step) for step in found.steps[:-1]]
+    return with_gains(effects, arena.whole, (found.retuned, *between, found.after))
 
 
 def _proposal(arena: Arena, found: Explanation, judged: Judgement) -> Proposal | None:

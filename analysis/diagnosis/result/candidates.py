@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from analysis.diagnosis.balance.actuator import NO_COLUMN
 from analysis.diagnosis.balance.reduced_recordings import linear_laws
+from analysis.diagnosis.balance.structures import NOTICED
 from analysis.diagnosis.balance.weigh import SMALL, Balance
 from analysis.diagnosis.balance.weighed import Weighed
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
@@ -26,6 +27,50 @@ REFINING = {
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """Where one response was measured, a late command is as good as a late reading."""
+
+
+BEYOND = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
+
+
+def beside_given(
+    diagnosis: Diagnosis,
+    balances: Sequence[Balance],
+    unconfirmed: Sequence[Candidate],
+    channels: tuple[str, ...],
+) -> Diagnosis:
+    """Candidates and classes, where a model was given. unconfirmed: what the search by simulation found and did not
+    name. channels: of the commands."""
+    alike = {
+        (law.law.effect, axis_letter(channels[axis], channels)): law.alike
+        for axis, balance in enumerate(balances)
+        for law in balance.laws
+    }
+    effects = tuple(
+        replace(effect, class_=_class_of(effect, alike.get((effect.effect, effect.axis or ""), ())))
+        for effect in diagnosis.effects
+    )
+    named = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
+    weighed = [
+        (axis_letter(channels[axis], channels), law)
+        for axis, balance in enumerate(balances)
+        for law in (*balance.laws, *balance.others)
+    ]
+    by_balance = [
+        _candidate(replace(law, why_not=BEYOND) if law.law.linear else law, axis)
+        for axis, law in sorted(weighed, key=lambda placed: (_rank(placed[1]), -placed[1].gain))
+        if law.share >= SMALL and law.gain >= NOTICED
+    ]
+    both = sorted((*unconfirmed, *by_balance), key=lambda each: -each.held_out_gain)
+    left = [each for each in both if (each.effect, each.axis) not in named]
+    return replace(diagnosis, effects=effects, candidates=_once(left)[:MOST])
+
+
+def _class_of(effect: NamedEffect, alike: tuple[str, ...]) -> tuple[str, ...]:
+    """Rivals that neither the simulation nor the balance can part from it."""
+    passed = {rival.effect for rival in effect.rivals if not rival.inseparable}
+    names = [rival.effect for rival in effect.rivals if rival.inseparable]
+    names += [name for name in alike if name not in passed]
+    return tuple(dict.fromkeys((effect.effect, *names))) if names else ()
 
 
 def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]) -> Diagnosis:
@@ -102,7 +147,8 @@ def reached_of(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tupl
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
         laws = [law.place for law in balance.laws if law.law.effect in names]
         rms = balance.error_of(laws) if laws else balance.linear
-        found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested))
+        given = balance.searched.regression.prior is not None
+        found.append(Reached(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, given))
     return tuple(found)
 
 

@@ -40,10 +40,8 @@ def _ceiling(one: Reached, single: bool) -> str:
             f"In the force balance{along}, no law could be tested: the device moves once, and next to nothing moves in "
             "what was held back. Record several moves, or hold one of them back."
         )
-    alone = (
-        f"In the force balance{along}, on held-out data, mass, damping and stiffness alone leave "
-        f"{error_text(one.linear)} of the force"
-    )
+    model = "the re-tuned model leaves" if one.given else "mass, damping and stiffness alone leave"
+    alone = f"In the force balance{along}, on held-out data, {model} {error_text(one.linear)} of the force"
     named = f"what is named leaves {error_text(one.named)}" if one.any_named else "no law is named"
     if one.any_named and one.named <= one.ceiling * (1 + SAME):
         return f"{alone}, {named}, and all laws together leave no less."

@@ -80,6 +80,8 @@ class Reached:
     any_named: bool
     tested: bool = True
     """What was held back moves enough to test laws by."""
+    given: bool = False
+    """The model was given: `linear` is what it leaves, re-tuned."""
 
     @property
     def share(self) -> float:

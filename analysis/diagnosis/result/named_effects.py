@@ -141,14 +141,14 @@ def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, s
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Said) -> dict[str, Estimate]:
     claim = whole.claims[number]
-    at = _reported(whole, number, whole.point)
+    at = reported_numbers(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
     for coordinate in range(own.start, own.stop):
         if not np.isfinite(errors[coordinate]):
             continue
         moved = whole.point.copy()
         moved[coordinate] += errors[coordinate]
-        for name, value in _reported(whole, number, moved).items():
+        for name, value in reported_numbers(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
     units = _units(claim.effect, at, said)
     return {
@@ -181,7 +181,7 @@ def _interval(value: float, standard_error: float) -> tuple[float, float] | None
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
-def _reported(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+def reported_numbers(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
     """The vocabulary's numbers: of the only axis, of the first, or where the effect's size is asked of the largest."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]

@@ -104,7 +104,8 @@ def state_maps(
     for axis, letter in enumerate(letters):
         if balances:
             course, completed = _of_balance(balances[axis], diagnosis, letter)
-            model = "mass, damping and stiffness alone"
+            given = balances[axis].searched.regression.prior is not None
+            model = "the re-tuned model" if given else "mass, damping and stiffness alone"
         else:
             course, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
         if course is not None:

@@ -158,8 +158,17 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
 def share_sentence(effect: NamedEffect) -> str:
     return (
         f"It accounts for {100 * effect.share:.3g} % of the mismatch that re-tuning leaves; "
-        f"the probability that this is its name is {probability_text(effect.probability)}."
+        f"the probability that this is its name is {probability_text(effect.probability)}.{gain_sentence(effect)}"
     )
+
+
+def gain_sentence(effect: NamedEffect) -> str:
+    """With a space before it; empty where nothing was held out."""
+    gain = effect.held_out_gain
+    if gain is None or gain.ci95 is None:
+        return ""
+    low, high = (share_text(max(end, 0.0)) for end in gain.ci95)
+    return f" On held-out data it takes {share_text(max(gain.value, 0.0))} of the error's power ({low} to {high})."
 
 
 def confirmation_sentence(fit: Errors, test: Errors) -> str:

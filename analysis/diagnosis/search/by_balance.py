@@ -175,6 +175,8 @@ def _constants(balances: Sequence[Balance]) -> Hypothesis:
     whole = NOTHING
     for axis, balance in enumerate(balances):
         regression = balance.searched.regression
+        if regression.prior is not None:
+            continue
         force = -float(regression.weights(regression.chosen(()))[-1])
         if force:
             claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
@@ -200,6 +202,8 @@ def _claimed(axis: int, weighed: Weighed) -> Hypothesis:
 def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
     start = np.zeros(len(tuning.names))
+    if any(balance.searched.regression.prior is not None for balance in balances):
+        return start
     model = tuning.model
     if len(balances) != 1 or model.coordinates != 1:
         return start

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation, explain
 from analysis.diagnosis.search.no_answer import foresees_nothing
 from analysis.diagnosis.search.patience import OUT_OF_TIME, always
@@ -31,6 +32,16 @@ ONLY_REFINES = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Unconfirmed:
+    """What was found and is not named."""
+
+    hypothesis: Hypothesis
+    gain: float
+    """Share of the held-out error power that goes with it."""
+    why_not: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Searched:
     arena: Arena
     """With the samples as they were used in the end."""
@@ -39,6 +50,8 @@ class Searched:
     remarks: tuple[str, ...] = ()
     errors: FloatArray | None = None
     """`final_errors`, where the search needed them."""
+    unconfirmed: tuple[Unconfirmed, ...] = ()
+    """The largest gain first."""
 
 
 def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:

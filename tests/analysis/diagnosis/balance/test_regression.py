@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.blocks import FOLDS
+from analysis.diagnosis.balance.everything import of_everything
 from analysis.diagnosis.balance.law import Law, named
 from analysis.diagnosis.balance.motion import motions_of
-from analysis.diagnosis.balance.regression import of_everything, of_laws, regression_of, with_law
+from analysis.diagnosis.balance.regression import of_laws, regression_of, with_law
 from analysis.diagnosis.balance.structures import Structure, better
 from analysis.diagnosis.data.observed_parts import observed_parts
 

@@ -1,0 +1,71 @@
+"""A given model's part in a force balance: the force that it needs, and how that changes with its open numbers.
+
+Both are columns: the first has the weight 1, the others the weight 0 give or take 1, for they are counted in standard
+deviations of the calibration. How much the recording weighs against that follows from what the columns leave: error
+power per degree of freedom, of which an error with a narrow spectrum has few (equivalent degrees of freedom of a power
+estimate; Bendat and Piersol 2010, Random Data, ch. 8).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.everything import of_everything
+from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.balance.regression import Regression, regression_of
+from equalizer.signals.signal import FloatArray
+
+FIXED = 1e6
+"""Precision of the weight 1, over what the recording knows of it; principle: far beyond it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenBase:
+    """Of one axis."""
+
+    columns: tuple[FloatArray, ...]
+    """Per motion, (n, 1 + numbers): the force that the model needs along the measured motion, and what one standard
+    deviation more of each open number adds to it; at the recording's rate."""
+    mass: float
+    """That moves along the axis."""
+    least: float = 0.0
+    """Of the force's rms, that all laws together must take for any to be looked for."""
+
+
+def based_on(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
+    """As `regression_of`. Numbers that hardly change the force are left out."""
+    told = _told(given)
+    columns = [each[:, told] for each in given.columns]
+    plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
+    scale = plain.scale[: plain.base - 1]
+    precision = np.full(len(scale), _power_per_freedom(plain)) / scale**2
+    precision[0] = FIXED * sum(block.gram[0, 0] for block in plain.fit)
+    pull = np.zeros(len(scale))
+    pull[0] = precision[0] * scale[0]
+    return replace(plain, prior=(precision, pull))
+
+
+def takes_enough(plain: Regression, least: float) -> bool:
+    """Whether all laws together take so much of the force, over the folds."""
+    alone = float(plain.crossed(plain.chosen(())).sum())
+    whole = of_everything(plain, range(plain.columns[0].shape[1]))[0]
+    return alone - whole > least**2 * sum(block.signal for block in plain.fit)
+
+
+def _told(given: GivenBase) -> list[int]:
+    size = np.sqrt(np.mean(np.vstack(given.columns) ** 2, axis=0))
+    return [0, *(k for k in range(1, len(size)) if size[k] > 1e-9 * size[0])]
+
+
+def _power_per_freedom(plain: Regression) -> float:
+    """Of what the columns leave where they are fitted freely, the sum of squares over its degrees of freedom."""
+    left = plain.remainder(plain.chosen(()))
+    power, freedom = 0.0, 0.0
+    for course, motion in zip(left, plain.motions, strict=True):
+        seen = np.where(motion.kept(motion.fit), course, 0.0)
+        lines = np.abs(np.fft.rfft(seen)) ** 2
+        power += float(seen @ seen)
+        freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)
+    return power / max(freedom, 1.0)

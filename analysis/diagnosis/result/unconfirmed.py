@@ -1,0 +1,58 @@
+"""What a search by simulation found and did not name, and what what it named gains on held-out data."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.result.findings import BlackBox
+from analysis.diagnosis.result.named_effects import axis_of, reported_numbers, said_of
+from analysis.diagnosis.search.held_out_gain import held_out_gain
+from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.search import Unconfirmed
+from equalizer.effects.placing import place_of_effect
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+
+
+def unconfirmed_of(
+    found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
+) -> tuple[Candidate, ...]:
+    """The effect that was added last stands for those before it. Shares are of what a black box takes, or, where
+    physics takes more, of the largest gain."""
+    if not found:
+        return ()
+    said, most = said_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
+    candidates = []
+    for each in found:
+        number = len(each.hypothesis.claims) - 1
+        claim = each.hypothesis.claims[number]
+        candidates.append(
+            Candidate(
+                effect=claim.effect.name,
+                place=place_of_effect(claim.effect),
+                axis=axis_of(claim, said),
+                parameters=reported_numbers(each.hypothesis, number, each.hypothesis.point),
+                held_out_gain=min(each.gain, 1.0),
+                share_of_black_box=min(each.gain / most, 1.0),
+                why_not=each.why_not,
+            )
+        )
+    return tuple(candidates)
+
+
+def _gain_of(box: BlackBox | None) -> float:
+    """Share of the error power of a model without named effects that the black box beside it takes."""
+    return 0.0 if box is None or not box.physics > 0 else 1 - (box.test / box.physics) ** 2
+
+
+def with_gains(
+    effects: Sequence[NamedEffect], measure: ErrorMeasure, stages: Sequence[Contender]
+) -> tuple[NamedEffect, ...]:
+    """stages: with the sealed samples, the re-tuned model and what stood after each effect."""
+    named = []
+    for place, effect in enumerate(effects):
+        gain = held_out_gain(measure, stages[place], stages[place + 1])
+        told = None if gain is None else Estimate(gain.gain, "1", (min(gain.low, gain.gain), max(gain.high, gain.gain)))
+        named.append(replace(effect, held_out_gain=told))
+    return tuple(named)
