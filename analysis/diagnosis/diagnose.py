@@ -106,8 +106,8 @@ def diagnose(
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
         repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
-        beside = weighed_beside(recordings, look.model, seen.searched, repeats, settings.patient)
-        seen, balances = replace(seen, searched=beside.searched), beside.balances
+        weighed = weighed_beside(recordings, look.model, seen.searched, repeats, settings.patient)
+        seen, balances = replace(seen, searched=weighed.searched), weighed.balances
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 

@@ -40,10 +40,11 @@ def based_on(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: G
     columns = [each[:, told] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
     scale = plain.scale[: plain.base - 1]
-    precision = np.full(len(scale), _power_per_freedom(plain)) / scale**2
+    precision, pull = np.zeros(len(scale)), np.zeros(len(scale))
     precision[0] = FIXED * sum(block.gram[0, 0] for block in plain.fit)
-    pull = np.zeros(len(scale))
     pull[0] = precision[0] * scale[0]
+    free = replace(plain, prior=(precision.copy(), pull))
+    precision[1:] = _power_per_freedom(free) / scale[1:] ** 2
     return replace(plain, prior=(precision, pull))
 
 
@@ -60,7 +61,7 @@ def _told(given: GivenBase) -> list[int]:
 
 
 def _power_per_freedom(plain: Regression) -> float:
-    """Of what the columns leave where they are fitted freely, the sum of squares over its degrees of freedom."""
+    """Of what the columns leave where the open numbers are fitted freely, the sum of squares over its degrees of freedom."""
     left = plain.remainder(plain.chosen(()))
     power, freedom = 0.0, 0.0
     for course, motion in zip(left, plain.motions, strict=True):

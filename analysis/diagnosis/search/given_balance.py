@@ -5,13 +5,13 @@ effects. Laws are then weighed as beside a fitted model (`balance.weigh`), by wh
 data that re-tuning leaves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.diagnosis.balance.given_base import GivenBase
-from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.motion import OVERSAMPLED, Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.balance.weigh import OF_SIGNAL, Balance, weigh
 from analysis.diagnosis.data.carried_weight import carrying
@@ -30,8 +30,8 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-FINER = 2
-"""Samples at which laws are computed, per sample that is kept: they have overtones, which must not fold back."""
+FINEST = 6.0
+"""Samples per period of the band's end at which laws are computed: they have overtones, which must not fold back."""
 MOVED = 0.1
 """Step of the finite differences, in standard deviations of the calibration."""
 
@@ -78,30 +78,56 @@ class _Seen:
 
 
 def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
-    recording, rate_hz = record.recording, motion.rate_hz
+    recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known = placed_effects(model, recording.command.channels, recording.response.channels)
-    tuning = tuning_of(model, recording.command.channels)
-    moved = band_motion(motion.position[:, : model.inputs], rate_hz, motion.band_hz)
-
-    def needs(deviations: FloatArray) -> FloatArray:
-        structure = _structure(carrying(tuning.tuned(deviations), recording), known)
-        return needed_force(structure, moved).force
-
     at = _structure(carrying(model, recording), known)
-    whole = needed_force(at, moved)
+    whole = needed_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
     entered = entered_force(model, motion.force, rate_hz, known, recording.hold)
     added = force_along(at, known, course, (motion.force, entered - whole.force), rate_hz)
-    changes = [(needs(step) - whole.force) / MOVED for step in MOVED * np.eye(len(tuning.names))]
-    columns = np.stack([whole.force, *changes], axis=1)
-    every = max(motion.step // FINER, 1)
-    turned = replace(
-        motion, rate_hz=rate_hz / every, step=motion.step // every, channels=motion.channels[: model.inputs],
-        position=course[0][::every], velocity=course[1][::every], acceleration=course[2][::every],
+    every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
+    position, velocity, acceleration = (each[::every] for each in course)
+    thin = replace(
+        motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (OVERSAMPLED * motion.band_hz)), 1),
+        channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
         force=motion.within(entered + added)[::every], condition=motion.condition[::every],
         fit=motion.fit[::every], test=motion.test[::every],
     )  # fmt: skip
-    return _Seen(turned, tuple(columns[::every, :, axis] for axis in range(model.inputs)))
+    changes = [*_grounded(thin, model, recording), *_of_modes(thin, model, recording, known)]
+    columns = np.stack([whole.force[::every], *changes], axis=1)
+    return _Seen(thin, tuple(columns[:, :, axis] for axis in range(m)))
+
+
+def _grounded(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
+    """(n, m) each: what one standard deviation of mass, damping and stiffness at the driven axes adds, as `Tuning`
+    counts them."""
+    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    length = np.linalg.norm(model.input, axis=0)
+    for part, course in enumerate((motion.acceleration, motion.velocity, motion.position)):
+        for number, (i, j) in enumerate(pairs, part * len(pairs)):
+            added = np.zeros((len(course), m))
+            added[:, i] = course[:, j]
+            added[:, j] = course[:, i]
+            yield tuning.deviation[number] * added / length
+
+
+def _of_modes(
+    motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
+) -> Iterator[FloatArray]:
+    """(n, m) each: the same of the modes' numbers."""
+    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    first = 3 * m * (m + 1) // 2
+    if first == len(tuning.names):
+        return
+    seen = motion.position @ (model.output[:m] @ driven_axes(model)).T
+    moved = band_motion(seen, motion.rate_hz, motion.band_hz)
+    steps = MOVED * np.eye(len(tuning.names))[first:]
+    here, *there = (
+        needed_force(_structure(carrying(tuning.tuned(step), recording), known), moved).force
+        for step in (0 * steps[0], *steps)
+    )
+    yield from ((each - here) / MOVED for each in there)
 
 
 def _structure(model: MechanicalModel, known: Sequence[PlacedEffect]) -> MechanicalModel:
