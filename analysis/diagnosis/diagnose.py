@@ -105,8 +105,7 @@ def diagnose(
         seen = replace(seen, searched=with_laws(seen.searched, progress, settings.patient))
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
-        repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
-        weighed = weighed_beside(recordings, look.model, seen.searched, repeats, settings.patient)
+        weighed = weighed_beside(recordings, look, seen.searched, settings.patient)
         seen, balances = replace(seen, searched=weighed.searched), weighed.balances
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)

@@ -61,7 +61,7 @@ def _told(given: GivenBase) -> list[int]:
 
 
 def _power_per_freedom(plain: Regression) -> float:
-    """Of what the columns leave where the open numbers are fitted freely, the sum of squares over its degrees of freedom."""
+    """Of what the columns leave with the open numbers fitted freely: the sum of squares over its degrees of freedom."""
     left = plain.remainder(plain.chosen(()))
     power, freedom = 0.0, 0.0
     for course, motion in zip(left, plain.motions, strict=True):

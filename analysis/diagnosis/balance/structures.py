@@ -74,11 +74,14 @@ def search_structures(
     else:
         first = regression_of(motions, axis, laws, turns, beside)
     if "cogging" not in without:
-        first = _with_pitches(first, scales, ())
-        grown = _grown(first, [_linear(first)])
-        if grown:
-            first = _with_pitches(first, scales, grown[0].laws)
+        first = _pitched(first, scales)
     linear = _linear(first)
+    first, ranked, best = _beam(first, linear, patient)
+    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda each: each.error)), patient())
+
+
+def _beam(first: Regression, linear: Structure, patient: Patience) -> tuple[Regression, list[Structure], Structure]:
+    """Of all sizes; and with the laws refined."""
     beam, ranked, best = [linear], [linear], linear
     for _ in range(MOST_LAWS):
         if not patient():
@@ -93,7 +96,7 @@ def search_structures(
         if not better(best, beam[0]):
             break
         best = beam[0]
-    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda each: each.error)), patient())
+    return first, ranked, best
 
 
 def better(plain: Structure, richer: Structure) -> bool:
@@ -156,6 +159,13 @@ def values_of(regression: Regression, laws: Sequence[int]) -> list[dict[str, flo
         found.append(law.values(weights[begin : begin + count], law.numbers, mass))
         begin += count
     return found
+
+
+def _pitched(first: Regression, scales: Sequence[Scales]) -> Regression:
+    """With the pitches that show before any law, and beside the best one."""
+    first = _with_pitches(first, scales, ())
+    grown = _grown(first, [_linear(first)])
+    return _with_pitches(first, scales, grown[0].laws) if grown else first
 
 
 def _with_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:

@@ -17,13 +17,13 @@ from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.by_balance import searched_by_balance
 from analysis.diagnosis.search.given_balance import balances_beside
 from analysis.diagnosis.search.held_out_gain import HeldOutGain, held_out_gain
+from analysis.diagnosis.search.looks import Look
 from analysis.diagnosis.search.parsimony import only_refines
 from analysis.diagnosis.search.rivalry import Arena, Contender
 from analysis.diagnosis.search.search import Searched, Unconfirmed
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import NAMED_ERROR, RETUNING_BOUND
 from analysis.diagnosis.types import Patience
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 AT_LIMIT = 0.97
@@ -39,17 +39,12 @@ class Beside:
     """Empty where nothing is missing, or no motion was measured."""
 
 
-def weighed_beside(
-    recordings: Sequence[Recording],
-    model: MechanicalModel,
-    seen: Searched,
-    known_noise: bool,
-    patient: Patience,
-) -> Beside:
-    """seen: by simulation. known_noise: from repeats, in every recording."""
+def weighed_beside(recordings: Sequence[Recording], look: Look, seen: Searched, patient: Patience) -> Beside:
+    """seen: by simulation."""
     if seen.judged.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
         return Beside(seen)
-    balances = balances_beside(recordings, model, seen.arena.barred, patient)
+    known_noise = all(floor.how == "repeats" for floor in look.chosen.floors)
+    balances = balances_beside(recordings, look.model, seen.arena.barred, patient)
     near = float(np.nanmax(seen.found.retuned.standing.test, initial=0.0)) <= NAMED_ERROR
     if seen.judged.named:
         return Beside(seen, balances)
