@@ -13,6 +13,8 @@ GAP = 1.5
 """Steps between two stamps that are a gap."""
 JITTER, WILD = 0.02, 0.2
 """Rms of a stamp off its place, in steps, that is noticed, and that spoils phases."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
+"""Of the devices and sensors that are known here: outside, stamps in s were called ms, or the other way."""
 DRIFT_PPM, RATE_PPM = 100.0, 5000.0
 """Off the stated rate: a cheap oscillator, and a rate that is another."""
 
@@ -28,12 +30,29 @@ def clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ..
             ),
         )
     if recording.time_s is None:
-        said = _resampled(recording)
-        return said or (
-            Check(CLOCK, "fine", f"There are no time stamps; {recording.sample_rate_hz:g} Hz is taken as stated."),
-        )
+        said = (*_resampled(recording), *_rate(recording.sample_rate_hz))
+        return said or (Check(CLOCK, "fine", _whence(recording)),)
     found = tuple(check for start, stop in stretches for check in _of_stamps(recording, start, stop))
     return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
+
+
+def odd_rate(rate_hz: float) -> str:
+    """What speaks against a rate, from stamps in another unit than was said; empty where nothing does."""
+    if SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        return ""
+    other = "s, called ms" if rate_hz > FASTEST_HZ else "ms, called s"
+    return f"{rate_hz:g} Hz is an unlikely rate of a haptic device: the time may be in another unit ({other})."
+
+
+def _rate(rate_hz: float) -> tuple[Check, ...]:
+    odd = odd_rate(rate_hz)
+    return (Check(CLOCK, "notice", odd, "Check the unit of the time, and import again."),) if odd else ()
+
+
+def _whence(recording: Recording) -> str:
+    if recording.meta.get("time") == "stamps":
+        return f"The time stamps of the file were even at its import; they give {recording.sample_rate_hz:g} Hz."
+    return f"There are no time stamps; {recording.sample_rate_hz:g} Hz is taken as stated."
 
 
 def _resampled(recording: Recording) -> tuple[Check, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.diagnosis.data.found_segments import with_found_segments
+from analysis.look.clock import odd_rate
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import recording_problems
 from equalizer.signals.signal import FloatArray, Signal
@@ -84,7 +85,7 @@ def build_recording(
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = said.sentences([part.label for part in planned])
-    return Built(recording, (*notes, *_said_of_units(wanted), *([repeats] if repeats else [])))
+    return Built(recording, (*notes, *_said_of_units(wanted), *filter(None, (_odd_rate(recording), repeats))))
 
 
 class _Counter:
@@ -173,8 +174,14 @@ def _joined(wanted: ImportMap, parts: Sequence[_Part], units: dict[Key, _Channel
     )
 
 
+def _odd_rate(recording: Recording) -> str:
+    return "" if recording.meta.get("time") == "unknown" else odd_rate(recording.sample_rate_hz)
+
+
 def _time_facts(wanted: ImportMap) -> dict[str, str]:
-    return {"time": "unknown"} if any(clock.unknown for clock in wanted.clock) else {}
+    if any(clock.unknown for clock in wanted.clock):
+        return {"time": "unknown"}
+    return {"time": "stamps"} if wanted.clock[0].time else {}
 
 
 def _require_one_rate(parts: Sequence[_Part]) -> None:

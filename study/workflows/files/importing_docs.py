@@ -103,7 +103,8 @@ cannot be understood is refused by name, and then nothing is written. `hapteq va
 * **Units** are never guessed: a channel without one keeps its numbers, in the unit `1`, and that is said. So is the
   unit in which each computed channel is taken to be. {ALLOWED[0].upper()}{ALLOWED[1:]}; `lb` and `oz` are masses.
 * **Conditions**: what was known beside (a temperature, a pressure, a setting) is a channel with the role `condition`.
-* **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so.
+* **No time**: where none is known, `unknown = true` of the clock numbers the samples, at 1 Hz; `meta/time` says so
+  (`unknown`; `stamps` where the rate is that of the file's own time).
 * **Resampling** is never done unasked. `held`: a command that stays until the next one. `band-limited`: a signal that
   was sampled behind a filter; flat to {FLAT_TO:.0%} of the lower Nyquist frequency, what is above the new one is taken
   out. `linear`: straight lines. Between uniform rates the band-limited way is exact to 1e-4 of the amplitude up to four

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from analysis.look.clock import clock
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
@@ -80,6 +81,19 @@ def test_a_folder_that_no_map_is_for_is_wrong_use(tmp_path):
     (tmp_path / "a.csv").write_text("x\n1\n")
     with pytest.raises(WrongUseError, match="No map is for the files of the folder"):
         import_recording(ImportPlan((tmp_path,), None, tmp_path / "r.h5"))
+
+
+def test_seconds_that_are_called_milliseconds_are_noticed(tmp_path):
+    (tmp_path / "a.csv").write_text(TABLE.replace("time [s]", "time [ms]"))
+    (tmp_path / "b.csv").write_text(TABLE)
+    _, notes = recording_from(tmp_path / "a.csv")
+    assert any("1e+06 Hz is an unlikely rate" in note and "(s, called ms)" in note for note in notes)
+    found, notes = recording_from(tmp_path / "b.csv")
+    assert not any("unlikely" in note for note in notes)
+    (check,) = clock(found, [(0, len(found))])
+    assert (check.level, check.seen) == (
+        "fine", "The time stamps of the file were even at its import; they give 1000 Hz."
+    )  # fmt: skip
 
 
 def write_runs(folder, *names):
