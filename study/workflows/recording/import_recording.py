@@ -167,4 +167,16 @@ def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
 def _with_header(wanted: ImportMap, files: Sequence[Path], on_progress: Progress) -> Foreign:
     built = build_recording(wanted, files, on_progress)
     told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
-    return Foreign(built.recording, tuple(files), "header", "", (f"Taken from the header: {told}.", *built.notes))
+    notes = (f"Taken from the header: {told}.", *_perhaps_imposed(built.recording), *built.notes)
+    return Foreign(built.recording, tuple(files), "header", "", notes)
+
+
+def _perhaps_imposed(recording: Recording) -> tuple[str, ...]:
+    """More forces than motions: more often the motion was imposed and the forces were measured."""
+    command, response = recording.command, recording.response
+    if len(command.channels) <= len(response.channels) or not set(command.quantities) <= {"force", "torque"}:
+        return ()
+    return (
+        f"{len(command.channels)} forces beside {len(response.channels)} motion: they were taken for commands. If the "
+        "motion was imposed and the forces were measured, import by a map with the roles the other way round.",
+    )

@@ -96,6 +96,16 @@ def test_seconds_that_are_called_milliseconds_are_noticed(tmp_path):
     )  # fmt: skip
 
 
+def test_of_two_forces_along_one_motion_it_is_said_that_the_motion_may_be_imposed(tmp_path):
+    rows = [f"{t:.3f},{np.sin(99 * t):.6f},{np.cos(99 * t):.6f},{t:.6f}" for t in T]
+    (tmp_path / "a.csv").write_text(
+        "time [s],drive force [N],tip force [N],displacement [mm]\n" + "\n".join(rows) + "\n"
+    )
+    assert any("If the motion was imposed" in note for note in recording_from(tmp_path / "a.csv")[1])
+    (tmp_path / "b.csv").write_text(TABLE)
+    assert not any("imposed" in note for note in recording_from(tmp_path / "b.csv")[1])
+
+
 def write_runs(folder, *names):
     folder.mkdir()
     for name in names:
