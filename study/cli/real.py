@@ -15,9 +15,13 @@ def real(
     ],
     out: Annotated[Path, typer.Option(help="Folder of the page, the table, the figures and every diagnosis.")],
     seconds: Annotated[
-        float,
-        typer.Option(min=1.0, help="Processor time for a sub-folder: a search that is not done by then ends there."),
-    ] = 180.0,
+        float | None,
+        typer.Option(
+            min=1.0,
+            help="Processor time for a sub-folder, after which its searches end. [default: they end by a count of "
+            "evaluations, the same on every machine]",
+        ),
+    ] = None,
     inject: Annotated[
         int,
         typer.Option(

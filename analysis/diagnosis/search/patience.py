@@ -1,6 +1,7 @@
 """Time limit of a search: what was found until then is the result."""
 
 from collections.abc import Callable, Iterable
+from itertools import count
 
 from analysis.diagnosis.types import Mapper, Patience
 
@@ -16,6 +17,12 @@ class OutOfPatienceError(Exception):
 
 def always() -> bool:
     return True
+
+
+def counted(most: int) -> Patience:
+    """Until it was asked so often: the same pieces on every machine, however busy."""
+    asked = count()
+    return lambda: next(asked) < most
 
 
 def impatient(map_: Mapper, patient: Patience) -> Mapper:

@@ -28,13 +28,13 @@ def answer_place(out: Path, one: RealRecording) -> Path:
     return out / one.folder.name / one.name
 
 
-def origin_of_answer(one: RealRecording, seconds: float) -> Provenance:
+def origin_of_answer(one: RealRecording, seconds: float | None) -> Provenance:
     """Everything that an answer hangs on. Raises CannotReadError."""
     files = tuple(dict.fromkeys((*one.parents, *one.tested_on)))
     return gather_provenance(parents=files, settings={"seconds": seconds})
 
 
-def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float) -> dict[Path, RealAnswer]:
+def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
     """By their place; nothing is written. Raises StudyError where one is torn, or was made from something else."""
     there = [one for one in wanted if (answer_place(out, one) / ANSWER_NAME).is_file()]
     kept = [_kept(answer_place(out, one), one, seconds) for one in there]
@@ -43,7 +43,7 @@ def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float) -> 
     return {one.place: one.answer for one in kept}
 
 
-def _kept(place: Path, one: RealRecording, seconds: float) -> _Kept:
+def _kept(place: Path, one: RealRecording, seconds: float | None) -> _Kept:
     try:
         answer, origin = read_answer_and_origin(place / ANSWER_NAME)
     except StudyError as error:
@@ -73,13 +73,17 @@ def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iter
             yield f"{name} has changed" if name in names_now else f"{name} is gone"
 
 
-def _setting_changes(origin: Mapping[str, Any], seconds: float) -> Iterator[str]:
+def _setting_changes(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
     settings = origin.get("settings")
-    then = settings.get("seconds") if isinstance(settings, dict) else None
-    if not isinstance(then, int | float):
+    then = settings.get("seconds", "") if isinstance(settings, dict) else ""
+    if not isinstance(then, int | float | None):
         yield "it does not say its --seconds"
     elif then != seconds:
-        yield f"--seconds was {then:g}, and is {seconds:g}"
+        yield f"--seconds was {_seconds(then)}, and is {_seconds(seconds)}"
+
+
+def _seconds(said: float | None) -> str:
+    return "left out" if said is None else f"{said:g}"
 
 
 def _made_otherwise(out: Path, outdated: Sequence[_Kept]) -> StudyError:

@@ -9,6 +9,8 @@ from pathlib import Path
 from time import process_time
 
 from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.diagnosis.search.patience import counted
+from analysis.diagnosis.types import Patience
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
@@ -36,11 +38,11 @@ from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
 """Share of the work that is done when faults begin to be injected."""
-SECONDS = 180.0
-"""Of processor time, for a folder's recordings together: a search that is not done by then ends with what it has. The
-clock on the wall would make answers hang on what else the machine does."""
+EVALUATIONS = 4000
+"""Pieces of a search (a structure weighed, a law simulated or fitted) for one recording: one that is not done by then
+ends with what it has. Seconds would make answers hang on what else the machine does."""
 BESIDE_S = 25.0
-"""What fitting a model, a page and figures take beside the search."""
+"""What fitting a model, a page and figures take beside the search, where seconds are asked for."""
 
 Progress = Callable[[str, float], None]
 
@@ -49,7 +51,8 @@ Progress = Callable[[str, float], None]
 class RealPlan:
     folder: Path
     out: Path
-    seconds: float = SECONDS
+    seconds: float | None = None
+    """Of processor time, for a folder's recordings together; None = evaluations are counted."""
     inject: int = 0
     """Faults to inject into what was diagnosed; 0 = none."""
     seed: int = 1
@@ -80,11 +83,11 @@ def diagnose_folder(plan: RealPlan, on_progress: Progress, clock: Clock | None =
 
 def _found(plan: RealPlan) -> RealFolder:
     """Raises StudyError where there is nothing to diagnose, or no time for it."""
-    if not math.isfinite(plan.seconds):
+    if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
             "That is no number of seconds",
             f"--seconds is {plan.seconds}.",
-            f"Give a number of 1 or more, such as {SECONDS:g}.",
+            "Give a number of 1 or more, such as 180, or leave it out.",
             saved="Nothing was written.",
         )
     found = read_real_folder(plan.folder)
@@ -127,11 +130,12 @@ def _answers(
     plan: RealPlan, found: RealFolder, kept: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
 ) -> tuple[RealAnswer, ...]:
     answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
-    left = dict.fromkeys((one.folder.name for one in found.recordings), plan.seconds)
+    whole = plan.seconds or 0.0
+    left = dict.fromkeys((one.folder.name for one in found.recordings), whole)
     for number, one in enumerate(found.recordings):
         rest = sum(other.folder == one.folder for other in found.recordings[number:])
         begun = process_time()
-        budget = max(left[one.folder.name] / rest - BESIDE_S, 0.1 * plan.seconds)
+        budget = max(left[one.folder.name] / rest - BESIDE_S, 0.1 * whole)
 
         def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
             on_progress(f"{one.folder.name}, {one.name}: {what}", end * (number + min(share, 1.0)) / count)
@@ -145,6 +149,8 @@ def _answers(
 def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Progress, clock: Clock) -> RealAnswer:
     """budget_s: of processor time, that the search may take."""
     begun_s, worked, guard = clock.now_s(), process_time(), crash_guard()
+    timed: Patience = lambda: process_time() - worked < budget_s  # noqa: E731
+    patient = counted(EVALUATIONS) if plan.seconds is None else timed
 
     def kept(done: RealDiagnosis) -> RealAnswer:
         answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
@@ -152,7 +158,7 @@ def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Pr
         return answer
 
     try:
-        return kept(diagnose_real(one, lambda: process_time() - worked < budget_s, guard, on_progress))
+        return kept(diagnose_real(one, patient, guard, on_progress))
     except StudyError:
         raise
     except Exception as crash:

@@ -32,7 +32,7 @@ class Provenance:
     """As typed, paths cut down to file names."""
     protocol_hash: str | None = None
     seeds: Mapping[str, int] | None = None
-    settings: Mapping[str, float] | None = None
+    settings: Mapping[str, float | None] | None = None
     """Options that the result hangs on, as they held, typed or not."""
     parents: tuple[Parent, ...] = ()
 
@@ -48,7 +48,7 @@ def gather_provenance(
     *,
     protocol_hash: str | None = None,
     seeds: Mapping[str, int] | None = None,
-    settings: Mapping[str, float] | None = None,
+    settings: Mapping[str, float | None] | None = None,
     parents: Sequence[Path] = (),
 ) -> Provenance:
     """Of the running program. Raises CannotReadError where a parent is not there."""

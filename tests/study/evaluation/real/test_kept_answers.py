@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.diagnosis.search.patience import counted
 from study.errors import StudyError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
@@ -113,6 +114,16 @@ def test_a_file_that_came_or_went_is_said(answered: RealPlan) -> None:
 def test_other_seconds_are_said(answered: RealPlan) -> None:
     error = refusal(RealPlan(answered.folder, answered.out, seconds=180.0))
     assert error.happened == "axis/run/answer.json: --seconds was 20, and is 180."
+
+
+def test_a_count_of_evaluations_is_another_limit_than_seconds(answered: RealPlan) -> None:
+    said = refusal(RealPlan(answered.folder, answered.out)).happened
+    assert said == "axis/run/answer.json: --seconds was 20, and is left out."
+
+
+def test_a_patience_that_counts_is_asked_as_often_everywhere() -> None:
+    patient = counted(3)
+    assert [patient() for _ in range(5)] == [True, True, True, False, False]
 
 
 def test_faults_that_were_injected_into_it_go_with_it(answered: RealPlan) -> None:
