@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED
-from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
+from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.wording import listed, typeset
 from equalizer.signals.signal import FloatArray
 
@@ -81,3 +82,27 @@ def doubtful_sentences(moved: Sequence[MovedNumber]) -> tuple[str, ...]:
 
 
 _AS_FAR = ", as far as it may"
+
+
+def _raised(errors: Errors) -> bool:
+    """Re-tuning raises the error on held-out data."""
+    return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
+
+
+def better_model(errors: Errors) -> tuple[str, str]:
+    """The better of the given and the re-tuned model: no name may shine beside a model that re-tuning made worse."""
+    return ("before", "as given") if _raised(errors) else ("retuned", "re-tuned without it")
+
+
+def better_alone(errors: Errors) -> tuple[str, float | None]:
+    return ("as given", errors.before) if _raised(errors) else ("re-tuned", errors.retuned)
+
+
+def raised_sentence(errors: Errors) -> str:
+    """errors: on held-out data. Empty where re-tuning does not raise them."""
+    if not _raised(errors) or errors.before is None or errors.retuned is None:
+        return ""
+    return (
+        f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to {error_text(errors.retuned)} "
+        "of the signal: what was fitted to differs from what was kept for the test, and re-tuned numbers are doubtful."
+    )

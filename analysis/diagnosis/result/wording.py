@@ -18,7 +18,15 @@ from analysis.diagnosis.result.ceiling_wording import black_box_sentence, ceilin
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, moved_numbers, retuned_sentence
+from analysis.diagnosis.result.retuned_numbers import (
+    MovedNumber,
+    better_alone,
+    better_model,
+    doubtful_sentences,
+    moved_numbers,
+    raised_sentence,
+    retuned_sentence,
+)
 from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text
 from analysis.wording import capital, ended, listed, p_text
@@ -59,15 +67,15 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), de
             f"{capital(_fall(errors, ('before', 'as given'), ('retuned', 're-tuned')))}."
         )
     if diagnosis.verdict == "explained":
-        return f"Missing in the model: {named}. {capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}."
+        return f"Missing in the model: {named}. {capital(_fall(errors, better_model(errors), _AFTER))}."
     if diagnosis.verdict == "partly_explained":
         return (
             f"Missing in the model: {named}, but that is not all. "
-            f"{capital(_fall(errors, ('retuned', 're-tuned without it'), _AFTER))}, and a mismatch remains."
+            f"{capital(_fall(errors, better_model(errors), _AFTER))}, and a mismatch remains."
         )
     said = (
         "Model and device disagree, and no effect of the catalogue explains it. "
-        f"{capital(_one_error('re-tuned', errors.retuned, errors))}."
+        f"{capital(_one_error(*better_alone(errors), errors))}."
     )
     return " ".join(filter(None, (said, best_candidate_sentence(diagnosis, device))))
 
@@ -202,6 +210,7 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
         lines.append(confirmation_sentence(diagnosis.fit.fit, diagnosis.fit.test))
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
         lines += [
+            raised_sentence(diagnosis.fit.test),
             retuned_sentence(moved),
             remainder_sentence(diagnosis, device_of(found)),
             *ceiling_sentences(found.reached),

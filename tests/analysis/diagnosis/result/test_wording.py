@@ -6,7 +6,7 @@ from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismat
 from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text, place_words
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, raised_sentence, retuned_sentence
 from analysis.diagnosis.result.wording import (
     confirmation_sentence,
     effect_sentence,
@@ -263,3 +263,10 @@ def test_numbers_that_are_off_by_little_are_said_to_be():
     assert said.startswith(
         "No physics is missing; numbers of the model are off, each within its calibration's standard deviation. The"
     )
+
+
+def test_no_name_shines_beside_a_model_that_re_tuning_made_worse():
+    worse = Errors(0.158, 0.321, 0.016, 0.01)
+    assert "from 32.1 % to" not in raised_sentence(worse)
+    assert "from 15.8 % to 32.1 %" in raised_sentence(worse)
+    assert raised_sentence(Errors(0.321, 0.158, 0.016, 0.01)) == ""
