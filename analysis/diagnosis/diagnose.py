@@ -24,7 +24,12 @@ from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import state_maps
 from analysis.diagnosis.result.unconfirmed import unconfirmed_of
 from analysis.diagnosis.search.beside_given import weighed_beside
-from analysis.diagnosis.search.by_balance import borne_out, leaves_open, searched_by_balance
+from analysis.diagnosis.search.by_balance import (
+    borne_out,
+    leaves_open,
+    searched_by_balance,
+    unconfirmed_beside_motion,
+)
 from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, hums_low, known_to_repeat
 from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation
@@ -212,7 +217,7 @@ def _by_search(
             found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
     if balances and found.searched.judged.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
-        found = replace(found, searched=borne_out(found.searched, repeats))
+        found = replace(found, searched=unconfirmed_beside_motion(borne_out(found.searched, repeats)))
     seen = found.searched
     if seen.judged.verdict in ("unexplained", "partly_explained") and not arena.certain and settings.patient():
         progress("looking for play that rattles", 0.9)
@@ -239,10 +244,10 @@ def _assembled(
     found = searched.found if searched.judged.named else replace(searched.found, after=searched.found.retuned)
     whole = assembled(replace(searched, found=found), look.chosen.floors, names, seen.floor)
     channels = recordings[0].command.channels
+    found_too = unconfirmed_of(searched.unconfirmed, whole.black_box, recordings[0], look.model)
     if settings.fitted:
-        diagnosis = with_balances(whole.diagnosis, balances, channels)
+        diagnosis = with_balances(whole.diagnosis, balances, channels, found_too)
     else:
-        found_too = unconfirmed_of(searched.unconfirmed, whole.black_box, recordings[0], look.model)
         diagnosis = beside_given(whole.diagnosis, balances, found_too, channels)
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear = linear_remarks(balances, channels) if settings.fitted else ()

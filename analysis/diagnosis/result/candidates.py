@@ -73,8 +73,14 @@ def _class_of(effect: NamedEffect, alike: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((effect.effect, *names))) if names else ()
 
 
-def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]) -> Diagnosis:
-    """channels: of the commands. A constant force that no balance names is a number of the model, no effect."""
+def with_balances(
+    diagnosis: Diagnosis,
+    balances: Sequence[Balance],
+    channels: tuple[str, ...],
+    unconfirmed: Sequence[Candidate] = (),
+) -> Diagnosis:
+    """channels: of the commands; unconfirmed: effects of actuator and sensor that a search found, told behind the laws
+    of the motion. A constant force that no balance names is a number of the model, no effect."""
     if not balances:
         return diagnosis
     weighed = {
@@ -98,13 +104,12 @@ def with_balances(diagnosis: Diagnosis, balances: Sequence[Balance], channels: t
         for name in (effect.effect, *effect.class_, *(one.effect for one in effect.rivals if one.why_not == REFINED))
     }
     found = [
-        _candidate(item, axis_letter(channels[axis], channels))
-        for axis, item in sorted(
-            ((axis, each) for axis, balance in enumerate(balances) for each in (*balance.laws, *balance.others)),
-            key=lambda placed: _rank(placed[1]),
-        )
+        (_rank(law), _candidate(law, axis_letter(channels[axis], channels)))
+        for axis, balance in enumerate(balances)
+        for law in (*balance.laws, *balance.others)
     ]
-    left = [each for each in found if (each.effect, each.axis) not in named]
+    found += [(0, each) for each in unconfirmed]
+    left = [each for _, each in sorted(found, key=lambda ranked: ranked[0]) if (each.effect, each.axis) not in named]
     retuned = {**diagnosis.retuned, **constants}
     verdict = diagnosis.verdict
     if not effects and diagnosis.effects:

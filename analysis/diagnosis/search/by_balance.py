@@ -20,8 +20,9 @@ from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.contest import refine
 from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.held_out_gain import held_out_gain
 from analysis.diagnosis.search.rivalry import Arena, Contender
-from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search import Searched, Unconfirmed
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
 from analysis.diagnosis.search.without_step import without_step
 from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
@@ -31,6 +32,12 @@ from equalizer.signals.signal import FloatArray
 CONSTANT = "constant_force"
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
 """Effects that are numbers of a fitted model, and their values."""
+SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
+"""Effects of a sensor that its own signal shows, whatever moves before it."""
+ONLY_BESIDE_CALIBRATION = (
+    "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
+    "calibrated model, or recordings of the device in order, would tell"
+)
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Standard errors of a logarithm from which an interval reaches a number that is none."""
 HELD_BY_SIMULATION = 0.9
@@ -86,6 +93,26 @@ def borne_out(seen: Searched, repeats: bool) -> Searched:
     if repeats or seen.judged.verdict != "explained" or names <= set(CONSTANTS):
         return seen
     return replace(seen, judged=replace(seen.judged, verdict="partly_explained"))
+
+
+def unconfirmed_beside_motion(seen: Searched) -> Searched:
+    """Effects of actuator and sensor that a search beside balances named become candidates, except where the signal
+    itself shows them: the model was fitted to these very recordings, so that its numbers give way to whatever bends,
+    and a law of the motion that no catalogue holds looks like a bent or late sensor."""
+    found, told = seen.found, []
+    doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
+    for place in reversed(doubtful):
+        gain = held_out_gain(seen.arena.whole, found.retuned, seen.arena.confirmed(found.steps[place]))
+        if gain is not None and gain.gain > 0:
+            told.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
+        if len(found.steps) > 1:
+            found = without_step(seen.arena, found, place)
+        else:
+            found = replace(found, after=found.retuned, steps=())
+    if not doubtful:
+        return seen
+    kept = tuple(sorted(told, key=lambda each: -each.gain))
+    return replace(seen, found=found, judged=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
 
 
 def _takes_enough(arena: Arena, found: Explanation) -> bool:
