@@ -7,7 +7,17 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
 from analysis.diagnosis.search import by_balance
-from analysis.diagnosis.search.by_balance import VAGUE, _from_starts, _vague
+from analysis.diagnosis.search.by_balance import (
+    ONLY_BESIDE_CALIBRATION,
+    VAGUE,
+    _from_starts,
+    _vague,
+    unconfirmed_beside_motion,
+)
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.held_out_gain import HeldOutGain
+from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.verdict import Judgement
 from equalizer.effects.catalogue import EFFECTS
 
 OPEN, SURE = 1.01 / VAGUE, 0.1 / VAGUE
@@ -64,3 +74,45 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
     _, after = _from_starts(arena, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.standing.test[0] == end
     assert len(tried) == starts
+
+
+def contender(*names):
+    hypothesis = SimpleNamespace(claims=names)
+    standing = SimpleNamespace(seen=9.0, chosen_by=9.0, test=np.array([9.0]))
+    return SimpleNamespace(
+        newest=names[-1] if names else "", fitted=SimpleNamespace(hypothesis=hypothesis), standing=standing
+    )
+
+
+def searched_to(*names):
+    retuned = contender()
+    steps = tuple(contender(*names[: place + 1]) for place in range(len(names)))
+    found = Explanation(retuned, retuned, steps[-1], (), steps)
+    arena = SimpleNamespace(whole=None, confirmed=lambda each: each)
+    return Searched(arena, found, Judgement("partly_explained", True))
+
+
+@pytest.fixture
+def gains_half(monkeypatch):
+    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
+
+
+@pytest.mark.usefixtures("gains_half")
+@pytest.mark.parametrize("name", ["sensor_nonlinearity", "slew_limit", "transport_delay", "force_gain"])
+def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
+    seen = unconfirmed_beside_motion(searched_to(name))
+    assert seen.judged == Judgement("unexplained", False)
+    assert not seen.found.steps
+    (told,) = seen.unconfirmed
+    assert (told.hypothesis.claims, told.gain, told.why_not) == ((name,), 0.5, ONLY_BESIDE_CALIBRATION)
+
+
+@pytest.mark.usefixtures("gains_half")
+def test_what_the_signal_itself_shows_keeps_its_name():
+    seen = searched_to("sensor_clipping")
+    assert unconfirmed_beside_motion(seen) is seen
+
+
+def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
+    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
+    assert unconfirmed_beside_motion(searched_to("slew_limit")).unconfirmed == ()

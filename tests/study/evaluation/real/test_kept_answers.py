@@ -177,7 +177,7 @@ def test_a_folder_without_a_recording_is_an_error_and_nothing_is_written(tmp_pat
     (tmp_path / "recordings").mkdir()
     with pytest.raises(StudyError, match="There is no recording to diagnose") as refused:
         diagnose_folder(RealPlan(tmp_path / "recordings", tmp_path / "out"), silent)
-    assert refused.value.happened.startswith("recordings: no map is for its files")
+    assert refused.value.happened.startswith("recordings: No map is for the files of the folder recordings")
     assert not (tmp_path / "out").exists()
 
 
