@@ -1,10 +1,8 @@
 """What effects add along a motion that was measured: the force that enters, and forces that depend on the motion."""
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from equalizer.effects.effect import STEPS, AxisForce, PlacedEffect
 from equalizer.effects.simulation.along_motion_kernel import follow
@@ -46,14 +44,11 @@ def force_along(
     )
     force = np.array(pushing, dtype=np.float64, order="C")
     position, velocity, acceleration = (np.ascontiguousarray(one) for one in motion)
-    with warnings.catch_warnings():
-        # numba calls functions that are passed as values an experimental feature.
-        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-        follow(
-            acting.laws, acting.places, acting.of, acting.memory, (position, velocity, acceleration),
-            np.ascontiguousarray(commands, dtype=np.float64) if acting.sees else np.empty((0, 0)),
-            per_newton, force, 1 / sample_rate_hz,
-        )  # fmt: skip
+    follow(
+        acting.laws, acting.places, acting.of, acting.memory, (position, velocity, acceleration),
+        np.ascontiguousarray(commands, dtype=np.float64) if acting.sees else np.empty((0, 0)),
+        per_newton, force, 1 / sample_rate_hz,
+    )  # fmt: skip
     return force
 
 

@@ -1,11 +1,9 @@
 """Forces that depend on the motion, along a motion that is known, compiled."""
 
-import warnings
 from typing import Any
 
 import numpy as np
 from numba import njit, types
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from equalizer.effects.simulation.instant import (
     A_FREE,
@@ -54,48 +52,45 @@ def _see(k: int, axis: int, motion: Motion, commands: FloatArray, per_newton: Fl
         at[begin + SEEN_COMMAND] = commands[k, other]
 
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+@njit(
+    types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY, _MATRIX, _MATRIX, types.float64),
+    cache=True, nogil=True, error_model="numpy",
+)  # fmt: skip
+def follow(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, of: FloatArray, memory: FloatArray,
+    motion: Motion, commands: FloatArray, per_newton: FloatArray,
+    force: FloatArray, step_s: float,
+) -> None:  # fmt: skip
+    """motion: positions, velocities and accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law sees
+    them. per_newton: (3, m), what 1 N over a step adds to the motion. force: (n, m), what pushes beside the linear
+    model, known from the motion, each over the step that begins there; becomes the sum of the laws' forces.
+    Friction at rest does not follow from the motion, but from what pushes against it.
 
-    @njit(
-        types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY, _MATRIX, _MATRIX, types.float64),
-        cache=True, nogil=True, error_model="numpy",
-    )  # fmt: skip
-    def follow(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: Any, places: Integers, of: FloatArray, memory: FloatArray,
-        motion: Motion, commands: FloatArray, per_newton: FloatArray,
-        force: FloatArray, step_s: float,
-    ) -> None:  # fmt: skip
-        """motion: positions, velocities and accelerations, (n, m) each. commands: (n, m), or (0, 0) where no law sees
-        them. per_newton: (3, m), what 1 N over a step adds to the motion. force: (n, m), what pushes beside the linear
-        model, known from the motion, each over the step that begins there; becomes the sum of the laws' forces.
-        Friction at rest does not follow from the motion, but from what pushes against it.
-
-        places: (items, 6) law, axis, begin and end in `of`, begin and end in `memory`.
-        """
-        position, velocity, acceleration = motion
-        sees = commands.shape[0] > 0
-        at = np.zeros(LENGTH + SEEN * force.shape[1] if sees else LENGTH)
-        at[STEP_S] = step_s
-        for k in range(len(position) - 1):
-            at[TIME_S] = k * step_s
-            pushing = force[k].copy()
-            force[k] = 0.0
-            for item in range(places.shape[0]):
-                axis = places[item, 1]
-                at[X], at[V] = position[k, axis], velocity[k, axis]
-                at[X_PER_N], at[V_PER_N], at[A_PER_N] = per_newton[0, axis], per_newton[1, axis], per_newton[2, axis]
-                at[X_FREE] = position[k + 1, axis] + at[X_PER_N] * pushing[axis]
-                at[V_FREE] = velocity[k + 1, axis] + at[V_PER_N] * pushing[axis]
-                at[A_FREE] = acceleration[k, axis] + at[A_PER_N] * pushing[axis]
-                at[F_END] = np.nan
-                if sees:
-                    _see(k, axis, motion, commands, per_newton, at)
-                    at[LENGTH + SEEN * axis + SEEN_X_END] = at[X_FREE]
-                    at[LENGTH + SEEN * axis + SEEN_V_END] = at[V_FREE]
-                    at[LENGTH + SEEN * axis + SEEN_A] = at[A_FREE]
-                kept = memory[places[item, 4] : places[item, 5]]
-                added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], kept, at)
-                force[k, axis] += added
-                pushing[axis] += added
-        force[len(position) - 1] = force[len(position) - 2]
+    places: (items, 6) law, axis, begin and end in `of`, begin and end in `memory`.
+    """
+    position, velocity, acceleration = motion
+    sees = commands.shape[0] > 0
+    at = np.zeros(LENGTH + SEEN * force.shape[1] if sees else LENGTH)
+    at[STEP_S] = step_s
+    for k in range(len(position) - 1):
+        at[TIME_S] = k * step_s
+        pushing = force[k].copy()
+        force[k] = 0.0
+        for item in range(places.shape[0]):
+            axis = places[item, 1]
+            at[X], at[V] = position[k, axis], velocity[k, axis]
+            at[X_PER_N], at[V_PER_N], at[A_PER_N] = per_newton[0, axis], per_newton[1, axis], per_newton[2, axis]
+            at[X_FREE] = position[k + 1, axis] + at[X_PER_N] * pushing[axis]
+            at[V_FREE] = velocity[k + 1, axis] + at[V_PER_N] * pushing[axis]
+            at[A_FREE] = acceleration[k, axis] + at[A_PER_N] * pushing[axis]
+            at[F_END] = np.nan
+            if sees:
+                _see(k, axis, motion, commands, per_newton, at)
+                at[LENGTH + SEEN * axis + SEEN_X_END] = at[X_FREE]
+                at[LENGTH + SEEN * axis + SEEN_V_END] = at[V_FREE]
+                at[LENGTH + SEEN * axis + SEEN_A] = at[A_FREE]
+            kept = memory[places[item, 4] : places[item, 5]]
+            added = laws[places[item, 0]](of[places[item, 2] : places[item, 3]], kept, at)
+            force[k, axis] += added
+            pushing[axis] += added
+    force[len(position) - 1] = force[len(position) - 2]

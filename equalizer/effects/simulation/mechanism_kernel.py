@@ -39,6 +39,10 @@ from equalizer.effects.simulation.instant import (
 from equalizer.effects.simulation.linear_step_kernel import FAST, go
 from equalizer.signals.signal import FloatArray
 
+# Laws are passed as values, so that a changed law never runs as it was in a kept kernel; numba calls that experimental.
+# Set once for the process: `catch_warnings` around a call would, in a thread, undo that of another thread.
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+
 LAWS = 6
 """How many different laws can act at once."""
 SWEEPS = 3
@@ -64,9 +68,7 @@ start without forces; forces over the step and at its end."""
 
 def compiled_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
     """The law, ready to be called from the kernel. Its machine code is kept on disk with its own file."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-        return njit(LAW, cache=True, error_model="numpy")(law)
+    return njit(LAW, cache=True, error_model="numpy")(law)
 
 
 @njit(inline="always")
@@ -136,106 +138,105 @@ def _see(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -
         at[begin + SEEN_A], at[begin + SEEN_A_PER_N] = ports[_A, other], per_newton[port, 2 * count + other]
 
 
-with warnings.catch_warnings():
-    # Laws are passed as values, so that a changed law never runs as it was in a kept kernel.
-    warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
+@compiled_law
+def no_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return 0.0
 
-    @compiled_law
-    def no_force(of: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-        return 0.0
 
-    @njit(inline="always")
-    def _push_at(  # noqa: PLR0913 - a kernel takes flat arrays
-        law: Any, of: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
-        at: FloatArray,
-    ) -> tuple[float, float]:  # fmt: skip
-        """One force, over the step and at its end, with all others as they are."""
-        count = ports.shape[1]
-        at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
-        at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
-        at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
-        at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
-        at[F_END] = np.nan
-        if at.shape[0] > LENGTH:
-            _see(per_newton, port, ports, at)
-        mean = law(of, memory, at)
-        end = mean if np.isnan(at[F_END]) else at[F_END]
-        _act(per_newton, port, mean, end, ports)
-        return mean, end
+@njit(inline="always")
+def _push_at(  # noqa: PLR0913 - a kernel takes flat arrays
+    law: Any, of: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
+    at: FloatArray,
+) -> tuple[float, float]:  # fmt: skip
+    """One force, over the step and at its end, with all others as they are."""
+    count = ports.shape[1]
+    at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
+    at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
+    at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
+    at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
+    at[F_END] = np.nan
+    if at.shape[0] > LENGTH:
+        _see(per_newton, port, ports, at)
+    mean = law(of, memory, at)
+    end = mean if np.isnan(at[F_END]) else at[F_END]
+    _act(per_newton, port, mean, end, ports)
+    return mean, end
 
-    @njit(
-        types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR),
-        cache=True, nogil=True, error_model="numpy", fastmath=FAST,
-    )  # fmt: skip
-    def _push(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
-        own: FloatArray, at: FloatArray,
-    ) -> None:  # fmt: skip
-        """Several forces. own: (3, items), scratch. A force is not found again where no other has changed since."""
-        before = memory.copy()
-        own[:] = 0.0
-        for sweep in range(SWEEPS):
-            for item in range(places.shape[0]):
-                if sweep > 0 and own[2, item] == 0.0:
-                    continue
-                port, kept, end = places[item, 1], places[item, 4], places[item, 5]
-                mean_before, end_before = own[0, item], own[1, item]
-                if sweep > 0:
-                    _act(per_newton, port, -mean_before, -end_before, ports)
-                    for i in range(kept, end):
-                        memory[i] = before[i]
-                begin, law = places[item, 2], laws[places[item, 0]]
-                own[0, item], own[1, item] = _push_at(
-                    law, of[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
-                )
-                if own[0, item] != mean_before or own[1, item] != end_before:
-                    own[2] = 1.0
-                own[2, item] = 0.0
 
-    @njit(
-        types.void(
-            _LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64
-        ),
-        cache=True, nogil=True, error_model="numpy", fastmath=FAST,
-    )  # fmt: skip
-    def play(  # noqa: PLR0913 - a kernel takes flat arrays
-        laws: Any, places: Integers, of: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
-        commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
-    ) -> None:  # fmt: skip
-        """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
-        ports' accelerations at its start; a sample's first row becomes the state before it and the forces (r,) just
-        then. commands: (n stride, m), or (0, 0) where no law sees them. ports: (PORT_ROWS, r) and state: (s,) become
-        those of the end.
+@njit(
+    types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR),
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST,
+)  # fmt: skip
+def _push(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, of: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
+    own: FloatArray, at: FloatArray,
+) -> None:  # fmt: skip
+    """Several forces. own: (3, items), scratch. A force is not found again where no other has changed since."""
+    before = memory.copy()
+    own[:] = 0.0
+    for sweep in range(SWEEPS):
+        for item in range(places.shape[0]):
+            if sweep > 0 and own[2, item] == 0.0:
+                continue
+            port, kept, end = places[item, 1], places[item, 4], places[item, 5]
+            mean_before, end_before = own[0, item], own[1, item]
+            if sweep > 0:
+                _act(per_newton, port, -mean_before, -end_before, ports)
+                for i in range(kept, end):
+                    memory[i] = before[i]
+            begin, law = places[item, 2], laws[places[item, 0]]
+            own[0, item], own[1, item] = _push_at(
+                law, of[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
+            )
+            if own[0, item] != mean_before or own[1, item] != end_before:
+                own[2] = 1.0
+            own[2, item] = 0.0
 
-        places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. step: how the state advances,
-        the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
-        state (r, s), and `per_newton`. count: steps per sample; stride, which is 1 where commands are held over all of
-        them, else so many; the first sample's number.
-        """
-        advance, look, by_force, per_newton = step
-        steps, stride, begun = count
-        size, r = state.shape[0], ports.shape[1]
-        sees = commands.shape[0] > 0
-        added, at = np.empty(size + r), np.zeros(LENGTH + SEEN * r if sees else LENGTH)
-        own, law = np.zeros((3, places.shape[0])), laws[places[0, 0]]
-        its, its_memory = of[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
-        at[STEP_S], ports[_A] = step_s, np.nan
-        for k in range(rows.shape[0] // stride):
-            for now in range(steps):
-                if now == 0 or stride > 1:
-                    for i in range(size + r):
-                        added[i] = rows[k * stride + now, i]
-                    for axis in range(commands.shape[1]):
-                        at[LENGTH + SEEN * axis + SEEN_COMMAND] = commands[k * stride + now, axis]
-                if now == 0:
-                    _keep(state, ports, rows[k * stride])
-                if look.shape[0] > 2 * r:
-                    _feel(look, added, state, ports)
-                go(advance, added, state)
-                _aim(look, state, ports)
-                at[TIME_S] = ((begun + k) * steps + now) * step_s
-                if places.shape[0] == 1:
-                    _push_at(law, its, its_memory, places[0, 1], per_newton, ports, at)
-                else:
-                    _push(laws, places, of, memory, per_newton, ports, own, at)
-                _land(by_force, state, ports)
+
+@njit(
+    types.void(
+        _LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64
+    ),
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST,
+)  # fmt: skip
+def play(  # noqa: PLR0913 - a kernel takes flat arrays
+    laws: Any, places: Integers, of: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
+    commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
+) -> None:  # fmt: skip
+    """Motion under forces. rows: (n stride, s + r ...): what commands add to the state over a step and to the
+    ports' accelerations at its start; a sample's first row becomes the state before it and the forces (r,) just
+    then. commands: (n stride, m), or (0, 0) where no law sees them. ports: (PORT_ROWS, r) and state: (s,) become
+    those of the end.
+
+    places: (items, 6) law, port, begin and end in `of`, begin and end in `memory`. step: how the state advances,
+    the ports' positions and velocities (2 r, s), where laws ask with accelerations (3 r, s), what forces do to the
+    state (r, s), and `per_newton`. count: steps per sample; stride, which is 1 where commands are held over all of
+    them, else so many; the first sample's number.
+    """
+    advance, look, by_force, per_newton = step
+    steps, stride, begun = count
+    size, r = state.shape[0], ports.shape[1]
+    sees = commands.shape[0] > 0
+    added, at = np.empty(size + r), np.zeros(LENGTH + SEEN * r if sees else LENGTH)
+    own, law = np.zeros((3, places.shape[0])), laws[places[0, 0]]
+    its, its_memory = of[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
+    at[STEP_S], ports[_A] = step_s, np.nan
+    for k in range(rows.shape[0] // stride):
+        for now in range(steps):
+            if now == 0 or stride > 1:
+                for i in range(size + r):
+                    added[i] = rows[k * stride + now, i]
+                for axis in range(commands.shape[1]):
+                    at[LENGTH + SEEN * axis + SEEN_COMMAND] = commands[k * stride + now, axis]
+            if now == 0:
+                _keep(state, ports, rows[k * stride])
+            if look.shape[0] > 2 * r:
+                _feel(look, added, state, ports)
+            go(advance, added, state)
+            _aim(look, state, ports)
+            at[TIME_S] = ((begun + k) * steps + now) * step_s
+            if places.shape[0] == 1:
+                _push_at(law, its, its_memory, places[0, 1], per_newton, ports, at)
+            else:
+                _push(laws, places, of, memory, per_newton, ports, own, at)
+            _land(by_force, state, ports)

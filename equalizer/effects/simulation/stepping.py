@@ -1,11 +1,9 @@
 """How a motion is stepped, block by block of samples: alone, or under forces that depend on it."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from equalizer.effects.simulation.linear_step_kernel import coast
 from equalizer.effects.simulation.mechanism_kernel import PORT_ROWS, Integers, play
@@ -86,14 +84,11 @@ def pushed(linear: LinearSteps, forces: Forces, steps: int, stride: int, command
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
     def run(course: FloatArray, first: int) -> None:
-        with warnings.catch_warnings():
-            # numba calls functions that are passed as values an experimental feature.
-            warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-            play(
-                forces.laws, forces.places, forces.of, memory, step, course,
-                seen[first * stride : first * stride + len(course)], ports, state, (steps, stride, first),
-                linear.step_s,
-            )  # fmt: skip
+        play(
+            forces.laws, forces.places, forces.of, memory, step, course,
+            seen[first * stride : first * stride + len(course)], ports, state, (steps, stride, first),
+            linear.step_s,
+        )  # fmt: skip
 
     def begin(from_: FloatArray) -> None:
         state[:] = form.inward @ from_
