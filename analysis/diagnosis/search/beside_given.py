@@ -46,7 +46,7 @@ def weighed_beside(recordings: Sequence[Recording], look: Look, seen: Searched, 
     known_noise = all(floor.how == "repeats" for floor in look.chosen.floors)
     balances = balances_beside(recordings, look.model, seen.arena.barred, patient)
     near = float(np.nanmax(seen.found.retuned.standing.test, initial=0.0)) <= NAMED_ERROR
-    if seen.judged.named:
+    if seen.judged.named or seen.found.barred:
         return Beside(seen, balances)
     if known_noise and near:
         why_not = "the noise is known here, and what it leaves is more than noise"

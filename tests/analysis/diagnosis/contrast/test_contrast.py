@@ -16,11 +16,13 @@ from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.rigid_model import rigid_model
 from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, _named, with_contrast
+from analysis.diagnosis.search import learn_clean_floor
 from analysis.diagnosis.search.by_contrast import Contrast, contrast_of
 from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from analysis.diagnosis.search.patience import OUT_OF_TIME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.unit_system import LINEAR
 
 RATE_HZ, COUNT = 500.0, 5000
 UNDONE = (
@@ -119,7 +121,7 @@ def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(g
     assert found is not None and not found.by_force
     answer = decide(found, 1)
     assert answer.named is not None
-    named = _named(answer.named, answer, faulty, False)
+    named = _named(answer.named, answer, faulty, LINEAR)
     assert (named.effect, named.axis) == ("force_gain", "y")
     assert named.parameters["gain"].value == pytest.approx(gain, rel=0.05)
 
@@ -353,7 +355,8 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
         asked.append(given)
         raise NothingLearned("they were measured otherwise")
 
-    monkeypatch.setattr(engine, "learned_from", teaches_nothing)
+    for asks in (engine, learn_clean_floor):
+        monkeypatch.setattr(asks, "learned_from", teaches_nothing)
     clean = recording(1)
     settings = DiagnosisSettings(without=UNDONE, clean=(clean,))
     faulty = recording(2, "coulomb_friction", 0.6)
