@@ -15,7 +15,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tole
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
-TRIED = ("coulomb_friction", "hardening_stiffness")
+TRIED = ("coulomb_friction", "force_deadband")
 RATE_HZ = 1000.0
 PERIOD, LOOKS = 1000, 3
 LEVELS_N = (0.5, 1.5, 3.0)

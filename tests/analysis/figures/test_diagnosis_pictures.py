@@ -195,7 +195,7 @@ def test_without_held_out_data_nothing_is_drawn(friction_found):
 
 def test_rivals_stand_below_the_best_with_their_errors(friction_found):
     tried = tried_explanations(friction_found.explanation.rounds[0], ("x",))
-    assert [one.words for one in tried] == ["dry friction", "a spring that hardens with displacement"]
+    assert [one.words for one in tried] == ["dry friction", "a dead band of the force"]
     assert tried[0].seen < 1.1 < tried[1].seen
     axes = draw_rivals(tried, replace(tried[1], words="re-tuned")).axes[0]
     assert written(axes.figure) == ["noise", "re-tuned"]
@@ -205,7 +205,7 @@ def test_rivals_stand_below_the_best_with_their_errors(friction_found):
 def test_the_one_that_was_chosen_stands_on_top_even_where_another_has_less_error(friction_found):
     best, worse = friction_found.explanation.rounds[0]
     tried = tried_explanations((worse, best), ("x",))
-    assert [one.words for one in tried] == ["a spring that hardens with displacement", "dry friction"]
+    assert [one.words for one in tried] == ["a dead band of the force", "dry friction"]
 
 
 def test_a_round_that_brought_nothing_is_folded_and_says_so(friction_found):
