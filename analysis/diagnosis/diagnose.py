@@ -96,7 +96,7 @@ def diagnose(
         balances = balances_of(recordings, frozenset(settings.without), settings.patient) if known is None else known
         for number, look in enumerate(looks_of(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
-            arena = _arena(look, settings, map_)
+            arena = _arena(recordings[0], look, settings, map_)
             repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
             found = searched_by_balance(arena, balances, repeats)
             if found is not None and not (look.narrow and leaves_open(found)):
@@ -135,7 +135,7 @@ def _beside_clean(
         unweighed = _by_given_model(recordings, model, settings, contrast.weighed, map_, progress)
         if unweighed is not None:
             return unweighed
-    arena = _arena(look, settings, map_)
+    arena = _arena(recordings[0], look, settings, map_)
     given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
     stands = arena.confirmed(arena.contender(given))
     found = Searched(arena, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
@@ -175,9 +175,9 @@ class _Seen:
     floor: CleanFloor
 
 
-def _arena(look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
+def _arena(recording: Recording, look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
+    """recording: as it was given; where forces are compared, the measure's own have forces for responses."""
     measure = look.chosen.measure
-    recording = measure.records[0].recording
     model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
     return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
@@ -193,7 +193,7 @@ def _by_search(
 ) -> _Seen:
     """balances: where they name a law of the motion, nothing else is looked for; where they were weighed and name none,
     effects of actuator and sensor are."""
-    chosen, arena = look.chosen, _arena(look, settings, map_)
+    chosen, arena = look.chosen, _arena(recordings[0], look, settings, map_)
     left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
     known = (*CATALOGUE, *kept_effects(settings.kept, recordings[0]))
     catalogue = [effect for effect in known if effect.name not in left_out]

@@ -1,0 +1,18 @@
+"""Where forces are compared, numbers still carry the units of the motion that was measured."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+from analysis.diagnosis import diagnose as engine
+from analysis.diagnosis.diagnose import DiagnosisSettings
+
+
+def test_units_are_those_of_the_recording_as_it_was_given(diagnosed):
+    recording = diagnosed.recorded(1)
+    forces = replace(recording, response=replace(recording.response, quantity="force", unit="N"))
+    measure = SimpleNamespace(records=(SimpleNamespace(recording=forces),), shortened=lambda: None)
+    look = SimpleNamespace(model=diagnosed.device(1), chosen=SimpleNamespace(measure=measure))
+    arena = engine._arena(recording, look, DiagnosisSettings(), map)
+    assert arena.tuning.model.units is None
+    wrongly = engine._arena(forces, look, DiagnosisSettings(), map)
+    assert wrongly.tuning.model.units is not None
