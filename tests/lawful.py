@@ -7,7 +7,7 @@ from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
-from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.search_context import Arena
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism

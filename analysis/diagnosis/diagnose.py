@@ -7,6 +7,14 @@ import numpy as np
 
 from analysis.diagnosis.balance.balances import balances_of
 from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.confirm.confirm_laws import (
+    borne_out,
+    leaves_open,
+    searched_by_balance,
+    unconfirmed_beside_motion,
+)
+from analysis.diagnosis.confirm.fitting_measures import Look, look_of, looks_of
+from analysis.diagnosis.confirm.laws_beside_model import weighed_beside
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import names_of_parts
@@ -16,6 +24,10 @@ from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.reference.compare_with_reference import HUM, contrast_of, foresees, hums_low, known_to_repeat
+from analysis.diagnosis.reference.learn_model_error import NothingLearned, floor_of, learned_from
+from analysis.diagnosis.reference.model_free_faults import seen_directly
+from analysis.diagnosis.reference.search_beside_reference import searched_beside_reference
 from analysis.diagnosis.result.assemble_findings import assembled
 from analysis.diagnosis.result.candidates import beside_given, linear_remarks, reached_of, with_balances
 from analysis.diagnosis.result.contrast_findings import with_contrast
@@ -23,28 +35,17 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.result.state_maps import state_maps
 from analysis.diagnosis.result.unconfirmed import unconfirmed_of
-from analysis.diagnosis.search.beside_given import weighed_beside
-from analysis.diagnosis.search.by_balance import (
-    borne_out,
-    leaves_open,
-    searched_by_balance,
-    unconfirmed_beside_motion,
-)
-from analysis.diagnosis.search.by_contrast import HUM, contrast_of, foresees, hums_low, known_to_repeat
-from analysis.diagnosis.search.determined import determined
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.search.identifiability import identified
 from analysis.diagnosis.search.impacts import rattling
-from analysis.diagnosis.search.learn_clean_floor import NothingLearned, floor_of, learned_from
-from analysis.diagnosis.search.looks import Look, look_of, looks_of
-from analysis.diagnosis.search.patience import OUT_OF_TIME, always
-from analysis.diagnosis.search.rivalry import Arena
 from analysis.diagnosis.search.search import Searched, searched
-from analysis.diagnosis.search.search_beside_sound import searched_beside_sound
-from analysis.diagnosis.search.seen_directly import seen_directly
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import Judgement, judge
-from analysis.diagnosis.types import Mapper, Patience, Progress
+from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.effect import Effect
 from equalizer.effects.law_entry import LawEntry, kept_effects
 from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
@@ -74,7 +75,7 @@ class DiagnosisSettings:
     """Where no name of the catalogue stands, laws without a name are looked for."""
     kept: tuple[LawEntry, ...] = ()
     """Laws that were found elsewhere, to be looked for beside the catalogue."""
-    patient: Patience = always
+    time_left: TimeBudget = always
     """Asked before each piece of the search; once it says no, what was found until then stands."""
     guard: Guard = field(default_factory=Guard)
     """Where it is on, an effect that crashes is left out, and that is said."""
@@ -87,18 +88,18 @@ def diagnose(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """recordings: of one device, alike in channels, units and rate; see `belonging` for what is refused. Raises
+    """recordings: of one device, alike in channels, units and rate; see `input_checks` for what is refused. Raises
     NothingLearned where the clean recordings say nothing of these."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
         known = settings.balances
-        balances = balances_of(recordings, frozenset(settings.without), settings.patient) if known is None else known
+        balances = balances_of(recordings, frozenset(settings.without), settings.time_left) if known is None else known
         for number, look in enumerate(looks_of(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
-            arena = _arena(recordings[0], look, settings, map_)
+            context = _search_context(recordings[0], look, settings, map_)
             repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
-            found = searched_by_balance(arena, balances, repeats)
+            found = searched_by_balance(context, balances, repeats)
             if found is not None and not (look.narrow and leaves_open(found)):
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
@@ -107,10 +108,10 @@ def diagnose(
     look = look_of(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     seen = _by_search(recordings, look, settings, map_, progress, balances)
     if settings.discovery and not settings.fitted:
-        seen = replace(seen, searched=with_laws(seen.searched, progress, settings.patient))
+        seen = replace(seen, searched=with_laws(seen.searched, progress, settings.time_left))
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
-        weighed = weighed_beside(recordings, look, seen.searched, settings.patient)
+        weighed = weighed_beside(recordings, look, seen.searched, settings.time_left)
         seen, balances = replace(seen, searched=weighed.searched), weighed.balances
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
@@ -130,15 +131,15 @@ def _beside_clean(
     if not settings.fitted and (known_to_repeat(look.chosen) or foresees(model, settings.clean)):
         return None
     progress("comparing with the clean recordings", 0.1)
-    contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.patient)
+    contrast = contrast_of(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if not settings.fitted and contrast.left_open:
         unweighed = _by_given_model(recordings, model, settings, contrast.weighed, map_, progress)
         if unweighed is not None:
             return unweighed
-    arena = _arena(recordings[0], look, settings, map_)
-    given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
-    stands = arena.confirmed(arena.contender(given))
-    found = Searched(arena, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
+    context = _search_context(recordings[0], look, settings, map_)
+    given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    stands = context.confirmed(context.candidate(given))
+    found = Searched(context, Explanation(stands, stands, stands, (), ()), Judgement("unexplained", False))
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else floor_of(settings.clean, model, recordings, map_, progress)
     whole = _assembled(recordings, settings, look, _Seen(found, floor), ())
@@ -161,8 +162,8 @@ def _by_given_model(
         seen = _by_search(recordings, look, rest, map_, progress, ())
     except (NothingLearned, np.linalg.LinAlgError):
         return None
-    arena = seen.searched.arena
-    found = determined(arena, seen.searched.found, settings.patient)
+    context = seen.searched.context
+    found = identified(context, seen.searched.found, settings.time_left)
     searched = borne_out(replace(seen.searched, found=found, errors=None), False)
     if not (searched.judged.named and searched.found.steps):
         return None
@@ -175,12 +176,12 @@ class _Seen:
     floor: CleanFloor
 
 
-def _arena(recording: Recording, look: Look, settings: DiagnosisSettings, map_: Mapper) -> Arena:
+def _search_context(recording: Recording, look: Look, settings: DiagnosisSettings, map_: Mapper) -> SearchContext:
     """recording: as it was given; where forces are compared, the measure's own have forces for responses."""
     measure = look.chosen.measure
     model = with_units_of(look.model, recording.command.units, recording.response.units, time_unit(recording))
     tuning = tuning_of(model, recording.command.channels)
-    return Arena(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
+    return SearchContext(measure.shortened(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 
 
 def _by_search(
@@ -193,13 +194,9 @@ def _by_search(
 ) -> _Seen:
     """balances: where they name a law of the motion, nothing else is looked for; where they were weighed and name none,
     effects of actuator and sensor are."""
-    chosen, arena = look.chosen, _arena(recordings[0], look, settings, map_)
-    left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
-    known = (*CATALOGUE, *kept_effects(settings.kept, recordings[0]))
-    catalogue = [effect for effect in known if effect.name not in left_out]
-    refined = {name for effect in catalogue for name in effect.simpler}
-    catalogue += [effect for effect in CATALOGUE if effect.name in refined & arena.barred]
-    may_be_named = [effect for effect in catalogue if effect.name not in arena.barred]
+    chosen, context = look.chosen, _search_context(recordings[0], look, settings, map_)
+    catalogue = _catalogue(settings, recordings[0], context.barred)
+    may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
     if balances:
         named = any(balance.named for balance in balances)
         imposed = bool(recordings[0].meta.get("imposed"))
@@ -207,24 +204,34 @@ def _by_search(
         may_be_named = []
     if settings.clean:
         learned = learned_from(settings.clean, look.model, recordings, map_, progress)
-        told = [effect for effect in may_be_named if chosen.measure.tells(effect)]
-        arena = replace(arena, certain=seen_directly(recordings, settings.clean, told))
-        found = _Seen(searched_beside_sound(arena, learned, catalogue, progress, settings.patient), learned.floor)
+        told = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
+        context = replace(context, certain=seen_directly(recordings, settings.clean, told))
+        beside = searched_beside_reference(context, learned, catalogue, progress, settings.time_left)
+        found = _Seen(beside, learned.floor)
     else:
-        found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
+        found = _Seen(searched(context, catalogue, progress, settings.time_left), CleanFloor())
         if hums_low(found.searched.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            found = _Seen(searched(arena, catalogue, progress, settings.patient), CleanFloor())
+            found = _Seen(searched(context, catalogue, progress, settings.time_left), CleanFloor())
     if balances and found.searched.judged.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
         found = replace(found, searched=unconfirmed_beside_motion(borne_out(found.searched, repeats)))
     seen = found.searched
-    if seen.judged.verdict in ("unexplained", "partly_explained") and not arena.certain and settings.patient():
+    if seen.judged.verdict in ("unexplained", "partly_explained") and not context.certain and settings.time_left():
         progress("looking for play that rattles", 0.9)
-        rattled = rattling(seen.arena, seen.found, chosen.floors, may_be_named)
+        rattled = rattling(seen.context, seen.found, chosen.floors, may_be_named)
         if rattled is not None:
-            return replace(found, searched=Searched(seen.arena, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+            return replace(found, searched=Searched(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
+
+
+def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:
+    """The effects to look for; with those that a barred effect refines, though they were left out, as rivals."""
+    left_out = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
+    known = (*CATALOGUE, *kept_effects(settings.kept, recording))
+    catalogue = [effect for effect in known if effect.name not in left_out]
+    refined = {name for effect in catalogue for name in effect.simpler}
+    return catalogue + [effect for effect in CATALOGUE if effect.name in refined & barred]
 
 
 def _beside_motion(name: str, place: str, imposed: bool) -> bool:

@@ -3,7 +3,7 @@
 Purely numerical tolerances stay where they are used.
 
 Errors are rms errors over rms noise, 1 = noise alone; where one number stands for several channels, the worst counts.
-A gain is a difference of mean log error power, over the channels, between two fits (`Standing.chosen_by`).
+A gain is a difference of mean log error power, over the channels, between two fits (`FitScore.mean_log_error`).
 
 Where a number comes from:
 
@@ -15,7 +15,7 @@ Where a number comes from:
 
 from math import log
 
-# What can be compared at all (`belonging`). By hand.
+# What can be compared at all (`input_checks`). By hand.
 LEAST_SAMPLES = 256  # with a response, in all recordings: fewer carry neither a fit nor a test
 SHORTEST_S, SHORTEST_SAMPLES = 1.5, 2000  # what lasts less and holds fewer is explained as well by any effect
 LEAST_SAMPLES_TO_FIT = 64  # with a response, of what may be fitted to
@@ -72,7 +72,7 @@ SENSOR_ABSENT, SENSOR_PRESENT = 0.1, 0.5  # share of it below which position lac
 STATE_CROWDED = 1.5  # share of a mismatch in a region of state, over the region's share of the samples
 STATES_NAMED = 2  # per axis or channel; principle: what depends on one state is seen in others, too
 
-# Which hypotheses are tried and fitted (`candidates`, `screening`, `rivalry`). By hand.
+# Which hypotheses are tried and fitted (`starting_hypotheses`, `screening`, `search_context`). By hand.
 STARTS_PER_CLAIM = 4
 WEAKEST_START, STRONGEST_START = 0.1, 6.0  # factors by which a starting value's strength may be wrong
 MOST_FITTED, LEAST_FITTED = 10, 4  # hypotheses that get a first fit
@@ -85,8 +85,8 @@ RICHER_LAW_SQUARES = 4.0  # squares of the noise, in sum, that more numbers must
 CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS = 6, 120  # of the response's middle frequency, at the recording's end
 CLOCK_LEAST_SHARE = 1e-3  # of the misfit that a trial of clock drift must take
 
-# What of a periodic recording laws are compared on first (`brief`).
-BRIEF_CONSTANTS = 7.0  # time constants of the model's run-in; principle: exp(-7) is below a thousandth
+# What of a periodic recording laws are compared on first (`short_recordings`).
+RUN_IN_CONSTANTS = 7.0  # time constants of the model's run-in; principle: exp(-7) is below a thousandth
 BRIEF_SHARE = 0.7  # of the samples, above which the whole is simulated at once; by hand
 
 # Whether a further effect is looked for, and added (`explain`). By hand.
@@ -106,7 +106,7 @@ REFINED_SHARE = 0.35  # or as a share of what the plain law leaves: where both a
 REFINED_FRICTION_SHARE = 0.7  # of dry friction: its reversal differs from device to device, any number takes some of it
 REFINED_MOST_GAIN = 0.7  # principle: half of the error power is more than plainness makes up for
 
-# What a search found is taken back (`prune`, `determined`, `no_answer`).
+# What a search found is taken back (`prune`, `identifiability`, `no_answer`).
 LAST_EFFECT_SHARE = 0.1  # of the mismatch. Bank 93000: below, four of five were wrong; right ones took a fifth or more
 UNDETERMINED_REACH = 5.0  # interval over distance from none. Bank 93000: right names up to 4.5, eight wrong from 6 on
 REPLACEMENTS_TRIED = 2  # by hand
@@ -125,7 +125,7 @@ CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on seale
 SEALED_TOO_SMALL = 0.05  # unless it is smaller there than this
 SEALED_ALONE_ERROR, SEALED_ALONE_TIMES = 1.25, 1.5  # on sealed samples, and over that on all others: half are opened
 
-# Faults that a recording shows by itself (`seen_directly`). By hand.
+# Faults that a recording shows by itself (`model_free_faults`). By hand.
 STEP_FACTOR = 1.5  # times a sound device's steps, from which on steps are others
 READINGS_LEAST = 8  # readings at a limit, or there twice, that are no chance,
 READINGS_FACTOR = 3.0  # times what a sound device has of them,
@@ -143,7 +143,7 @@ IMPACTS_AS_GOOD = 1.1  # times the named one's misfit, up to which a rival is as
 # Numbers and probabilities of what is named (`named_effects`).
 MOST_RIVALS = 6
 INTERVAL_FACTOR, INTERVAL_SHARE = 2.5, 0.005  # of the noise's, and of the number. Bank 91000: noise alone held 65 %
-PROBABILITY_SCALE = 0.002  # gain that makes a contender e times less likely. Bank (docs/proof.md), as the next two
+PROBABILITY_SCALE = 0.002  # gain that makes a candidate e times less likely. Bank (docs/proof.md), as the next two
 ELSEWHERE_LEAST, ELSEWHERE_MOST = 0.01, 0.8  # chance that none is right: where noise is left, where much more is
 ELSEWHERE_HALFWAY, ELSEWHERE_STEEPNESS = 0.35, 1.5  # error above noise at which that is even, and how fast it turns
 

@@ -14,5 +14,5 @@ Mapper = Callable[..., Iterable[object]]
 Progress = Callable[[str, float], None]
 """Called with what is being done, and the share of the whole work that is done."""
 
-Patience = Callable[[], bool]
+TimeBudget = Callable[[], bool]
 """Asked before each piece of a search: whether to go on."""

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import Claim
-from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.figures.diagnosis_style import AFTER, RETUNED, ratio_ticks
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, say_nothing_to_draw
@@ -36,20 +36,20 @@ class Tried:
     """On held-out data; NaN where these were not looked at."""
 
 
-def tried_explanations(round_: Sequence[Contender], axes: Sequence[str]) -> tuple[Tried, ...]:
+def tried_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[Tried, ...]:
     """The best of each hypothesis: first the round's first, which need not have the least error where a simpler one is
     as good; then the others by their errors."""
     best: dict[object, Tried] = {}
     for item in round_:
         words = ", ".join(_claim_words(claim, axes) for claim in item.fitted.hypothesis.claims[-1:])
-        best.setdefault(item.fitted.hypothesis.key, _tried(words, item.standing))
+        best.setdefault(item.fitted.hypothesis.key, _tried(words, item.score))
     chosen, others = list(best.values())[:1], list(best.values())[1:]
     return (*chosen, *sorted(others, key=lambda each: each.seen))[:MOST_RIVALS]
 
 
 def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
     """One per effect for which several were tried."""
-    retuned = _tried("re-tuned, no physics", explanation.retuned.standing)
+    retuned = _tried("re-tuned, no physics", explanation.retuned.score)
     pictures = []
     several = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
     for number in several[: len(_ORDINALS)]:
@@ -129,9 +129,9 @@ def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
     return f"{noun}, {axes[site] if site < len(axes) else site + 1}" if len(axes) > 1 else noun
 
 
-def _tried(words: str, standing: Standing) -> Tried:
-    seen = np.concatenate([standing.fit, standing.choose])
-    return Tried(words, _mean(seen), _mean(standing.test))
+def _tried(words: str, score: FitScore) -> Tried:
+    seen = np.concatenate([score.fit, score.choose])
+    return Tried(words, _mean(seen), _mean(score.test))
 
 
 def _mean(values: FloatArray) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.diagnosis.result.real_answer import DrawnExcerpt, RealAnswer
+from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, RealAnswer
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.diagnosis_style import AFTER, MEASURED, RETUNED
 from analysis.figures.picture import Picture

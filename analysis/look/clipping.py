@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.diagnosis.data.rounding import rounding_step
+from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.look.channels import Channel
 from analysis.look.check import Check, fine_if_none
 from equalizer.signals.signal import FloatArray

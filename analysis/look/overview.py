@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.rounding import rounding_step
+from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.look.channels import Channel, Stretch, channels_of, rms, stretches_of
 from analysis.look.check import Check
 from analysis.look.clipping import clipping

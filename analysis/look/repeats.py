@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.found_segments import decided_command, found_period
-from analysis.diagnosis.data.periods import look_samples, settled_periods
+from analysis.diagnosis.noise.periods import look_samples, settled_periods
 from analysis.look.channels import Stretch, rms
 from analysis.look.check import Check
 from analysis.wording import listed, typeset

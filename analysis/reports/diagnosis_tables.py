@@ -86,7 +86,7 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
     statistic, what = found.explanation.statistic, "noise"
     if statistic is not None:
         units, noises, what = ("1",) * len(names), dict(zip(names, statistic.chance.tolist(), strict=True)), "chance"
-    stands = {stage: getattr(getattr(found.explanation, stage).standing, part) for stage, _ in _STAGES}
+    stands = {stage: getattr(getattr(found.explanation, stage).score, part) for stage, _ in _STAGES}
     rows = []
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
         noise = noises.get(name)

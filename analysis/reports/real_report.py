@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.result.real_answer import OwnNumber, PairOutcome, RealAnswer
+from analysis.diagnosis.real_answer.real_answer import OwnNumber, PairOutcome, RealAnswer
 from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.evaluation.proof.injected import InjectedOutcome
 from analysis.figures.picture import Picture

@@ -39,7 +39,7 @@ def real(
     """
     import json
 
-    from analysis.diagnosis.result.real_answer import real_answer_to_json
+    from analysis.diagnosis.real_answer.real_answer import real_answer_to_json
     from study.cli.progress import steps
     from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
     from study.evaluation.real.real_summary import real_lines

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.errors.missing_force import missing_force
+from analysis.diagnosis.forces.missing_force import missing_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import Played, simulate_mechanism

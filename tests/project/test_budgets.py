@@ -30,18 +30,11 @@ CATALOGUES = {
 
 LONG_FILES: set[str] = set()
 CROWDED = {
-    "analysis/diagnosis/balance",
-    "analysis/diagnosis/data",
-    "analysis/diagnosis/errors",
-    "analysis/diagnosis/result",
-    "analysis/diagnosis/search",
     "study/devices",
 }
 SMALL_BESIDE_THEIR_IMPORTER = {
     "analysis/diagnosis/discovery/along.py",
     "analysis/diagnosis/result/error_table.py",
-    "analysis/diagnosis/search/by_brief.py",
-    "analysis/diagnosis/search/prune.py",
     "equalizer/effects/simulation/low_pass_kernel.py",
     "study/devices/accelerometer/packet.py",
     "study/devices/block.py",

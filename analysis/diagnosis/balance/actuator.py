@@ -32,7 +32,7 @@ from analysis.diagnosis.balance.plainest_structure import NOTABLE
 from analysis.diagnosis.balance.structures import Searched
 from analysis.diagnosis.balance.weigh import MOST_ALIKE, Balance, judged_by, weigh
 from analysis.diagnosis.balance.weighed import Weighed, drawn_of, gain_of
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
 
@@ -103,17 +103,17 @@ class Actuator:
 
 
 def balance_of(
-    motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], patient: Patience
+    motions: Sequence[Motion], axis: int, rotational: bool, without: frozenset[str], time_left: TimeBudget
 ) -> Balance:
     """Of laws of the motion, along what a law of the command lets through where one is named."""
-    balance = weigh(search_beside_linear(motions, axis, rotational, without, patient))
+    balance = weigh(search_beside_linear(motions, axis, rotational, without, time_left))
     actuator = actuator_of(balance.searched, without) if balance.tested else None
     if actuator is None:
         return balance
     weighed = actuator.weighed
     if weighed.named:
         through = [_through(motion, axis, actuator.law) for motion in motions]
-        again = weigh(search_beside_linear(through, axis, rotational, without, patient))
+        again = weigh(search_beside_linear(through, axis, rotational, without, time_left))
         return replace(again, laws=(weighed, *again.laws), linear=balance.linear)
     if weighed.gain_low <= 0 or weighed.gain < NOTABLE:
         return balance

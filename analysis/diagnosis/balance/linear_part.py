@@ -24,7 +24,7 @@ from analysis.diagnosis.balance.structures import (
     search_structures,
     values_of,
 )
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 WORTH = 0.1
@@ -46,19 +46,19 @@ def search_beside_linear(
     axis: int,
     rotational: bool,
     without: frozenset[str],
-    patient: Patience,
+    time_left: TimeBudget,
 ) -> Searched:
     """See `search_structures`."""
     beside = Beside(driven_motion(motions)[axis])
-    found = search_structures(motions, axis, rotational, without, patient, beside)
+    found = search_structures(motions, axis, rotational, without, time_left, beside)
     for _ in range(ROUNDS - 1):
-        if not patient():
+        if not time_left():
             break
         more = _linear_beside(found, beside)
         if more.laws == beside.laws and more.late_s == beside.late_s:
             break
         beside, shifted = more, [_late(motion, more.late_s) for motion in motions]
-        found = search_structures(shifted, axis, rotational, without, patient, beside)
+        found = search_structures(shifted, axis, rotational, without, time_left, beside)
     return found
 
 

@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.law import Beside, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import laws_of, likely_pitches, pitched
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import Regression, of_laws, regression_of, with_law, with_laws
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 MOST_LAWS = 3
@@ -54,7 +54,7 @@ def search_structures(
     axis: int,
     rotational: bool,
     without: frozenset[str],
-    patient: Patience,
+    time_left: TimeBudget,
     beside: Beside | GivenBase | None = None,
 ) -> Searched:
     """without: effects that are not to be considered. beside: None = mass, damping and stiffness alone."""
@@ -76,15 +76,15 @@ def search_structures(
     if "cogging" not in without:
         first = _pitched(first, scales)
     linear = _linear(first)
-    first, ranked, best = _beam(first, linear, patient)
-    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda each: each.error)), patient())
+    first, ranked, best = _beam(first, linear, time_left)
+    return Searched(first, linear, best, tuple(sorted(ranked, key=lambda each: each.error)), time_left())
 
 
-def _beam(first: Regression, linear: Structure, patient: Patience) -> tuple[Regression, list[Structure], Structure]:
+def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[Regression, list[Structure], Structure]:
     """Of all sizes; and with the laws refined."""
     beam, ranked, best = [linear], [linear], linear
     for _ in range(MOST_LAWS):
-        if not patient():
+        if not time_left():
             break
         grown = _grown(first, beam)
         if not grown:

@@ -17,7 +17,7 @@ from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faul
 from analysis.diagnosis.contrast.stream import FOLDS, Stream, changed_rows, stream_of
 from analysis.diagnosis.contrast.taken import Taken, taken_of
 from analysis.diagnosis.contrast.watch_base import watch_bases
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -99,7 +99,7 @@ class Compared:
 
 
 def compared(
-    recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], patient: Patience
+    recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
 ) -> Compared | None:
     """None where there is too little, nothing holds, or one set hardly moves beside the other."""
     sides = taken_of(clean), taken_of(recordings)
@@ -107,7 +107,7 @@ def compared(
         return None
     try:
         streams, faults, by_force = _streams(*sides)
-        found = _weigh(streams, [fault for fault in faults if fault.effect not in without], patient)
+        found = _weigh(streams, [fault for fault in faults if fault.effect not in without], time_left)
     except (np.linalg.LinAlgError, ValueError):
         return None
     base = streams[0].base
@@ -139,7 +139,7 @@ def _streams(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> tuple[list[
     return streams, faults, by_force
 
 
-def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience) -> Compared:
+def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Compared:
     clean = [stream.grams(stream.clean, []).blocks for stream in streams]
     bare = [Pair(stream.grams(stream.other, []), ALL, tuple(own)) for stream, own in zip(streams, clean, strict=True)]
     plain = fitted(bare, None)
@@ -148,7 +148,7 @@ def _weigh(streams: Sequence[Stream], faults: Sequence[Fault], patient: Patience
     best: list[tuple[Fit, Fault, Variant, list[Pair]]] = []
     complete = False
     for fault in faults:
-        if not patient():
+        if not time_left():
             break
         tried = []
         for variant in fault.variants:

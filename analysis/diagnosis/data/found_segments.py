@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.observed_parts import MOST_PERIODS, parts_of
-from analysis.diagnosis.data.rounding import rounding_step
+from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.wording import listed
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal

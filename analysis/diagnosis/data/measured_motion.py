@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.simulation.sensor_path import before_low_pass
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording

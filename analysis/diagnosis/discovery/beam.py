@@ -17,7 +17,7 @@ from analysis.diagnosis.settings import (
     LAW_REFINED,
     LAW_WORTH_SHARE,
 )
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 
@@ -29,13 +29,13 @@ class Searched:
     """Share of the held-out squares above the noise that the best term takes of a residual out of its time."""
 
 
-def best_sums(base: Products, terms: Sequence[Term], patient: Patience) -> Searched:
+def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> Searched:
     """base: of the model's numbers alone."""
     view = base.view
     kept, columns = _tabled(view, terms)
-    found = _refined(base, (), kept, _order(base, columns), patient)
+    found = _refined(base, (), kept, _order(base, columns), time_left)
     every = list(found)
-    while found and len(found[0].terms) < LAW_MOST_TERMS and patient():
+    while found and len(found[0].terms) < LAW_MOST_TERMS and time_left():
         best = found[0]
         if best.crossed - 1 <= LAW_MAIN_PART * (best.without - 1):
             break
@@ -43,7 +43,7 @@ def best_sums(base: Products, terms: Sequence[Term], patient: Patience) -> Searc
         for sum_ in found[: LAW_BEAM // 2]:
             held = [column for term in sum_.terms if (column := column_of(view, term)) is not None]
             order = _order(extended(base, held), columns)
-            longer += _refined(base, sum_.terms, kept, order, patient)[:LAW_BEAM]
+            longer += _refined(base, sum_.terms, kept, order, time_left)[:LAW_BEAM]
         longer = sorted(longer, key=lambda one: one.crossed)
         if not longer or not _worth(best, longer[0]):
             break
@@ -98,7 +98,7 @@ def _order(base: Products, columns: FloatArray) -> list[int]:
 
 
 def _refined(
-    base: Products, held: tuple[Term, ...], terms: Sequence[Term], order: Sequence[int], patient: Patience
+    base: Products, held: tuple[Term, ...], terms: Sequence[Term], order: Sequence[int], time_left: TimeBudget
 ) -> tuple[Sum, ...]:
     """The best starts of different shapes, each beside the terms that are held, fitted together."""
     shapes: dict[str, Term] = {}
@@ -107,5 +107,5 @@ def _refined(
             shapes.setdefault(terms[number].shape, terms[number])
         if len(shapes) == LAW_REFINED:
             break
-    found = [fitted_sum(base, (*held, term)) for term in shapes.values() if patient()]
+    found = [fitted_sum(base, (*held, term)) for term in shapes.values() if time_left()]
     return tuple(sorted((one for one in found if one is not None), key=lambda one: one.crossed))

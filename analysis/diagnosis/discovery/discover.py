@@ -14,10 +14,10 @@ from analysis.diagnosis.discovery.sums import Sum
 from analysis.diagnosis.discovery.whitened import View, views_of
 from analysis.diagnosis.errors.hypothesis import together
 from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
-from analysis.diagnosis.search.contest import refine
+from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, worthwhile
-from analysis.diagnosis.search.rivalry import FIRST_ROUNDS, Arena, Contender, sensitivity_at
 from analysis.diagnosis.search.same_within_errors import inseparable
+from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import (
     LAW_ALMOST_NOISE,
     LAW_AXES_SHARE,
@@ -28,7 +28,7 @@ from analysis.diagnosis.settings import (
     NOISE_ALONE,
     RETUNING_BOUND,
 )
-from analysis.diagnosis.types import Patience, Progress
+from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
 
 
@@ -36,10 +36,10 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 class Round:
     """One law that was added."""
 
-    contenders: tuple[Contender, ...]
+    fitted_candidates: tuple[FittedCandidate, ...]
     """The best first."""
     sums: tuple[Sum, ...]
-    """As the screen had them; the first is that of the first contender."""
+    """As the screen had them; the first is that of the first candidate."""
     placebo: float
     """Share of the held-out squares above the noise that the best term takes of a missing force out of its time."""
 
@@ -51,58 +51,64 @@ class Discovered:
     rounds: tuple[Round, ...]
 
 
-def discover(arena: Arena, known: Explanation, progress: Progress, patient: Patience) -> Discovered | None:
+def discover(
+    context: SearchContext, known: Explanation, progress: Progress, time_left: TimeBudget
+) -> Discovered | None:
     """None where no law is found that is worth its numbers. known: what the named effects explain."""
     retuned = known.retuned.fitted
-    base = arena.contender(evaluated(arena.measure, arena.tuning, retuned.deviations, retuned.hypothesis))
+    base = context.candidate(evaluated(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
     rounds: list[Round] = []
-    steps: list[Contender] = []
-    while len(rounds) < LAW_MOST_ROUNDS and patient() and base.standing.seen > NOISE_ALONE:
+    steps: list[FittedCandidate] = []
+    while len(rounds) < LAW_MOST_ROUNDS and time_left() and base.score.worst_channel > NOISE_ALONE:
         progress("looking for a law that has no name", 0.6 + 0.1 * len(rounds))
-        found = _next(arena, base.fitted, patient)
-        if found is None or not worthwhile(base, found.contenders[0]):
+        found = _next(context, base.fitted, time_left)
+        if found is None or not worthwhile(base, found.fitted_candidates[0]):
             break
-        base = found.contenders[0]
+        base = found.fitted_candidates[0]
         rounds.append(found)
         steps.append(base)
     if not rounds:
         return None
-    last = arena.contender(snapped(arena, base.fitted))
+    last = context.candidate(snapped(context, base.fitted))
     steps[-1] = last
     whole = Explanation(
-        known.before, known.retuned, arena.confirmed(last), tuple(each.contenders for each in rounds), tuple(steps)
+        known.before,
+        known.retuned,
+        context.confirmed(last),
+        tuple(each.fitted_candidates for each in rounds),
+        tuple(steps),
     )
     return Discovered(whole, tuple(rounds))
 
 
-def _next(arena: Arena, base: Fitted, patient: Patience) -> Round | None:
-    views = views_of(arena.measure, arena.tuning, base)
-    searched = [_along(view, patient) for view in _where(views)]
+def _next(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round | None:
+    views = views_of(context.measure, context.tuning, base)
+    searched = [_along(view, time_left) for view in _where(views)]
     every = sorted((one for found in searched for one in found.sums), key=lambda one: _taken(views, one), reverse=True)
     sums = _near(_different(every))[:LAW_FITTED]
     if not sums:
         return None
-    known = sensitivity_at(arena, base.deviations, base.hypothesis)
+    known = sensitivity_at(context, base.deviations, base.hypothesis)
     fits: list[tuple[Fitted, Sum]] = []
     for one in sums:
-        start = _started(arena, base, one)
+        start = _started(context, base, one)
         if start is not None:
-            fits.append((fit(arena.measure, arena.tuning, start, known, FIRST_ROUNDS), one))
+            fits.append((fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), one))
     fits.sort(key=lambda pair: pair[0].cost)
     if not fits or not np.isfinite(fits[0][0].cost):
         return None
-    refined = [(arena.contender(refine(arena, fits[0][0])), fits[0][1])]
-    rest = [(arena.contender(fitted), one) for fitted, one in fits[1:]]
+    refined = [(context.candidate(refine(context, fits[0][0])), fits[0][1])]
+    rest = [(context.candidate(fitted), one) for fitted, one in fits[1:]]
     close = [pair for pair in rest if _price(pair[1]) < _price(fits[0][1]) and inseparable(refined[0][0], pair[0])]
-    refined += [(arena.contender(refine(arena, contender.fitted)), one) for contender, one in close]
+    refined += [(context.candidate(refine(context, candidate.fitted)), one) for candidate, one in close]
     ranked = _plainest_first([*refined, *(pair for pair in rest if pair not in close)])
     placebo = max((found.placebo for found in searched), default=0.0)
     return Round(tuple(one for one, _ in ranked), tuple(one for _, one in ranked), placebo)
 
 
-def _plainest_first(pairs: Sequence[tuple[Contender, Sum]]) -> list[tuple[Contender, Sum]]:
+def _plainest_first(pairs: Sequence[tuple[FittedCandidate, Sum]]) -> list[tuple[FittedCandidate, Sum]]:
     """The best first; of those that these data cannot part from it, the one with the fewest numbers to be told."""
-    ranked = sorted(pairs, key=lambda pair: pair[0].standing.chosen_by)
+    ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
     alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
     first = min(alike, key=lambda pair: _price(pair[1]))
     return [first, *(pair for pair in ranked if pair is not first)]
@@ -117,13 +123,13 @@ def _price(of: Sum) -> int:
     return told
 
 
-def _started(arena: Arena, base: Fitted, one: Sum) -> Fitted | None:
+def _started(context: SearchContext, base: Fitted, one: Sum) -> Fitted | None:
     """With the model's own numbers as they were, or as the sum wants them."""
-    law = hypothesis_of(law_of_sum(one), one.axis, arena.measure.records[0].recording)
+    law = hypothesis_of(law_of_sum(one), one.axis, context.measure.records[0].recording)
     found: list[Fitted] = []
     for deviations in (base.deviations, np.clip(base.deviations + one.moved, -RETUNING_BOUND, RETUNING_BOUND)):
         try:
-            found.append(evaluated(arena.measure, arena.tuning, deviations, together(base.hypothesis, law)))
+            found.append(evaluated(context.measure, context.tuning, deviations, together(base.hypothesis, law)))
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
     return min(found, key=lambda start: start.cost, default=None)
@@ -144,12 +150,12 @@ def _excess(view: View) -> float:
     return float(without.sum()) / (view.noise * len(view.residual))
 
 
-def _along(view: View, patient: Patience) -> Searched:
+def _along(view: View, time_left: TimeBudget) -> Searched:
     seen = view.records[0]
     axes = axes_of(seen.columns, seen.left.shape[1])
     terms = terms_of(axes, view.axis, len(seen.left) / seen.rate_hz, seen.rate_hz)
     lines = periodic(seen.columns, axes[view.axis], seen.left[:, view.axis], seen.rate_hz)
-    return best_sums(products_of(view), (*terms, *lines), patient)
+    return best_sums(products_of(view), (*terms, *lines), time_left)
 
 
 def _taken(views: Sequence[View], one: Sum) -> float:

@@ -13,8 +13,8 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.discovery.discover import Discovered, Round
 from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.discovery.sums import Sum
-from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_STABLE
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Segment
@@ -41,15 +41,15 @@ def _failed(of: Discovered, records: Sequence[Observed]) -> Iterator[str]:
             yield f"in a shuffled force the same search finds {100 * found.placebo:.0f} % of it"
         for other in _alike(found):
             yield f"a law of {' and '.join(other)} does as well"
-        if number and not of.found.steps[number].standing.chosen_by < of.found.steps[number - 1].standing.chosen_by:
+        if number and not of.found.steps[number].score.mean_log_error < of.found.steps[number - 1].score.mean_log_error:
             yield "it brings nothing beside the law before it"
 
 
 def _alike(found: Round) -> Iterator[tuple[str, ...]]:
     """Variables of laws that leave hardly more, and are not those of the first."""
-    best = found.contenders[0]
-    for contender, one in zip(found.contenders[1:], found.sums[1:], strict=True):
-        if inseparable(best, contender) and _variables(one) != _variables(found.sums[0]):
+    best = found.fitted_candidates[0]
+    for candidate, one in zip(found.fitted_candidates[1:], found.sums[1:], strict=True):
+        if inseparable(best, candidate) and _variables(one) != _variables(found.sums[0]):
             yield _variables(one)
 
 
@@ -64,10 +64,10 @@ def _variables(of: Sum) -> tuple[str, ...]:
     return tuple(sorted(names))
 
 
-def beats(law: Contender, rival: Contender) -> bool:
+def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
     """Whether a law leaves so much less than a named effect, on sealed samples too, that the name is not believed. Both
     confirmed."""
-    sealed, other = (float(np.mean(np.log(each.standing.test))) for each in (law, rival))
+    sealed, other = (float(np.mean(np.log(each.score.test))) for each in (law, rival))
     if np.isfinite(sealed) and sealed >= other:
         return False
     return excess(law) <= LAW_BEATS * excess(rival)

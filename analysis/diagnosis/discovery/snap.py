@@ -9,28 +9,28 @@ from analysis.diagnosis.discovery.as_effect import channels_of, laws_of
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed, together
 from analysis.diagnosis.errors.intervals import standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluated, fit
-from analysis.diagnosis.search.rivalry import FIRST_ROUNDS, Arena, sensitivity_at
+from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
 
 
-def snapped(arena: Arena, fitted: Fitted) -> Fitted:
+def snapped(context: SearchContext, fitted: Fitted) -> Fitted:
     """Fitted anew with its exponents held at simple numbers; the same where none is near one."""
-    known = sensitivity_at(arena, fitted.deviations, fitted.hypothesis)
-    errors = standard_errors(arena.measure, arena.tuning, fitted, known)[len(arena.tuning.names) :]
-    plain = _plain(arena, fitted.hypothesis, errors)
+    known = sensitivity_at(context, fitted.deviations, fitted.hypothesis)
+    errors = standard_errors(context.measure, context.tuning, fitted, known)[len(context.tuning.names) :]
+    plain = _plain(context, fitted.hypothesis, errors)
     if plain is None:
         return fitted
-    start = evaluated(arena.measure, arena.tuning, fitted.deviations, plain)
-    found = fit(arena.measure, arena.tuning, start, known, FIRST_ROUNDS)
+    start = evaluated(context.measure, context.tuning, fitted.deviations, plain)
+    found = fit(context.measure, context.tuning, start, known, FIRST_ROUNDS)
     return found if found.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
 
 
-def _plain(arena: Arena, whole: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
+def _plain(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
     """errors: (numbers,), of the point."""
-    recording = arena.measure.records[0].recording
+    recording = context.measure.records[0].recording
     parts, changed, first = [], False, 0
     for number, (claim, law) in enumerate(zip(whole.claims, laws_of(whole), strict=True)):
         count = len(claim.effect.parameters) * claim.groups

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import welch
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.standing import Standing
+from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
@@ -65,10 +65,10 @@ class BandPower:
         courses = [r.measured - left * unit for r, left in zip(self.measure.records, residuals, strict=True)]
         return np.asarray(0.5 * np.log(self._power(courses) + self._noise))
 
-    def misfits(self, off: FloatArray) -> Standing:
+    def misfits(self, off: FloatArray) -> FitScore:
         """off: a difference of such logarithms. Its rms by channel, for each purpose; NaN where nothing counts."""
         seen = np.where(np.isnan(self.measured), np.nan, off)
-        return Standing(*(_rms(seen[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
+        return FitScore(*(_rms(seen[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
 
     @cached_property
     def _edges(self) -> FloatArray:

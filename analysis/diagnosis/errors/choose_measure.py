@@ -20,15 +20,15 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion, time_unit
-from analysis.diagnosis.data.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.data.observed import Observed, noise_in_units
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.data.rounding import rounding_step
 from analysis.diagnosis.effect_words import EFFECT_WORDS
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.force_views import force_views
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.windows import windows_of
+from analysis.diagnosis.forces.force_views import force_views
+from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
+from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.diagnosis.settings import (
     DIES_OUT_SHARE,
     MOST_LEFT_OUT,

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.residual_colour import Colour
+from analysis.diagnosis.errors.whitening_filter import WhiteningFilter
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -20,7 +20,7 @@ class ColouredMeasure:
     """Residuals are those of `plain`, whitened; they count where all samples that the filter uses are known."""
 
     plain: ErrorMeasure
-    colour: Colour
+    colour: WhiteningFilter
     unit: FloatArray
     noise: FloatArray
     """(c,): rms of a sound device's whitened residual, in each channel's own unit."""
@@ -43,8 +43,8 @@ class ColouredMeasure:
     def shortened(self) -> Self:
         return replace(self, plain=self.plain.shortened())
 
-    def tells(self, effect: Effect) -> bool:
-        return self.plain.tells(effect)
+    def can_observe(self, effect: Effect) -> bool:
+        return self.plain.can_observe(effect)
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         left = self.plain.residuals(model, effects)
@@ -57,12 +57,12 @@ class ColouredMeasure:
         return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
 
 
-def coloured(plain: ErrorMeasure, colour: Colour, noise: FloatArray) -> ColouredMeasure:
+def coloured(plain: ErrorMeasure, colour: WhiteningFilter, noise: FloatArray) -> ColouredMeasure:
     """noise: (c,), see `ColouredMeasure`."""
     warm = [_counted(record, colour) for record in plain.records]
     return ColouredMeasure(plain.with_records(tuple(warm)), colour, noise, noise)
 
 
-def _counted(record: Observed, colour: Colour) -> Observed:
+def _counted(record: Observed, colour: WhiteningFilter) -> Observed:
     warm = colour.warm(record.measured)
     return replace(record, fit=record.fit & warm, choose=record.choose & warm, test=record.test & warm)

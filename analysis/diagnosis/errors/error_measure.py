@@ -46,7 +46,7 @@ class ErrorMeasure(Protocol):
     def shortened(self) -> Self:
         """Without the samples behind the last that decisions may see."""
 
-    def tells(self, effect: Effect) -> bool:
+    def can_observe(self, effect: Effect) -> bool:
         """Whether it could see the effect at all; others are not to be considered."""
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:

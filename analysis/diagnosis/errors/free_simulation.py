@@ -39,7 +39,7 @@ class FreeSimulation:
         kept = [record for record in self.records if (record.fit | record.choose).any()]
         return replace(self, records=tuple(record.shortened() for record in kept))
 
-    def tells(self, effect: Effect) -> bool:
+    def can_observe(self, effect: Effect) -> bool:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:

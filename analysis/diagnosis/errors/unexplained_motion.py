@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.missing_force import missing_force
+from analysis.diagnosis.forces.missing_force import missing_force
 from equalizer.effects.simulation.simulator import Played
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel

@@ -65,7 +65,7 @@ class Windows:
         ]
         return replace(self, records=tuple(record for record, _ in kept), states=tuple(states for _, states in kept))
 
-    def tells(self, effect: Effect) -> bool:
+    def can_observe(self, effect: Effect) -> bool:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:

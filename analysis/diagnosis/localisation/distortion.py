@@ -10,9 +10,9 @@ import numpy as np
 from analysis.diagnosis.data.detection_lines import DetectionLines, detection_lines, held_samples
 from analysis.diagnosis.data.frequency_cells import Band, octaves_between, within
 from analysis.diagnosis.data.line_statistics import excess
-from analysis.diagnosis.data.noise_floor import NoiseFloor
-from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.localisation.driven_looks import DrivenLook, driven_looks
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.noise.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.recording import Recording

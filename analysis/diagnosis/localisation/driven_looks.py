@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.channel_noise import ChannelNoise
 from analysis.diagnosis.data.detection_lines import DetectionLines
 from analysis.diagnosis.data.frequency_cells import driving_inputs
-from analysis.diagnosis.data.periods import Periods, look_spectra
+from analysis.diagnosis.noise.channel_noise import ChannelNoise
+from analysis.diagnosis.noise.periods import Periods, look_spectra
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
 from equalizer.signals.lockin import ComplexArray

@@ -6,17 +6,17 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
-from analysis.diagnosis.errors.transfer import axis_transfer
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.forces.transfer import axis_transfer
 from analysis.diagnosis.localisation.distortion import Distortions, distortion
 from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, entry_point
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Prediction
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.residual_spectra import residual_spectra
 from analysis.diagnosis.localisation.tied_states import tied_errors, tied_forces
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

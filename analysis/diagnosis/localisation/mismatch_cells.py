@@ -11,9 +11,9 @@ from scipy.stats import false_discovery_control
 
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.data.line_statistics import noncentral_f_sf
-from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.settings import EQUIVALENCE_MARGIN, FALSE_DISCOVERY_RATE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.output_error import Fitted
-from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import Margin, MismatchCell, Prediction, mismatch_cells
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 
 Cells = tuple[MismatchCell, ...]
 
@@ -40,7 +40,7 @@ def maps_of(
     return Maps({stage: cells_of(measure, fitted, floors, learned) for stage, fitted in stages.items()})
 
 
-def whole_mismatch(measure: ErrorMeasure, stands: Standing) -> tuple[Mismatch, ...]:
+def whole_mismatch(measure: ErrorMeasure, stands: FitScore) -> tuple[Mismatch, ...]:
     """One row for the worst channel over the whole band, where no cell can be told apart from its neighbours."""
     record = measure.records[0].recording
     errors = np.fmax(np.maximum(stands.fit, stands.choose), stands.test)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.channel_noise import ChannelNoise
 from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
 from analysis.diagnosis.data.frequency_cells import Band, driving_inputs, octaves_between, within
-from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods, spectra
+from analysis.diagnosis.noise.channel_noise import ChannelNoise
+from analysis.diagnosis.noise.periods import Periods, look_spectra, settled_periods, spectra
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.recording import Recording, Segment

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.channel_noise import ChannelNoise
 from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
-from analysis.diagnosis.data.noise_floor import NoiseFloor
-from analysis.diagnosis.data.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
+from analysis.diagnosis.noise.channel_noise import ChannelNoise
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.noise.periods import Periods, look_spectra, settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.lockin import ComplexArray

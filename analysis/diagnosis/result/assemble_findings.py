@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import without_claim
@@ -15,19 +14,20 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.localisation import Localisation, localised
 from analysis.diagnosis.localisation.mismatch_maps import Maps, maps_of, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
+from analysis.diagnosis.next_experiment.proposed_experiment import Proposal, proposed_experiment
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.reference.learn_model_error import learned_sentence
 from analysis.diagnosis.result.black_box import black_box
 from analysis.diagnosis.result.error_table import channel_errors, errors_of
 from analysis.diagnosis.result.findings import BlackBox, Course, Findings, Signature
 from analysis.diagnosis.result.named_effects import Said, named_effects, said_of
-from analysis.diagnosis.result.proposed_experiment import Proposal, proposed_experiment
 from analysis.diagnosis.result.signature_curves import Names, signature_of
 from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
-from analysis.diagnosis.search.determined import final_errors
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.learn_clean_floor import learned_sentence
-from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.identifiability import final_errors
 from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
 from analysis.diagnosis.types import Mask
@@ -45,15 +45,15 @@ def assembled(
 ) -> Findings:
     """searched.found.after is what is named; the same as re-tuned where nothing is. names: of the recordings. learned:
     what clean recordings differ by."""
-    arena, found, judged = searched.arena, searched.found, searched.judged
-    measure, tuning = arena.whole, arena.tuning
+    context, found, judged = searched.context, searched.found, searched.judged
+    measure, tuning = context.whole, context.tuning
     errors = _errors(searched)
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
     maps, courses = maps_of(measure, found.stages, floors, learned), _courses(measure, found, names)
     local = localised(measure, tuning, found.stages, floors, maps.cells)
-    proposal = _proposal(arena, found, judged)
+    proposal = _proposal(context, found, judged)
     document = _document(searched, errors, (maps, local), proposal)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
@@ -67,7 +67,7 @@ def assembled(
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
-        signatures=_signatures(arena, found, said),
+        signatures=_signatures(context, found, said),
         black_box=_black_box(measure, found, document),
         remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),
         maps=maps.cells,
@@ -107,14 +107,14 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
 
 def _errors(searched: Searched) -> FloatArray:
     """Of the model's own numbers and of the named effects', as far as a reader is shown them; see `final_errors`."""
-    arena, found = searched.arena, searched.found
-    own, numbers = len(arena.tuning.names), len(found.after.fitted.hypothesis.point)
+    context, found = searched.context, searched.found
+    own, numbers = len(context.tuning.names), len(found.after.fitted.hypothesis.point)
     if found.statistic is not None:
         return np.concatenate([np.full(own, np.nan), found.statistic.errors])
     if searched.errors is not None and searched.judged.named:
         return searched.errors
-    if searched.judged.named or arena.tuning.model.coordinates == 1:
-        return final_errors(arena, found if searched.judged.named else replace(found, steps=()))
+    if searched.judged.named or context.tuning.model.coordinates == 1:
+        return final_errors(context, found if searched.judged.named else replace(found, steps=()))
     return np.full(own + numbers, np.nan)
 
 
@@ -122,20 +122,20 @@ def _document(
     searched: Searched, errors: FloatArray, looked: tuple[Maps, Localisation], proposal: Proposal | None
 ) -> Diagnosis:
     found, judged = searched.found, searched.judged
-    measure, tuning, fitted = searched.arena.whole, searched.arena.tuning, found.after.fitted
+    measure, tuning, fitted = searched.context.whole, searched.context.tuning, found.after.fitted
     maps, local = looked
     said = said_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
-        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.standing)),
+        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score)),
         effects=_named(searched, errors[len(tuning.names) :], said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
         else impact_remainder(measure, found)
         or mismatch_rows(maps.cells["after"], local.states["after"])
-        or whole_mismatch(measure, found.after.standing),
+        or whole_mismatch(measure, found.after.score),
         fit=errors_of(measure, found),
         error=measure.name,
         next_experiment=None if proposal is None else proposal.document,
@@ -144,17 +144,17 @@ def _document(
 
 def _named(searched: Searched, errors: FloatArray, said: Said) -> tuple[NamedEffect, ...]:
     """With their gains on held-out data, where samples were compared."""
-    arena, found = searched.arena, searched.found
+    context, found = searched.context, searched.found
     effects = named_effects(found, errors, said)
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects
-    between = [arena.confirmed(step) for step in found.steps[:-1]]
-    return with_gains(effects, arena.whole, (found.retuned, *between, found.after))
+    between = [context.confirmed(step) for step in found.steps[:-1]]
+    return with_gains(effects, context.whole, (found.retuned, *between, found.after))
 
 
-def _proposal(arena: Arena, found: Explanation, judged: Judgement) -> Proposal | None:
-    foretold = judged.named and arena.whole.name == "free simulation" and found.statistic is None
-    return proposed_experiment(arena, found) if foretold else None
+def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> Proposal | None:
+    foretold = judged.named and context.whole.name == "free simulation" and found.statistic is None
+    return proposed_experiment(context, found) if foretold else None
 
 
 def channel_names(recording: Recording, count: int) -> tuple[str, ...]:
@@ -168,8 +168,8 @@ def _courses(measure: ErrorMeasure, found: Explanation, names: Sequence[str]) ->
     for number, record in enumerate(measure.records):
         count = record.measured.shape[1]
         before, retuned, after = (
-            record.measured - contender.fitted.residuals[number] * measure.unit
-            for contender in (found.before, found.retuned, found.after)
+            record.measured - candidate.fitted.residuals[number] * measure.unit
+            for candidate in (found.before, found.retuned, found.after)
         )
         courses.append(
             Course(
@@ -201,9 +201,9 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
-def _signatures(arena: Arena, found: Explanation, said: Said) -> tuple[Signature, ...]:
+def _signatures(context: SearchContext, found: Explanation, said: Said) -> tuple[Signature, ...]:
     """Each named effect's, against the final model without it alone."""
-    measure, tuning, fitted = arena.whole, arena.tuning, found.after.fitted
+    measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
     names = Names(
         tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
     )
@@ -229,9 +229,9 @@ def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatc
     amplitudes."""
     if found.statistic is None:
         return ()
-    record, standing = measure.records[0].recording, found.after.standing
+    record, score = measure.records[0].recording, found.after.score
     names = (*record.response.channels, *(() if record.position is None else record.position.channels))
-    worst = np.maximum(standing.fit, standing.choose)
+    worst = np.maximum(score.fit, score.choose)
     return tuple(
         Mismatch(
             names[c], "+".join(record.command.channels), (0.0, record.sample_rate_hz / 2), None, None,

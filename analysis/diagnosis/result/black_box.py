@@ -8,9 +8,9 @@ has numbers.
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.standing import rms_over
+from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
@@ -21,7 +21,7 @@ _SEEN_AT_ALL = 1e-6
 _TINY = np.finfo(np.float64).tiny
 
 
-def black_box(measure: ErrorMeasure, retuned: Contender, numbers: int, physics: float | None) -> BlackBox | None:
+def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, physics: float | None) -> BlackBox | None:
     """physics: the named effects' error on the test samples, as `document.Errors`. None where nothing is sealed."""
     if physics is None or not any(record.test.any() for record in measure.records):
         return None

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.diagnosis.balance.actuator import NO_COLUMN
-from analysis.diagnosis.balance.reduced_recordings import linear_laws
 from analysis.diagnosis.balance.structures import NOTICED
 from analysis.diagnosis.balance.weigh import SMALL, Balance
 from analysis.diagnosis.balance.weighed import Weighed
+from analysis.diagnosis.confirm.confirm_laws import CONSTANTS
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
 from analysis.diagnosis.effect_words import noun_of, place_of
+from analysis.diagnosis.first_model.reduced_recordings import linear_laws
 from analysis.diagnosis.result.candidate_wording import REFINED
 from analysis.diagnosis.result.findings import Reached
-from analysis.diagnosis.search.by_balance import CONSTANTS
 from analysis.wording import listed
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter

@@ -11,9 +11,9 @@ from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import unit_of
+from analysis.diagnosis.reference.compare_with_reference import Contrast
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.search.by_contrast import Contrast
-from analysis.diagnosis.search.patience import OUT_OF_TIME
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place

@@ -6,9 +6,9 @@ import numpy as np
 
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.standing import rms_over
+from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.search.explain import Explanation, Statistic
-from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.search_context import FittedCandidate
 
 
 def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
@@ -22,16 +22,14 @@ def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
 def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
     """By stage and channel: rms over the test samples in units of the noise."""
     stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
-    return {
-        stage: dict(zip(names, contender.standing.test.tolist(), strict=True)) for stage, contender in stages.items()
-    }
+    return {stage: dict(zip(names, candidate.score.test.tolist(), strict=True)) for stage, candidate in stages.items()}
 
 
 def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
     """Root mean square over the channels of the logarithm that a prediction is off by."""
 
-    def one(contender: Contender) -> float | None:
-        off = np.array([getattr(contender.standing, part) for part in parts]) * statistic.chance
+    def one(candidate: FittedCandidate) -> float | None:
+        off = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
         whole = float(np.sqrt(np.mean(off**2)))
         return whole if np.isfinite(whole) else None
 
@@ -46,8 +44,8 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
     size = np.maximum(rms_over(measure.records, signals, masks), np.finfo(float).tiny)
 
-    def one(contender: Contender) -> float | None:
-        rms = rms_over(measure.records, contender.fitted.residuals, masks) * measure.unit / size
+    def one(candidate: FittedCandidate) -> float | None:
+        rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit / size
         whole = float(np.sqrt(np.mean(rms**2)))
         return whole if np.isfinite(whole) else None
 

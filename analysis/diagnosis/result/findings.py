@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.document import Diagnosis, Mismatch
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.result.proposed_experiment import Proposal
+from analysis.diagnosis.next_experiment.proposed_experiment import Proposal
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
 from equalizer.effects.effect import PlacedEffect

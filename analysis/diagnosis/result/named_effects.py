@@ -11,7 +11,7 @@ from analysis.diagnosis.found_law import FoundLaw, found_law
 from analysis.diagnosis.result.impact_wording import BY_CHANCE, BY_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand, only_refines
-from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import shares_taken
 from analysis.diagnosis.settings import (
     ELSEWHERE_HALFWAY,
@@ -93,13 +93,17 @@ def axis_of(claim: Claim, said: Said) -> str | None:
 
 
 def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, ...], float]:
-    contenders = found.rounds[number]
-    left = found.after.standing.seen if found.statistic is None else found.after.standing.seen / EXPLAINED_BY_CHANCE
-    chances = probabilities(contenders, left)
-    best, by_name = contenders[0], _chances_of_names(contenders, chances)
+    fitted_candidates = found.rounds[number]
+    left = (
+        found.after.score.worst_channel
+        if found.statistic is None
+        else found.after.score.worst_channel / EXPLAINED_BY_CHANCE
+    )
+    chances = probabilities(fitted_candidates, left)
+    best, by_name = fitted_candidates[0], _chances_of_names(fitted_candidates, chances)
     rivals: dict[str, Rival] = {}
     unit = BY_NOISE if found.statistic is None else BY_CHANCE
-    for other in contenders[1:]:
+    for other in fitted_candidates[1:]:
         claim = other.fitted.hypothesis.claims[-1]
         if claim.effect.name == best.newest or claim.effect.name in rivals:
             continue
@@ -112,19 +116,19 @@ def _rivals(found: Explanation, number: int, said: Said) -> tuple[tuple[Rival, .
     return tuple(rivals.values()), by_name[best.newest]
 
 
-def _chances_of_names(contenders: Sequence[Contender], chances: Sequence[float]) -> dict[str, float]:
+def _chances_of_names(fitted_candidates: Sequence[FittedCandidate], chances: Sequence[float]) -> dict[str, float]:
     """An effect may contend several times, at other axes or from another start: the name is one."""
     found: dict[str, float] = {}
-    for contender, chance in zip(contenders, chances, strict=True):
-        name = contender.newest
+    for candidate, chance in zip(fitted_candidates, chances, strict=True):
+        name = candidate.newest
         found[name] = min(1.0, found.get(name, 0.0) + chance)
     return found
 
 
-def _why_not(best: Contender, other: Contender, same: bool, words: tuple[Said, str]) -> str:
+def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: tuple[Said, str]) -> str:
     """words: of the device, and what errors are counted in."""
     said, unit = words
-    worst, least = other.standing.seen, best.standing.seen
+    worst, least = other.score.worst_channel, best.score.worst_channel
     claim = other.fitted.hypothesis.claims[-1]
     axis = axis_of(claim, said)
     where = f" ({axis})" if axis else ""
@@ -202,20 +206,22 @@ def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[
     return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 
 
-# How likely each contender is the right one, from how far apart they stand.
-def probabilities(contenders: Sequence[Contender], left: float) -> tuple[float, ...]:
-    """One each, in sum less than 1; the first contender is the preferred one, and its refinements count for it. left:
+# How likely each candidate is the right one, from how far apart they stand.
+def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> tuple[float, ...]:
+    """One each, in sum less than 1; the first candidate is the preferred one, and its refinements count for it. left:
     errors of the whole explanation in the worst channel, in units of the noise."""
-    if not contenders:
+    if not fitted_candidates:
         return ()
-    best = contenders[0]
-    behind = np.array([max(contender.standing.chosen_by - best.standing.chosen_by, 0.0) for contender in contenders])
-    refines = np.array([contender is not best and only_refines(contender, best) for contender in contenders])
+    best = fitted_candidates[0]
+    behind = np.array(
+        [max(candidate.score.mean_log_error - best.score.mean_log_error, 0.0) for candidate in fitted_candidates]
+    )
+    refines = np.array([candidate is not best and only_refines(candidate, best) for candidate in fitted_candidates])
     weights = np.where(refines, 0.0, np.exp(-behind / PROBABILITY_SCALE))
     return tuple((1 - elsewhere(left)) * float(weight) for weight in weights / weights.sum())
 
 
 def elsewhere(left: float) -> float:
-    """The probability that no contender is right, though none in the catalogue is better."""
+    """The probability that no candidate is right, though none in the catalogue is better."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from analysis.diagnosis.data.noise_floor import NoiseFloor
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.findings import Course
 from equalizer.signals.signal import FloatArray
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from scipy.signal import welch
 
-from analysis.diagnosis.errors.missing_force import missing_force
 from analysis.diagnosis.errors.unexplained_motion import EXPECTED
+from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.result.signature_bins import binned, binned_law, running_rms
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.named_effects import axis_of, reported_numbers, said_of
-from analysis.diagnosis.search.held_out_gain import held_out_gain
-from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.search.search import Unconfirmed
+from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -47,7 +47,7 @@ def _gain_of(box: BlackBox | None) -> float:
 
 
 def with_gains(
-    effects: Sequence[NamedEffect], measure: ErrorMeasure, stages: Sequence[Contender]
+    effects: Sequence[NamedEffect], measure: ErrorMeasure, stages: Sequence[FittedCandidate]
 ) -> tuple[NamedEffect, ...]:
     """stages: with the sealed samples, the re-tuned model and what stood after each effect."""
     named = []

@@ -7,27 +7,74 @@ import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together
 from analysis.diagnosis.errors.output_error import Fitted, evaluated, gather_evidence
-from analysis.diagnosis.search.brief import brief_of
-from analysis.diagnosis.search.by_brief import fits_by_brief
-from analysis.diagnosis.search.candidates import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
-from analysis.diagnosis.search.contest import contest, refine
-from analysis.diagnosis.search.families import excludes
-from analysis.diagnosis.search.no_answer import silences
-from analysis.diagnosis.search.parsimony import plainest_first
-from analysis.diagnosis.search.patience import OutOfPatienceError, always, impatient
-from analysis.diagnosis.search.rivalry import SCREENING, STARTING, Arena, Contender, first_fits, sensitivity_at
+from analysis.diagnosis.search.compare_candidates import compare_candidates, refine
+from analysis.diagnosis.search.no_prediction import predicts_nothing
+from analysis.diagnosis.search.parsimony import excludes, plainest_first
 from analysis.diagnosis.search.same_within_errors import excess
-from analysis.diagnosis.search.screening import screen
-from analysis.diagnosis.settings import ADDED_GAIN, ADDED_SHARE, MOST_EFFECTS, NOISE_ALONE, SEALED_SURPRISE, SEARCH_ON
-from analysis.diagnosis.types import Patience, Progress
+from analysis.diagnosis.search.screening import Screened, screen
+from analysis.diagnosis.search.search_context import (
+    FITTING,
+    SCREENING,
+    STARTING,
+    FittedCandidate,
+    SearchContext,
+    first_fits,
+    sensitivity_at,
+)
+from analysis.diagnosis.search.short_recordings import ShortRecordings, short_recordings_of
+from analysis.diagnosis.search.starting_hypotheses import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
+from analysis.diagnosis.search.time_budget import OutOfTimeError, always, budgeted
+from analysis.diagnosis.settings import (
+    ADDED_GAIN,
+    ADDED_SHARE,
+    MOST_EFFECTS,
+    NOISE_ALONE,
+    SEALED_SURPRISE,
+    SEARCH_ON,
+    WORTH_FITTING,
+)
+from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 
+def fits_on_short_recordings(
+    context: SearchContext,
+    short_form: ShortRecordings,
+    base: Fitted,
+    timeless: Sequence[Hypothesis],
+    timed: Sequence[Hypothesis],
+) -> list[Fitted]:
+    """On all samples, the best first. timed: what hangs on when a sample was taken, which the brief cannot judge."""
+    short, guard = short_form.context, context.guard
+    there = evaluated(short.measure, short.tuning, base.deviations, base.hypothesis)
+    known = sensitivity_at(short, base.deviations, base.hypothesis)
+    screened = screen(short.measure, short.tuning, there, known, timeless, guard.over(short.map_, SCREENING))
+
+    def whole(fitted: Fitted) -> Fitted:
+        return evaluated(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+
+    each = guard.over(context.map_, FITTING)
+    fits: list[Fitted] = list(each(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
+    if timed:
+        # What the model's own numbers do repeats all the same.
+        repeats = short_form.repeated(known)
+        screened = screen(context.measure, context.tuning, base, repeats, timed, guard.over(context.map_, SCREENING))
+        fits += first_fits(context, base, repeats, _promising(base, fits, screened))
+    # A law that the brief leaves open may run away on the whole.
+    return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
+
+
+def _promising(base: Fitted, fits: Sequence[Fitted], screened: Sequence[Screened]) -> list[Screened]:
+    """Those that foresee as much of the best gain so far as a first fit asks for."""
+    best = max((base.cost - law.cost for law in fits), default=0.0)
+    return [law for law in screened if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Statistic:
-    """What contenders were compared by where waveforms cannot be predicted: a statistic of the response."""
+    """What fitted_candidates were compared by where waveforms cannot be predicted: a statistic of the response."""
 
     words: str
     chance: FloatArray
@@ -38,20 +85,20 @@ class Statistic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
-    before: Contender
+    before: FittedCandidate
     """The model as given,"""
-    retuned: Contender
+    retuned: FittedCandidate
     """re-tuned within its tolerances,"""
-    after: Contender
+    after: FittedCandidate
     """and with what was found; the same as re-tuned where nothing was."""
-    rounds: tuple[tuple[Contender, ...], ...]
-    """The contenders for the first effect, the second, …; the best first. The last may have brought nothing."""
-    steps: tuple[Contender, ...]
+    rounds: tuple[tuple[FittedCandidate, ...], ...]
+    """The fitted_candidates for the first effect, the second, …; the best first. The last may have brought nothing."""
+    steps: tuple[FittedCandidate, ...]
     """What stood after each effect that was added."""
     statistic: Statistic | None = None
     """None where samples were compared, in units of their noise."""
     ended_early: bool = False
-    """Patience ran out before the search was done."""
+    """TimeBudget ran out before the search was done."""
     barred: str = ""
     """An effect that was not to be named, where nothing but refinements of it explains as much."""
     undetermined: tuple[str, ...] = ()
@@ -64,61 +111,64 @@ class Explanation:
         return {"before": self.before.fitted, "retuned": self.retuned.fitted, "after": self.after.fitted}
 
 
-def explain(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Explanation:
-    """patient: asked before each piece of the search for effects; once it says no, what was found until then stands."""
-    before = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
+def explain(
+    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget = always
+) -> Explanation:
+    """time_left: asked before each piece of the search for effects; what was found when it says no is kept."""
+    before = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
-    retuned = _retuned_from(arena, before)
-    base = arena.contender(retuned)
-    confirmed = arena.confirmed(base)
-    surprised = bool(np.nanmax(confirmed.standing.test, initial=0.0) > SEALED_SURPRISE)
-    rounds: list[tuple[Contender, ...]] = []
-    steps: list[Contender] = []
-    barred = ""
-    hasty, ended_early = replace(arena, map_=impatient(arena.map_, patient)), False
-    for certain in arena.certain:
-        base = _with(arena, base, certain)
+    retuned = _retuned_from(context, before)
+    base = context.candidate(retuned)
+    confirmed = context.confirmed(base)
+    surprised = context.sound is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > SEALED_SURPRISE)
+    rounds: list[tuple[FittedCandidate, ...]] = []
+    steps: list[FittedCandidate] = []
+    barred, ended_early = "", False
+    within_time = replace(context, map_=budgeted(context.map_, time_left))
+    for certain in context.certain:
+        base = _with(context, base, certain)
         rounds.append((base,))
         steps.append(base)
-    surprised |= arena.sound is not None
-    more = SEARCH_ON * (1.0 if arena.sound is None else arena.sound.beyond)
+    more = SEARCH_ON * (1.0 if context.sound is None else context.sound.beyond)
     while (
-        not arena.certain
+        not context.certain
         and len(rounds) < MOST_EFFECTS
-        and (base.standing.seen > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
+        and (base.score.worst_channel > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
     ):
         step = Step(f"looking for the {_COUNTED[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
-            contenders = _next(hasty, catalogue, base.fitted, step)
-        except OutOfPatienceError:
+            tried = _next(within_time, catalogue, base.fitted, step)
+        except OutOfTimeError:
             ended_early = True
             break
-        named = tuple(contender for contender in contenders if contender.newest not in arena.barred)
+        named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
         rounds.append(named)
-        if not named or not worthwhile(base, named[0]):
-            break
-        if named[0] is not contenders[0]:
-            barred = contenders[0].newest
+        if not named or not worthwhile(base, named[0]) or named[0] is not tried[0]:
+            barred = tried[0].newest if named and worthwhile(base, named[0]) else ""
             break
         base = named[0]
         steps.append(base)
-    ends = (arena.confirmed(arena.contender(before)), confirmed, arena.confirmed(base))
+    ends = (context.confirmed(context.candidate(before)), confirmed, context.confirmed(base))
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
 
 
-def _with(arena: Arena, base: Contender, hypothesis: Hypothesis) -> Contender:
+def _with(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
     """With a hypothesis that is certain, whether or not it lowers the error."""
-    start = evaluated(arena.measure, arena.tuning, base.fitted.deviations, together(base.fitted.hypothesis, hypothesis))
-    return arena.contender(refine(arena, start))
+    start = evaluated(
+        context.measure, context.tuning, base.fitted.deviations, together(base.fitted.hypothesis, hypothesis)
+    )
+    return context.candidate(refine(context, start))
 
 
-def retuned_alone(arena: Arena) -> Fitted:
+def retuned_alone(context: SearchContext) -> Fitted:
     """The model re-tuned, without any added effect."""
-    return _retuned_from(arena, evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
+    return _retuned_from(
+        context, evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    )
 
 
-def _retuned_from(arena: Arena, before: Fitted) -> Fitted:
-    return refine(arena, before)
+def _retuned_from(context: SearchContext, before: Fitted) -> Fitted:
+    return refine(context, before)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,53 +183,55 @@ class Step:
         self.progress(self.what, self.begun + 0.3 * share)
 
 
-def _next(arena: Arena, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[Contender, ...]:
+def _next(context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step) -> tuple[FittedCandidate, ...]:
     step.at(0.0)
-    evidence = gather_evidence(arena.measure, arena.tuning, base)[0]
-    told = [effect for effect in catalogue if arena.measure.tells(effect)]
-    brief = brief_of(arena, base.hypothesis)
-    if brief is None:
-        suggested = _suggested(arena, base.hypothesis, told, evidence)
-        known = sensitivity_at(arena, base.deviations, base.hypothesis)
+    evidence = gather_evidence(context.measure, context.tuning, base)[0]
+    told = [effect for effect in catalogue if context.measure.can_observe(effect)]
+    short_form = short_recordings_of(context, base.hypothesis)
+    if short_form is None:
+        suggested = _suggested(context, base.hypothesis, told, evidence)
+        known = sensitivity_at(context, base.deviations, base.hypothesis)
         step.at(0.2)
-        each = arena.guard.over(arena.map_, SCREENING)
-        screened = screen(arena.measure, arena.tuning, base, known, suggested, each)
-        fits = first_fits(arena, base, known, screened)
+        each = context.guard.over(context.map_, SCREENING)
+        screened = screen(context.measure, context.tuning, base, known, suggested, each)
+        fits = first_fits(context, base, known, screened)
     else:
         timeless = _suggested(
-            arena, base.hypothesis, [effect for effect in told if not effect.of_time], brief.of(evidence)
+            context, base.hypothesis, [effect for effect in told if not effect.of_time], short_form.of(evidence)
         )
-        timed = _suggested(arena, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
+        timed = _suggested(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
         step.at(0.2)
-        fits = fits_by_brief(arena, brief, base, timeless, timed)
+        fits = fits_on_short_recordings(context, short_form, base, timeless, timed)
     step.at(0.6)
-    contenders = contest(arena, base, fits)
+    fitted_candidates = compare_candidates(context, base, fits)
     return plainest_first(
         [
-            contender
-            for contender in contenders
-            if not silences(arena.measure, base, contender.fitted)
-            and within_data(contender.fitted.hypothesis, evidence)
+            candidate
+            for candidate in fitted_candidates
+            if not predicts_nothing(context.measure, base, candidate.fitted)
+            and within_data(candidate.fitted.hypothesis, evidence)
         ]
     )
 
 
-def _suggested(arena: Arena, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
+def _suggested(
+    context: SearchContext, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
+) -> list[Hypothesis]:
     suggested = [
         hypothesis
-        for hypothesis in candidates(catalogue, evidence, arena.guard.over(arena.map_, STARTING))
+        for hypothesis in candidates(catalogue, evidence, context.guard.over(context.map_, STARTING))
         if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
     ]
-    if arena.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
-        suggested += arena.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
+    if context.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
+        suggested += context.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
     return suggested
 
 
-def worthwhile(base: Contender, better: Contender) -> bool:
+def worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
     """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
     the mean over channels, its logarithm must fall by half."""
-    gained, over = base.standing.chosen_by - better.standing.chosen_by, np.log(base.standing.seen)
-    if excess(base) == 0 and over > np.log(NOISE_ALONE) and np.log(better.standing.seen) > over / 2:
+    gained, over = base.score.mean_log_error - better.score.mean_log_error, np.log(base.score.worst_channel)
+    if excess(base) == 0 and over > np.log(NOISE_ALONE) and np.log(better.score.worst_channel) > over / 2:
         return False
     return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.search.patience import OutOfPatienceError
+from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.types import Mapper
 from analysis.wording import capital, listed
 from equalizer.effects.effect import Effect
@@ -53,7 +53,7 @@ class Guard:
     def _tried(self, what: str, doing: str, work: Callable[[], Result]) -> tuple[Result, ...]:
         try:
             return (work(),)
-        except OutOfPatienceError:
+        except OutOfTimeError:
             raise
         except Exception as crash:  # noqa: BLE001 - whatever it is, the rest of the search can go on
             self.crashes.append(Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": .")))

@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.channel_noise import ChannelNoise
-from analysis.diagnosis.data.noise_floor import NoiseFloor
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.band_power_fit import Foreseen, View, fitted, foreseen
+from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
 from analysis.diagnosis.errors.shaken_axis import shaken_along
-from analysis.diagnosis.errors.standing import Standing
+from analysis.diagnosis.noise.channel_noise import ChannelNoise
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.explain import Explanation, Statistic
-from analysis.diagnosis.search.rivalry import Arena, Contender
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import (
     IMPACTS_AS_GOOD,
     IMPACTS_CALM_SPREAD,
@@ -43,18 +43,18 @@ RIVAL = "loose_joint"
 
 
 def rattling(
-    arena: Arena, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
+    context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
 ) -> Explanation | None:
     """None where the response is regular, or where play does not explain it."""
     effects = {effect.name: effect for effect in catalogue}
-    if "backlash" not in effects or not isinstance(arena.whole, FreeSimulation):
+    if "backlash" not in effects or not isinstance(context.whole, FreeSimulation):
         return None
-    if not irregular(arena, found, floors):
+    if not irregular(context, found, floors):
         return None
-    given = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
-    evidence = gather_evidence(arena.measure, arena.tuning, given)[0]
-    view = View(BandPower(arena.measure), arena.tuning, arena.map_)
-    claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(arena.tuning.model.inputs)]
+    given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    evidence = gather_evidence(context.measure, context.tuning, given)[0]
+    view = View(BandPower(context.measure), context.tuning, context.map_)
+    claims = [Claim(effects["backlash"], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
     places = sorted((_at(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
     if places[0].cost >= foreseen(view, given.deviations, NOTHING).cost:
         return None
@@ -63,7 +63,7 @@ def rattling(
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_at(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    return _judged(arena, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
+    return _judged(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
 
 
 def _at(view: View, evidence: Evidence, claim: Claim) -> Foreseen:
@@ -112,67 +112,69 @@ def _apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Comparison:
-    """Compares contenders by band power on all samples, the sealed ones included."""
+    """Compares fitted_candidates by band power on all samples, the sealed ones included."""
 
-    arena: Arena
+    context: SearchContext
     power: BandPower
     chance: FloatArray
     """(c,)"""
 
-    def stands(self, deviations: FloatArray, hypothesis: Hypothesis) -> Contender:
-        whole = evaluated(self.arena.whole, self.arena.tuning, deviations, hypothesis)
+    def stands(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
+        whole = evaluated(self.context.whole, self.context.tuning, deviations, hypothesis)
         off = self.power.misfits(self.power.measured - self.power.predicted(whole.residuals))
-        return Contender(whole, Standing(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
+        return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
 
     def _times(self, off: FloatArray) -> FloatArray:
         """Misfit over chance; 1 for a channel whose bands are all below the noise."""
         return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
 
 
-def _judged(arena: Arena, found: Explanation, best: Foreseen, others: Sequence[Hypothesis]) -> Explanation | None:
-    comparison = _comparison(arena, best)
+def _judged(
+    context: SearchContext, found: Explanation, best: Foreseen, others: Sequence[Hypothesis]
+) -> Explanation | None:
+    comparison = _comparison(context, best)
     named = comparison.stands(best.deviations, best.hypothesis)
     given = np.zeros_like(best.deviations)
     before = comparison.stands(given, NOTHING)
     linear = [before, *(comparison.stands(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
-    retuned = min(linear, key=lambda contender: contender.standing.chosen_by)
+    retuned = min(linear, key=lambda candidate: candidate.score.mean_log_error)
     rivals = [comparison.stands(given, rival) for rival in others]
     earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
     rivals += [
-        comparison.stands(contender.fitted.deviations, contender.fitted.hypothesis)
-        for contender in earlier
-        if contender.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
+        comparison.stands(candidate.fitted.deviations, candidate.fitted.hypothesis)
+        for candidate in earlier
+        if candidate.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
     ]
-    rivals.sort(key=lambda rival: rival.standing.chosen_by)
+    rivals.sort(key=lambda rival: rival.score.mean_log_error)
     if not _convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, comparison.chance, best.errors)
     return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
 
 
-def _comparison(arena: Arena, best: Foreseen) -> _Comparison:
-    power, model = BandPower(arena.whole), arena.tuning.tuned(best.deviations)
+def _comparison(context: SearchContext, best: Foreseen) -> _Comparison:
+    power, model = BandPower(context.whole), context.tuning.tuned(best.deviations)
 
     def course(number: int) -> FloatArray:
-        return power.predicted(arena.whole.residuals(model, _apart(best.hypothesis, number).placed()))
+        return power.predicted(context.whole.residuals(model, _apart(best.hypothesis, number).placed()))
 
-    first, other = (np.asarray(each) for each in arena.map_(course, range(2)))
+    first, other = (np.asarray(each) for each in context.map_(course, range(2)))
     apart = power.misfits(first - other)
     chance = np.fmax(np.fmax(apart.fit, apart.choose), apart.test)
-    return _Comparison(arena, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
+    return _Comparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
 
-def _convincing(named: Contender, retuned: Contender) -> bool:
+def _convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
     pairs = [
-        (getattr(retuned.standing, part), getattr(named.standing, part))
+        (getattr(retuned.score, part), getattr(named.score, part))
         for part in ("choose", "test")
-        if np.isfinite(getattr(named.standing, part)).any()
+        if np.isfinite(getattr(named.score, part)).any()
     ]
     return all(_whole(left) <= (1 - IMPACTS_SHARE) * _whole(of) and _whole(left) <= IMPACTS_ERROR for of, left in pairs)
 
 
-def _as_good(rival: Contender, named: Contender) -> bool:
-    ways = [(getattr(contender.standing, part) for contender in (rival, named)) for part in ("choose", "test")]
+def _as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
+    ways = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
     return all(_whole(other) <= IMPACTS_AS_GOOD * _whole(own) for other, own in ways if np.isfinite(other).any())
 
 
@@ -182,10 +184,10 @@ def _whole(times: FloatArray) -> float:
 
 
 # A response is irregular where repeats differ by far more than the noise or, without repeats, its residual is peaked.
-def irregular(arena: Arena, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
+def irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
     if any(floor.how == "repeats" for floor in floors):
         return any(_varies(channel) for floor in floors for channel in (floor.response, floor.position) if channel)
-    masks = [record.fit | record.choose for record in arena.whole.records]
+    masks = [record.fit | record.choose for record in context.whole.records]
     left = np.vstack([row[mask] for row, mask in zip(found.retuned.fitted.residuals, masks, strict=True)])
     if not len(left):
         return False

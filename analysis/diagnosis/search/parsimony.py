@@ -2,52 +2,80 @@
 
 from collections.abc import Sequence
 
-from analysis.diagnosis.search.families import DRY_FRICTION
-from analysis.diagnosis.search.rivalry import Contender
+from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import REFINED_FRICTION_SHARE, REFINED_GAIN, REFINED_MOST_GAIN, REFINED_SHARE
 
+DRY_FRICTION = frozenset(
+    {
+        "coulomb_friction",
+        "asymmetric_friction",
+        "stribeck_friction",
+        "presliding_hysteresis",
+        "position_dependent_friction",
+    }
+)
 
-def plainest_first(contenders: Sequence[Contender]) -> tuple[Contender, ...]:
-    """contenders: by their errors, the best first. The same, with the preferred contender moved to the front."""
-    if not contenders:
+FAMILIES: tuple[frozenset[str], ...] = (
+    DRY_FRICTION,
+    frozenset({"amplifier_lag", "transport_delay"}),
+    frozenset({"clock_drift", "logger_offset"}),
+    frozenset({"sensor_misalignment", "cross_axis_sensitivity"}),
+    frozenset({"sensor_offset", "sensor_drift"}),
+    frozenset({"added_mass", "hand_impedance", "body_on_actuator"}),
+    frozenset({"backlash", "loose_joint"}),
+)
+
+
+def excludes(held: Claim, other: Claim) -> bool:
+    """Whether `other` cannot be added beside a claim that is part of the explanation."""
+    if not set(held.sites) & set(other.sites):
+        return False
+    names = {held.effect.name, other.effect.name}
+    return len(names) == 1 or any(names <= family for family in FAMILIES)
+
+
+def plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
+    """fitted_candidates: by their errors, the best first. The same, with the preferred candidate moved to the front."""
+    if not fitted_candidates:
         return ()
-    chosen = contenders[0]
-    for other in contenders[1:]:
+    chosen = fitted_candidates[0]
+    for other in fitted_candidates[1:]:
         if _is_plainer(other, chosen) and _good_enough(other, chosen):
             chosen = other
-    return (chosen, *(contender for contender in contenders if contender is not chosen))
+    return (chosen, *(candidate for candidate in fitted_candidates if candidate is not chosen))
 
 
-def _is_plainer(plain: Contender, other: Contender) -> bool:
+def _is_plainer(plain: FittedCandidate, other: FittedCandidate) -> bool:
     return only_refines(other, plain) or (_price(plain) < _price(other) and not only_refines(plain, other))
 
 
-def _price(contender: Contender) -> float:
+def _price(candidate: FittedCandidate) -> float:
     """Akaike's information criterion (1974): two per number, and the squared deviations from the calibration."""
-    deviations = contender.fitted.deviations
-    return 2.0 * len(contender.fitted.hypothesis.point) + float(deviations @ deviations)
+    deviations = candidate.fitted.deviations
+    return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
 
 
-def only_refines(other: Contender, plain: Contender) -> bool:
+def only_refines(other: FittedCandidate, plain: FittedCandidate) -> bool:
     """Whether the other's last effect contains the plain one's as a special case, at the same place."""
     return _contained(plain, other)
 
 
-def both_stand(named: Contender, other: Contender) -> bool:
-    """Whether the other is inseparable from the named contender, and no refinement of it."""
+def both_stand(named: FittedCandidate, other: FittedCandidate) -> bool:
+    """Whether the other is inseparable from the named candidate, and no refinement of it."""
     return inseparable(named, other) and not only_refines(other, named)
 
 
-def _contained(contender: Contender, other: Contender) -> bool:
-    plain, refined = contender.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
+def _contained(candidate: FittedCandidate, other: FittedCandidate) -> bool:
+    plain, refined = candidate.fitted.hypothesis.claims[-1], other.fitted.hypothesis.claims[-1]
     return plain.effect.name in refined.effect.simpler and set(plain.sites) <= set(refined.sites)
 
 
-def _good_enough(plain: Contender, refined: Contender) -> bool:
+def _good_enough(plain: FittedCandidate, refined: FittedCandidate) -> bool:
     if not _contained(plain, refined):
         return inseparable(refined, plain)
-    gained = plain.standing.chosen_by - refined.standing.chosen_by
+    gained = plain.score.mean_log_error - refined.score.mean_log_error
     rubs = plain.newest in DRY_FRICTION
     share = REFINED_FRICTION_SHARE if rubs else REFINED_SHARE
     return gained <= max(REFINED_GAIN, min(share * excess(plain), REFINED_MOST_GAIN))

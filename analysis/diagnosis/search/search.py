@@ -7,16 +7,47 @@ import numpy as np
 
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.search.explain import Explanation, explain
-from analysis.diagnosis.search.no_answer import foresees_nothing
-from analysis.diagnosis.search.patience import OUT_OF_TIME, always
-from analysis.diagnosis.search.prune import pruned
-from analysis.diagnosis.search.rivalry import Arena
-from analysis.diagnosis.search.verdict import Judgement, judge
-from analysis.diagnosis.settings import SEALED_ALONE_ERROR, SEALED_ALONE_TIMES
-from analysis.diagnosis.types import Patience, Progress
+from analysis.diagnosis.search.explain import Explanation, explain, worthwhile
+from analysis.diagnosis.search.identifiability import identified
+from analysis.diagnosis.search.no_prediction import is_without_prediction
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
+from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge, shares_taken, worth_naming
+from analysis.diagnosis.search.without_effect import without_effect
+from analysis.diagnosis.settings import LAST_EFFECT_SHARE, SEALED_ALONE_ERROR, SEALED_ALONE_TIMES
+from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
+
+
+def pruned(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+    """Backward elimination: effects that forward selection added and that are not needed are removed."""
+    if found.statistic is not None or context.certain:
+        return found
+    if len(found.steps) == 2 and time_left():
+        found = _without_former(context, found)
+    if context.sound is None:
+        found = _without_little(context, found)
+    return identified(context, found, time_left)
+
+
+def _without_former(context: SearchContext, found: Explanation) -> Explanation:
+    """Of two effects, the later alone where it does as well: the earlier may have stood in for it."""
+    alone = without_effect(context, found, 0)
+    kept = worthwhile(alone.steps[-1], found.steps[-1]) or not np.isfinite(alone.steps[-1].fitted.cost)
+    return found if kept else alone
+
+
+def _without_little(context: SearchContext, found: Explanation) -> Explanation:
+    while len(found.steps) > 1 and not as_good_as_noise(found):
+        if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
+            break
+        fewer = without_effect(context, found, len(found.steps) - 1)
+        if not worth_naming(fewer):
+            break
+        found = fewer
+    return found
+
 
 OPENED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
@@ -43,7 +74,7 @@ class Unconfirmed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
-    arena: Arena
+    context: SearchContext
     """With the samples as they were used in the end."""
     found: Explanation
     judged: Judgement
@@ -54,24 +85,26 @@ class Searched:
     """The largest gain first."""
 
 
-def searched(arena: Arena, catalogue: Sequence[Effect], progress: Progress, patient: Patience = always) -> Searched:
-    found = _pruned(arena, explain(arena, catalogue, progress, patient), patient)
-    judged = _judged(arena, found)
+def searched(
+    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget = always
+) -> Searched:
+    found = _pruned(context, explain(context, catalogue, progress, time_left), time_left)
+    judged = _judged(context, found)
     if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
-        return Searched(arena, found, judged, _remarks(found))
-    half = arena.half_opened()
-    again = _pruned(half, explain(half, catalogue, progress, patient), patient)
+        return Searched(context, found, judged, _remarks(found))
+    half = context.half_opened()
+    again = _pruned(half, explain(half, catalogue, progress, time_left), time_left)
     second = _judged(half, again)
     if second.named:
         return Searched(half, again, second, (OPENED, *_remarks(again)))
-    return Searched(arena, found, replace(judged, verdict="unexplained"), (NOT_SHOWN, *_remarks(found)))
+    return Searched(context, found, replace(judged, verdict="unexplained"), (NOT_SHOWN, *_remarks(found)))
 
 
-def _pruned(arena: Arena, found: Explanation, patient: Patience) -> Explanation:
+def _pruned(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """Nothing is named whose last look crashes."""
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
-    return arena.guard.part(newest, "its last look", lambda: pruned(arena, found, patient), nothing)
+    return context.guard.part(newest, "its last look", lambda: pruned(context, found, time_left), nothing)
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:
@@ -87,13 +120,13 @@ def _left_open(names: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-def _judged(arena: Arena, found: Explanation) -> Judgement:
+def _judged(context: SearchContext, found: Explanation) -> Judgement:
     judged = judge(found)
-    if judged.named and foresees_nothing(arena.whole, found.after):
+    if judged.named and is_without_prediction(context.whole, found.after):
         return Judgement("unexplained", False)
     return judged
 
 
 def _sealed_alone(found: Explanation) -> bool:
-    shown = float(np.nanmax(found.retuned.standing.test, initial=0.0))
-    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * found.retuned.standing.seen
+    shown = float(np.nanmax(found.retuned.score.test, initial=0.0))
+    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * found.retuned.score.worst_channel

@@ -8,8 +8,8 @@ import numpy as np
 
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.search.same_within_errors import excess
+from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import (
     CONFIRMED_SHARE,
     CONVINCING_ERROR,
@@ -35,19 +35,21 @@ class Judgement:
 def judge(found: Explanation) -> Judgement:
     """By the samples to fit and to choose by; the sealed ones can only withdraw a name, or `explained`."""
     if not found.after.fitted.hypothesis.claims or not _confirmed(found):
-        if found.before.standing.seen <= NOISE_ALONE:
+        if found.before.score.worst_channel <= NOISE_ALONE:
             return Judgement("no_mismatch", False)
-        return Judgement("parameters" if found.retuned.standing.seen <= NOISE_ALONE else "unexplained", False)
+        return Judgement("parameters" if found.retuned.score.worst_channel <= NOISE_ALONE else "unexplained", False)
     if found.statistic is not None:
-        return Judgement("explained" if found.after.standing.seen <= EXPLAINED_BY_CHANCE else "partly_explained", True)
-    if as_good_as_noise(found) and not np.nanmax(found.after.standing.test, initial=0.0) > HELD_OUT_ERROR:
+        return Judgement(
+            "explained" if found.after.score.worst_channel <= EXPLAINED_BY_CHANCE else "partly_explained", True
+        )
+    if as_good_as_noise(found) and not np.nanmax(found.after.score.test, initial=0.0) > HELD_OUT_ERROR:
         return Judgement("explained", True)
     return Judgement("partly_explained", True) if worth_naming(found) else Judgement("unexplained", False)
 
 
 def as_good_as_noise(found: Explanation) -> bool:
     """On the samples to fit and to choose by."""
-    worst = found.after.standing.seen
+    worst = found.after.score.worst_channel
     if worst <= EXPLAINED_ERROR:
         return True
     return worst <= CONVINCING_ERROR and share_of_mismatch(found.retuned, found.after) >= CONVINCING_SHARE
@@ -55,27 +57,27 @@ def as_good_as_noise(found: Explanation) -> bool:
 
 def worth_naming(found: Explanation) -> bool:
     """Beside a remainder; on the samples to fit and to choose by."""
-    taken = found.retuned.standing.chosen_by - found.after.standing.chosen_by
+    taken = found.retuned.score.mean_log_error - found.after.score.mean_log_error
     share = share_of_mismatch(found.retuned, found.after)
-    return found.after.standing.seen <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
+    return found.after.score.worst_channel <= NAMED_ERROR or share >= NAMED_SHARE or taken >= NAMED_GAIN
 
 
 def _confirmed(found: Explanation) -> bool:
     """Whether the sealed samples confirm the explanation; yes where nothing was sealed."""
-    without, with_it = (np.log(contender.standing.test) for contender in (found.retuned, found.after))
+    without, with_it = (np.log(candidate.score.test) for candidate in (found.retuned, found.after))
     whole, left = float(np.mean(without)), float(np.mean(with_it))
     if not np.isfinite(whole):
         return True
     return whole <= SEALED_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole
 
 
-def share_of_mismatch(without: Contender, with_it: Contender) -> float:
+def share_of_mismatch(without: FittedCandidate, with_it: FittedCandidate) -> float:
     """Between 0 and 1: how far the errors came down from where they were to the noise, in logarithms of power."""
     whole = excess(without)
     return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
 
 
-def shares_taken(without: Contender, steps: Sequence[Contender]) -> tuple[float, ...]:
+def shares_taken(without: FittedCandidate, steps: Sequence[FittedCandidate]) -> tuple[float, ...]:
     """Share of the mismatch of the re-tuned model that each step removed; their sum is at most 1."""
     left = [0.0, *(share_of_mismatch(without, step) for step in steps)]
     return tuple(max(after - before, 0.0) for before, after in pairwise(left))

@@ -104,7 +104,7 @@ def engine_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def _patience(processor_s: float | None) -> Callable[[], bool]:
+def _time_budget(processor_s: float | None) -> Callable[[], bool]:
     """Of processor time: what else the machine does at the time changes no answer."""
     begun = time.process_time()
     return lambda: processor_s is None or time.process_time() - begun < processor_s
@@ -120,7 +120,7 @@ def _diagnosed(place: Path) -> dict[str, Any]:
     recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
     clean = tuple(read_recording(path) for path in sorted(place.glob(f"{CLEAN}/*.h5")))
     settings = DiagnosisSettings(
-        without=tuple(asked["without"]), clean=clean, patient=_patience(asked.get("processor_s"))
+        without=tuple(asked["without"]), clean=clean, time_left=_time_budget(asked.get("processor_s"))
     )
     found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
     errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}

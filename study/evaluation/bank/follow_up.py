@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.diagnosis.result.experiment_menu import Experiment, experiment_menu
+from analysis.diagnosis.next_experiment.experiment_menu import Experiment, experiment_menu
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256

@@ -6,20 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.balance.plain_form import plain_form
 from analysis.diagnosis.balance.weigh import Balance
-from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of, require_something
 from analysis.diagnosis.data.command_gaps import across_gaps
 from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of, require_something
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.played_errors import PlayedError, played_error
-from analysis.diagnosis.result.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
+from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.learn_clean_floor import NothingLearned
 from analysis.diagnosis.settings import EXPLAINED_ERROR
-from analysis.diagnosis.types import Patience, Progress
+from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
@@ -60,17 +60,17 @@ def crashed(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
     return RealDiagnosis(_refused(wanted, broken), None, wanted.parents)
 
 
-def diagnose_real(wanted: RealRecording, patient: Patience, guard: Guard, on_progress: Progress) -> RealDiagnosis:
+def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress) -> RealDiagnosis:
     """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
     parents = wanted.parents
     try:
-        read = _read(wanted, patient, on_progress)
+        read = _read(wanted, time_left, on_progress)
         settings = DiagnosisSettings(
             names=(wanted.name,),
             clean=() if read.before is None else (read.before,),
             fitted=wanted.model() is None,
             balances=read.balances,
-            patient=patient,
+            time_left=time_left,
             guard=guard,
         )
         with worker_threads() as threads:
@@ -112,7 +112,7 @@ def imported(found: FoundMap) -> Recording:
     return all_force_driven([recording])[0]
 
 
-def _read(wanted: RealRecording, patient: Patience, on_progress: Progress) -> _Read:
+def _read(wanted: RealRecording, time_left: TimeBudget, on_progress: Progress) -> _Read:
     """Raises StudyError where there is nothing to diagnose."""
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
@@ -127,7 +127,7 @@ def _read(wanted: RealRecording, patient: Patience, on_progress: Progress) -> _R
             raise nothing_to_diagnose(refusal.problems) from refusal
         remarks = tuple(f"{problem}." for problem in refusal.problems)
     before = None if wanted.before is None else imported(wanted.before)
-    first = _model(wanted, recording, patient, on_progress)
+    first = _model(wanted, recording, time_left, on_progress)
     return _Read(recording, first.model, first.balances, (*formed, *gaps, *remarks, *first.remarks), before)
 
 
@@ -139,13 +139,13 @@ def _formed(wanted: RealRecording, recording: Recording) -> tuple[tuple[Recordin
     return all_force_driven(formed), said
 
 
-def _model(wanted: RealRecording, recording: Recording, patient: Patience, on_progress: Progress) -> FirstModel:
+def _model(wanted: RealRecording, recording: Recording, time_left: TimeBudget, on_progress: Progress) -> FirstModel:
     given = wanted.model()
     if given is None:
         alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
         if wanted.before is not None:
             return FirstModel(*fitted_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share)))
-        return first_model_of(alone, (), patient, lambda what, share: on_progress(what, 0.1 * share))
+        return first_model_of(alone, (), time_left, lambda what, share: on_progress(what, 0.1 * share))
     try:
         require_model_of(given, (recording,))
     except NothingToDiagnose as refusal:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
 from study.store.disk.provenance import Provenance, gather_provenance

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 
-from analysis.diagnosis.result.real_answer import RealAnswer
-from analysis.diagnosis.search.patience import counted
-from analysis.diagnosis.types import Patience
+from analysis.diagnosis.real_answer.real_answer import RealAnswer
+from analysis.diagnosis.search.time_budget import counted
+from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import LeftError, StudyError, WrongUseError
@@ -149,8 +149,8 @@ def _answers(
 def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Progress, clock: Clock) -> RealAnswer:
     """budget_s: of processor time, that the search may take."""
     begun_s, worked, guard = clock.now_s(), process_time(), crash_guard()
-    timed: Patience = lambda: process_time() - worked < budget_s  # noqa: E731
-    patient = counted(EVALUATIONS) if plan.seconds is None else timed
+    timed: TimeBudget = lambda: process_time() - worked < budget_s  # noqa: E731
+    time_left = counted(EVALUATIONS) if plan.seconds is None else timed
 
     def kept(done: RealDiagnosis) -> RealAnswer:
         answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
@@ -158,7 +158,7 @@ def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Pr
         return answer
 
     try:
-        return kept(diagnose_real(one, patient, guard, on_progress))
+        return kept(diagnose_real(one, time_left, guard, on_progress))
     except StudyError:
         raise
     except Exception as crash:

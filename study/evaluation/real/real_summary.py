@@ -1,6 +1,6 @@
 """What is said of a folder of real recordings at the end, in lines."""
 
-from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import error_text
 from analysis.evaluation.proof.injected import injected_figures
 from analysis.reports.injected_section import figure_text

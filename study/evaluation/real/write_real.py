@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.diagnosis.result.real_answer import RealAnswer
+from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.evaluation.proof.injected import InjectedOutcome
 from analysis.figures.real_held_out import real_picture
 from analysis.reports.real_report import Trouble, render_real_report

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.result.real_answer import (
+from analysis.diagnosis.real_answer.real_answer import (
     FORMAT,
     VERSION,
     RealAnswer,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from analysis.diagnosis.data.belonging import NothingToDiagnose, require_alike
+from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike
 from study.errors import StudyError
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose, read_input, same_position
 

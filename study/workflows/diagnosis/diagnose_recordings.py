@@ -13,9 +13,9 @@ from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import Compared
+from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.types import Mapper, Patience, Progress
+from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
@@ -113,14 +113,14 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
         both = with_clean(found, plan.sources, plan.clean, plan.seed)
         found, clean = both.found, both.clean
     on_progress("reading", READ)
-    patient = _patience(plan)
-    first = _model(plan, found, clean, patient, on_progress)
+    time_left = _time_budget(plan)
+    first = _model(plan, found, clean, time_left, on_progress)
     # A model that was fitted to these recordings has the spring in it.
     spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
     held = with_spring(first.model, spring)
     begun = FITTED if plan.model is None else READ
     _check_compared(plan, found, held)
-    settings = _settings(plan, found, clean, patient, first.balances)
+    settings = _settings(plan, found, clean, time_left, first.balances)
     try:
         with worker_threads() as threads:
             findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
@@ -158,7 +158,7 @@ def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
     return DiagnosedRecordings(answer.findings, plan.out)
 
 
-def _patience(plan: DiagnosePlan) -> Patience:
+def _time_budget(plan: DiagnosePlan) -> TimeBudget:
     worked = process_time()
     return lambda: plan.seconds is None or process_time() - worked < plan.seconds
 
@@ -167,7 +167,7 @@ def _settings(
     plan: DiagnosePlan,
     found: DiagnosisInput,
     clean: DiagnosisInput | None,
-    patient: Patience,
+    time_left: TimeBudget,
     balances: tuple[Balance, ...] | None,
 ) -> DiagnosisSettings:
     return DiagnosisSettings(
@@ -179,7 +179,7 @@ def _settings(
         compared=plan.compare,
         kept=tuple(read_entry(path) for path in plan.effect_files),
         discovery=plan.discovery,
-        patient=patient,
+        time_left=time_left,
         guard=crash_guard(),
     )
 
@@ -213,7 +213,7 @@ def _model(
     plan: DiagnosePlan,
     found: DiagnosisInput,
     clean: DiagnosisInput | None,
-    patient: Patience,
+    time_left: TimeBudget,
     on_progress: Progress,
 ) -> FirstModel:
     within = _within(on_progress, READ, FITTED)
@@ -222,7 +222,7 @@ def _model(
     if found.simulated:
         return FirstModel(_twin(within), (TWIN_SAID,))
     if clean is None:
-        return first_model_of(found, plan.without, patient, within)
+        return first_model_of(found, plan.without, time_left, within)
     what = "fitting a linear model, as none was given"
     on_progress(what, READ)
     return FirstModel(*fitted_model(clean, lambda share: within(what, share), "the clean recordings"))

@@ -6,8 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.diagnosis.balance.plain_form import plain_form
-from analysis.diagnosis.data.belonging import (
+from analysis.diagnosis.data.command_gaps import across_gaps
+from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
+from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.data.found_segments import with_found_segments
+from analysis.diagnosis.data.input_checks import (
     FEW_CYCLES,
     NothingToDiagnose,
     require_alike,
@@ -15,10 +18,7 @@ from analysis.diagnosis.data.belonging import (
     require_model_of,
     require_something,
 )
-from analysis.diagnosis.data.command_gaps import across_gaps
-from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
-from analysis.diagnosis.data.force_driven import all_force_driven
-from analysis.diagnosis.data.found_segments import with_found_segments
+from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.wording import listed
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.balance.choose_structure import Choice, first_structure
-from analysis.diagnosis.balance.model_structures import KINDS, Kind, Number, StructureRefused
 from analysis.diagnosis.data.carried_weight import weighted
+from analysis.diagnosis.first_model.choose_structure import Choice, first_structure
+from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
 from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import nearest

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.balances import balances_of
-from analysis.diagnosis.balance.first_model import plain_model
-from analysis.diagnosis.balance.model_structures import StructureRefused, balanced, structure_of
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.carried_weight import weighted
 from analysis.diagnosis.data.measured_motion import time_unit
-from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
-from analysis.diagnosis.types import Patience, Progress
+from analysis.diagnosis.first_model.model_of_balance import plain_model
+from analysis.diagnosis.first_model.model_structures import StructureRefused, balanced, structure_of
+from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
 from equalizer.identification.mechanical.open_tolerance import opened
@@ -49,13 +49,13 @@ class FirstModel:
 
 
 def first_model_of(
-    found: DiagnosisInput, without: Sequence[str], patient: Patience, on_progress: Progress
+    found: DiagnosisInput, without: Sequence[str], time_left: TimeBudget, on_progress: Progress
 ) -> FirstModel:
     """From the force balance where that names laws along the motion of one body per command; else by a fit to spectra,
     which takes longer. Raises StudyError where the recordings do not carry one."""
     _require_no_weight(found)
     on_progress("weighing laws in the force balance", 0.0)
-    balances = balances_of(found.recordings, frozenset(without), patient)
+    balances = balances_of(found.recordings, frozenset(without), time_left)
     if any(time_unit(each) != "s" for each in found.recordings) and (still := _massless(found.recordings)) is not None:
         return FirstModel(still, (UNTIMED_SAID,), balances)
     model = plain_model(balances, found.recordings[0], "fitted to these recordings")

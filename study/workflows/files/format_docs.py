@@ -13,7 +13,7 @@ from typing import Any, get_type_hints
 from pydantic import TypeAdapter
 
 from analysis.diagnosis import document
-from analysis.diagnosis.result import real_answer
+from analysis.diagnosis.real_answer import real_answer
 from analysis.evaluation.reproduction import document as reproduction_document
 from analysis.psychophysics.thresholds import Threshold
 from equalizer.laws.parse import FUNCTIONS, LARGEST, LONGEST, MEMORY

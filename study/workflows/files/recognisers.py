@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
-from analysis.diagnosis.result.real_answer import FORMAT as REAL_ANSWER_FORMAT
+from analysis.diagnosis.real_answer.real_answer import FORMAT as REAL_ANSWER_FORMAT
 from analysis.evaluation.reproduction.document import FORMAT as REPRODUCTION_FORMAT
 from analysis.look.driven_band import silent_segments
 from equalizer.plant.model_quality import quality_brief

@@ -95,28 +95,28 @@ def arena_of(diagnosed) -> Callable[..., Any]:
     late: it compiles."""
     from analysis.diagnosis.errors.choose_measure import measure_of
     from analysis.diagnosis.errors.tuning import tuning_of
-    from analysis.diagnosis.search.rivalry import Arena
+    from analysis.diagnosis.search.search_context import SearchContext
 
-    def arena(effects=(), given=None, axes=1, seed=4):
+    def context(effects=(), given=None, axes=1, seed=4):
         recording = diagnosed.recorded(axes, effects, seed)
         model = diagnosed.device(axes) if given is None else given
         measure = measure_of([recording], model).measure
-        return Arena(measure.shortened(), measure, tuning_of(model, recording.command.channels), map)
+        return SearchContext(measure.shortened(), measure, tuning_of(model, recording.command.channels), map)
 
-    return arena
+    return context
 
 
 @pytest.fixture(scope="session")
 def standing_at() -> Callable[..., Any]:
-    """A contender with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
+    """A candidate with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
     one."""
+    from analysis.diagnosis.errors.fit_score import FitScore
     from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
     from analysis.diagnosis.errors.output_error import Fitted
-    from analysis.diagnosis.errors.standing import Standing
-    from analysis.diagnosis.search.rivalry import Contender
+    from analysis.diagnosis.search.search_context import FittedCandidate
     from equalizer.effects.catalogue import EFFECTS
 
-    def contender(seen, *names, test=None, sites=(0,)):
+    def candidate(seen, *names, test=None, sites=(0,)):
         whole = NOTHING
         for name in names:
             effect = EFFECTS[name]
@@ -124,6 +124,6 @@ def standing_at() -> Callable[..., Any]:
             whole = together(whole, claimed(Claim(effect, "one", sites), [values]))
         errors = np.atleast_1d(np.asarray(seen, dtype=float))
         sealed = errors if test is None else np.atleast_1d(np.asarray(test, dtype=float))
-        return Contender(Fitted(whole, np.zeros(0), (), 0.0), Standing(errors, errors, sealed))
+        return FittedCandidate(Fitted(whole, np.zeros(0), (), 0.0), FitScore(errors, errors, sealed))
 
-    return contender
+    return candidate

@@ -7,7 +7,7 @@ import pytest
 from analysis.diagnosis.data.force_driven import force_driven
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.rigid_model import rigid_model
+from analysis.diagnosis.forces.rigid_model import rigid_model
 from study.workflows.recording.import_recording import read_foreign
 
 FRICTION = {"coulomb_friction", "asymmetric_friction", "stribeck_friction"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.localisation.state_regions import region_in_words
-from analysis.diagnosis.result.real_answer import OwnNumber
+from analysis.diagnosis.real_answer.real_answer import OwnNumber
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
 from analysis.figures.study_pictures import study_pictures

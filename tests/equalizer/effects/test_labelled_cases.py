@@ -11,7 +11,7 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.search.candidates import candidates
+from analysis.diagnosis.search.starting_hypotheses import candidates
 from equalizer.effects.catalogue import EFFECTS
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording

@@ -20,7 +20,7 @@ def axes(module_at) -> ModuleType:
 def balance_of():
     """Of a recording, one per axis."""
     from analysis.diagnosis.balance.balances import balances_of
-    from analysis.diagnosis.search.patience import always
+    from analysis.diagnosis.search.time_budget import always
 
     return lambda recording, without=(): balances_of([recording], frozenset(without), always)
 

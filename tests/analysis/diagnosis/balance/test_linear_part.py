@@ -99,8 +99,8 @@ def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, recordin
 
 
 def test_what_is_left_of_a_command_drives_one_body(two_bodies, recording_of, balance_of):
-    from analysis.diagnosis.balance.first_model import first_model
-    from analysis.diagnosis.balance.reduced_recordings import is_reduced, reduced_recordings
+    from analysis.diagnosis.first_model.model_of_balance import first_model
+    from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduced_recordings
 
     force, motion = two_bodies
     recording = recording_of(force, motion, RATE_HZ)

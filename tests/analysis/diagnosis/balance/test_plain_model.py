@@ -19,7 +19,7 @@ def played(axes, balance_of):
 
 
 def test_beside_friction_it_is_that_of_the_balance(played, axes):
-    from analysis.diagnosis.balance.first_model import plain_model
+    from analysis.diagnosis.first_model.model_of_balance import plain_model
 
     model = plain_model(*played(replace(axes.Physics(), coulomb=0.8)), "first")
     assert model is not None
@@ -28,19 +28,19 @@ def test_beside_friction_it_is_that_of_the_balance(played, axes):
 
 
 def test_without_a_named_law_another_fit_is_asked_for(played, axes):
-    from analysis.diagnosis.balance.first_model import plain_model
+    from analysis.diagnosis.first_model.model_of_balance import plain_model
 
     assert plain_model(*played(axes.Physics()), "first") is None
 
 
 def test_a_second_body_asks_for_another_fit(played, axes):
-    from analysis.diagnosis.balance.first_model import plain_model
+    from analysis.diagnosis.first_model.model_of_balance import plain_model
 
     assert plain_model(*played(replace(axes.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
 
 
 def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(played, axes):
-    from analysis.diagnosis.balance.first_model import share_within
+    from analysis.diagnosis.first_model.model_of_balance import share_within
 
     balances, _ = played(replace(axes.Physics(), coulomb=0.8))
     shares = [share_within(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]

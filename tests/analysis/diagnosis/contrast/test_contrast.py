@@ -14,12 +14,12 @@ from analysis.diagnosis.contrast.lines import hum_of, noise_of, steps_of
 from analysis.diagnosis.contrast.stream import FOLDS
 from analysis.diagnosis.contrast.taken import taken_of
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.errors.rigid_model import rigid_model
+from analysis.diagnosis.forces.rigid_model import rigid_model
+from analysis.diagnosis.reference import learn_model_error as learn_clean_floor
+from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
+from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, _named, with_contrast
-from analysis.diagnosis.search import learn_clean_floor
-from analysis.diagnosis.search.by_contrast import Contrast, contrast_of
-from analysis.diagnosis.search.learn_clean_floor import NothingLearned
-from analysis.diagnosis.search.patience import OUT_OF_TIME
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.unit_system import LINEAR
@@ -69,12 +69,12 @@ def recording(seed: int, change: str = "", level: float = 0.0) -> Recording:
     )
 
 
-def patient() -> bool:
+def time_left() -> bool:
     return True
 
 
 def decided(faulty: Recording, without: frozenset[str] = frozenset()) -> Decided:
-    found = compared([faulty], [recording(1)], without, patient)
+    found = compared([faulty], [recording(1)], without, time_left)
     assert found is not None
     return decide(found, 1)
 
@@ -117,7 +117,7 @@ def two_drives(seed: int, gain: float = 1.0) -> Recording:
 @pytest.mark.parametrize("gain", [0.6, 1.4])
 def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(gain):
     faulty = two_drives(3, gain)
-    found = compared([faulty], [two_drives(4)], frozenset(), patient)
+    found = compared([faulty], [two_drives(4)], frozenset(), time_left)
     assert found is not None and not found.by_force
     answer = decide(found, 1)
     assert answer.named is not None
@@ -127,7 +127,7 @@ def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(g
 
 
 def test_two_drives_of_one_body_in_order_name_nothing():
-    found = compared([two_drives(5)], [two_drives(4)], frozenset(), patient)
+    found = compared([two_drives(5)], [two_drives(4)], frozenset(), time_left)
     assert found is not None
     assert decide(found, 1).named is None
 
@@ -136,7 +136,7 @@ def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there
     """Scaled by its own error, what is left of a set is at least as much as a description of its own leaves."""
     only = frozenset(UNDONE) - {"viscous_damping"}
     for clean in ([recording(1)], [recording(seed) for seed in (1, 3, 4, 5)]):
-        found = compared([recording(2, "viscous_damping", 2.0)], clean, only, patient)
+        found = compared([recording(2, "viscous_damping", 2.0)], clean, only, time_left)
         assert found is not None
         assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
         assert 1.0 <= found.plain[:FOLDS].sum() / found.faulty_samples < 2.0
@@ -150,7 +150,7 @@ def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability():
 
 
 def test_a_fault_that_may_sit_on_either_of_two_axes_is_not_named():
-    found = compared([recording(2, "added_mass", 0.3)], [recording(1)], frozenset(), patient)
+    found = compared([recording(2, "added_mass", 0.3)], [recording(1)], frozenset(), time_left)
     assert found is not None
     best = decide(found, 1).named
     assert best is not None
@@ -180,7 +180,7 @@ def test_a_body_alone_cannot_tell_a_mass_from_a_gain():
         force = mass * a + 0.02 * a.std() * random.normal(size=COUNT)
         return replace(plain, command=replace(plain.command, samples=force[:, None]))
 
-    found = compared([body(2, 1.6)], [body(1, 1.2)], frozenset(), patient)
+    found = compared([body(2, 1.6)], [body(1, 1.2)], frozenset(), time_left)
     assert found is not None
     answer = decide(found, 1)
     names = {one.fault.effect for one, _ in answer.others} if answer.named is None else set(answer.alike)
@@ -239,7 +239,7 @@ def in_turns(seed: int, late: FloatArray) -> Recording:
 
 
 def test_a_logger_that_reads_all_channels_late_is_named_once():
-    found = compared([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), patient)
+    found = compared([in_turns(2, np.full(6, 2.0))], [in_turns(1, np.zeros(6))], frozenset(), time_left)
     assert found is not None
     answer = decide(found, 2)
     assert answer.named is not None
@@ -249,7 +249,7 @@ def test_a_logger_that_reads_all_channels_late_is_named_once():
 
 def test_a_logger_that_is_late_now_and_then_in_both_sets_is_not_named():
     faulty, clean = in_turns(2, np.array([0, 2, 1, 2, 0, 2.0])), in_turns(1, np.array([0, 0, 2, 0, 1, 0.0]))
-    found = compared([faulty], [clean], frozenset(), patient)
+    found = compared([faulty], [clean], frozenset(), time_left)
     assert found is not None
     assert decide(found, 2).named is None
 
@@ -257,8 +257,8 @@ def test_a_logger_that_is_late_now_and_then_in_both_sets_is_not_named():
 def test_recordings_of_rest_and_of_motion_are_not_compared():
     """What a device does at rest is foretold by no recording of its motion."""
     resting = read_as(2, lambda y: 0.01 * y)
-    assert compared([resting], [recording(1)], frozenset(), patient) is None
-    assert compared([recording(1)], [resting], frozenset(), patient) is None
+    assert compared([resting], [recording(1)], frozenset(), time_left) is None
+    assert compared([recording(1)], [resting], frozenset(), time_left) is None
 
 
 def test_a_line_of_the_mains_is_seen_where_the_clean_recording_has_none():
@@ -327,7 +327,7 @@ def test_what_is_cut_short_ends_with_what_it_has():
 
 
 def contrast(change: str = "", level: float = 0.0, without: tuple[str, ...] = (), seed: int = 2) -> Contrast:
-    return contrast_of([recording(seed, change, level)], [recording(1)], frozenset(without), patient)
+    return contrast_of([recording(seed, change, level)], [recording(1)], frozenset(without), time_left)
 
 
 def test_a_fault_that_the_comparison_cannot_undo_is_left_open():

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.belonging import NothingToDiagnose, require_model_of
 from analysis.diagnosis.data.carried_weight import carrying, heavier, weighted
+from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.errors.choose_measure import measure_of
 from equalizer.effects.simulation.simulator import simulate_mechanism
 

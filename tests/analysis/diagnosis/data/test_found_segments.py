@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.found_segments import exact_period, with_found_segments
-from analysis.diagnosis.data.noise_floor import noise_floor
+from analysis.diagnosis.noise.noise_floor import noise_floor
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 

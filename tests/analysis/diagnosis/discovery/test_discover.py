@@ -32,8 +32,8 @@ def always():
 
 
 def found_in(recording):
-    arena, known = arena_of(recording)
-    found = discover(arena, known, quiet, always)
+    context, known = arena_of(recording)
+    found = discover(context, known, quiet, always)
     return None if found is None else laws_of(found.found.after.fitted.hypothesis)
 
 
@@ -68,8 +68,8 @@ def test_ten_times_the_noise_leaves_the_law(seed=6):
 
 
 def joined(recording):
-    arena, known = arena_of(recording)
-    return with_laws(Searched(arena, known, judge(known)), quiet, always)
+    context, known = arena_of(recording)
+    return with_laws(Searched(context, known, judge(known)), quiet, always)
 
 
 def test_a_proved_law_explains(seed=7):
@@ -86,9 +86,11 @@ def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
 
 
 def test_a_shuffled_force_holds_no_law(seed=9):
-    arena, known = arena_of(recorded((DRAG,), seed))
+    context, known = arena_of(recorded((DRAG,), seed))
     fitted = known.retuned.fitted
-    view = views_of(arena.measure, arena.tuning, evaluated(arena.measure, arena.tuning, fitted.deviations, NOTHING))[0]
+    view = views_of(
+        context.measure, context.tuning, evaluated(context.measure, context.tuning, fitted.deviations, NOTHING)
+    )[0]
     seen = view.records[0]
     axis = axes_of(seen.columns, 1)
     terms = terms_of(axis, 0, len(seen.left) / seen.rate_hz, seen.rate_hz)

@@ -10,7 +10,7 @@ from analysis.diagnosis.data.force_driven import force_driven
 from analysis.diagnosis.data.observed_parts import names_of_parts, observed_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import choose_measure, holds_itself, measure_of
-from analysis.diagnosis.errors.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, ModelEffect, Tolerance
@@ -169,9 +169,9 @@ def test_what_decisions_see_does_not_hang_on_sealed_samples(held: Recording, dri
 
 def test_sensors_are_not_told_by_forces(held: Recording) -> None:
     measure = measure_of([held], model()).measure
-    assert not measure.tells(EFFECTS["sensor_gain"])
-    assert measure.tells(EFFECTS["coulomb_friction"])
-    assert measure.tells(EFFECTS["force_saturation"])
+    assert not measure.can_observe(EFFECTS["sensor_gain"])
+    assert measure.can_observe(EFFECTS["coulomb_friction"])
+    assert measure.can_observe(EFFECTS["force_saturation"])
 
 
 def test_a_weaker_actuator_does_not_make_errors_smaller(held: Recording) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, alike, claimed, together, without_claim
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
-from analysis.diagnosis.search.candidates import candidates
+from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.settings import STARTS_PER_CLAIM
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -60,9 +60,9 @@ def test_nothing_is_the_beginning_of_all_claims():
     assert NOTHING.placed() == ()
 
 
-def evidence_of(arena):
-    base = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
-    return gather_evidence(arena.measure, arena.tuning, base)[0]
+def evidence_of(context):
+    base = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    return gather_evidence(context.measure, context.tuning, base)[0]
 
 
 def test_friction_in_the_data_suggests_friction_near_its_level(arena_of):

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed, together
 from analysis.diagnosis.errors.output_error import bounded_step, evaluated, fit, fitting, sensitivity
-from analysis.diagnosis.search.contest import refine
+from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -17,11 +17,11 @@ def alone(name, values):
     return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
-def recovered(arena, hypothesis):
-    zero = np.zeros(len(arena.tuning.names))
-    start = evaluated(arena.measure, arena.tuning, zero, hypothesis)
-    known = sensitivity(arena.measure, arena.tuning, zero, NOTHING)
-    return refine(arena, fit(arena.measure, arena.tuning, start, known, 4))
+def recovered(context, hypothesis):
+    zero = np.zeros(len(context.tuning.names))
+    start = evaluated(context.measure, context.tuning, zero, hypothesis)
+    known = sensitivity(context.measure, context.tuning, zero, NOTHING)
+    return refine(context, fit(context.measure, context.tuning, start, known, 4))
 
 
 @pytest.fixture(scope="module")
@@ -39,10 +39,10 @@ def off(tuning, **deviations):
 def test_the_model_s_own_numbers_are_found(arena_of):
     truth = arena_of()
     wrong = off(truth.tuning, mass_fx=-2.0, damping_fx=1.5, stiffness_fx=-1.0)
-    arena = arena_of(given=truth.tuning.tuned(wrong))
-    found = recovered(arena, NOTHING)
+    context = arena_of(given=truth.tuning.tuned(wrong))
+    found = recovered(context, NOTHING)
     assert found.deviations == pytest.approx(-wrong, abs=0.15)
-    assert arena.contender(found).standing.seen < 1.03
+    assert context.candidate(found).score.worst_channel < 1.03
 
 
 def test_a_number_that_fits_as_it_is_stays(arena_of):
@@ -54,7 +54,7 @@ def test_a_number_that_fits_as_it_is_stays(arena_of):
 def test_friction_is_found_from_far_away(rubbing_arena, start):
     found = recovered(rubbing_arena, alone("coulomb_friction", {"level": start}))
     assert found.hypothesis.placed()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
-    assert rubbing_arena.contender(found).standing.seen < 1.03
+    assert rubbing_arena.candidate(found).score.worst_channel < 1.03
 
 
 def test_two_effects_are_found_at_once(arena_of):
@@ -70,7 +70,7 @@ def test_two_effects_are_found_at_once(arena_of):
 
 def test_a_wrong_law_does_not_come_down_to_the_noise(rubbing_arena):
     found = recovered(rubbing_arena, alone("hardening_stiffness", {"k3": 1e4}))
-    assert rubbing_arena.contender(found).standing.seen > 3
+    assert rubbing_arena.candidate(found).score.worst_channel > 3
 
 
 def test_a_fit_is_never_worse_than_its_start(rubbing_arena):
@@ -104,11 +104,13 @@ def test_sealed_samples_are_not_fitted_to(rubbing_arena):
 
 
 def test_a_sensitivity_foretells_what_a_small_change_does(arena_of):
-    arena = arena_of()
-    zero = np.zeros(len(arena.tuning.names))
-    known = sensitivity(arena.measure, arena.tuning, zero, NOTHING)
-    step = off(arena.tuning, damping_fx=0.05)
-    base, there = (fitting(arena.measure, arena.measure.residuals(arena.tuning.tuned(at), ())) for at in (zero, step))
+    context = arena_of()
+    zero = np.zeros(len(context.tuning.names))
+    known = sensitivity(context.measure, context.tuning, zero, NOTHING)
+    step = off(context.tuning, damping_fx=0.05)
+    base, there = (
+        fitting(context.measure, context.measure.residuals(context.tuning.tuned(at), ())) for at in (zero, step)
+    )
     assert base - there == pytest.approx(step @ known.columns, abs=0.02 * np.abs(base - there).max())
     assert known.squares == pytest.approx(known.columns @ known.columns.T)
 

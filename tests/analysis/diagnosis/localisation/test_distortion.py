@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.detection_lines import detection_lines, held_samples
-from analysis.diagnosis.data.noise_floor import noise_floor
 from analysis.diagnosis.localisation.distortion import distortion
 from analysis.diagnosis.localisation.level_trends import level_trends
+from analysis.diagnosis.noise.noise_floor import noise_floor
 from analysis.diagnosis.settings import DISTORTION_P
 
 CASES = Path(__file__).parents[4].parent / "shared" / "cases"

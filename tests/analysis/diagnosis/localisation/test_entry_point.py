@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.noise_floor import noise_floor
 from analysis.diagnosis.localisation.entry_point import Entry, entry_point, sensor_rule
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra, residual_spectra
+from analysis.diagnosis.noise.noise_floor import noise_floor
 
 FREQUENCY_HZ = np.arange(2.0, 120.0, 0.5)
 NOISE = np.array([1e-3, 1e-3, 1e-7, 1e-7]) ** 2

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.noise_floor import noise_floor
 from analysis.diagnosis.localisation.mismatch_cells import Margin, Prediction, learn_floor, mismatch_cells
+from analysis.diagnosis.noise.noise_floor import noise_floor
 
 
 def recorded_with_truth(bench, seed=1):

@@ -10,12 +10,12 @@ from equalizer.effects.effect import PlacedEffect
 
 
 def test_commands_that_are_never_played_together_where_it_is_fitted_do_not_break_it(arena_of):
-    arena = arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),), axes=2)
-    record = arena.whole.records[0]
+    context = arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),), axes=2)
+    record = context.whole.records[0]
     command = record.command.copy()
     command[record.test] += 1.0
-    whole = arena.whole.with_records((replace(record, command=command),))
-    bare = evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING)
-    box = black_box(whole, arena.confirmed(arena.contender(bare)), 2, 0.02)
+    whole = context.whole.with_records((replace(record, command=command),))
+    bare = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
+    box = black_box(whole, context.confirmed(context.candidate(bare)), 2, 0.02)
     assert np.isfinite(box.test)
     assert box.test < 10

@@ -1,4 +1,4 @@
-"""How likely contenders are, from how far apart they stand."""
+"""How likely fitted_candidates are, from how far apart they stand."""
 
 import pytest
 

@@ -10,7 +10,7 @@ from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
 from analysis.diagnosis.result.candidates import reached_of, with_balances
 from analysis.diagnosis.result.state_maps import NOT_CONFIRMED, state_maps
-from analysis.diagnosis.search.patience import always
+from analysis.diagnosis.search.time_budget import always
 from analysis.figures.diagnosis_state_maps import state_map_pictures
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.search.candidates import clock_drift_by_trial
+from analysis.diagnosis.search.starting_hypotheses import clock_drift_by_trial
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.simulation.other_times import read_other_times
 from equalizer.effects.starts.evidence import Evidence

@@ -161,5 +161,5 @@ def test_an_effect_that_leaves_the_one_bad_channel_as_bad_is_not_added(standing_
     """Three channels whose noise was taken for larger than it is make up for the worst one."""
     base = standing_at([1.16, 0.9, 0.9, 0.95])
     better = standing_at([left, 0.9, 0.9, 0.94], "quadratic_damping")
-    assert base.standing.chosen_by - better.standing.chosen_by > ADDED_GAIN
+    assert base.score.mean_log_error - better.score.mean_log_error > ADDED_GAIN
     assert worthwhile(base, better) is worth

@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim
-from analysis.diagnosis.search.families import FAMILIES, excludes
+from analysis.diagnosis.search.parsimony import FAMILIES, excludes
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 
 

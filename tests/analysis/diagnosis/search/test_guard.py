@@ -6,7 +6,7 @@ import pytest
 
 from analysis.diagnosis.search.explain import explain
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.patience import OutOfPatienceError
+from analysis.diagnosis.search.time_budget import OutOfTimeError
 from equalizer.effects.catalogue import EFFECTS
 
 
@@ -23,10 +23,10 @@ def quiet(what, share):
 
 
 def test_the_others_are_searched_and_the_crash_is_said(diagnosed, arena_of):
-    arena = replace(arena_of(diagnosed.RUBBING), guard=Guard(on=True))
-    found = explain(arena, [BROKEN, RUBS], quiet)
+    context = replace(arena_of(diagnosed.RUBBING), guard=Guard(on=True))
+    found = explain(context, [BROKEN, RUBS], quiet)
     assert found.after.newest == "coulomb_friction"
-    (said,) = arena.guard.sentences
+    (said,) = context.guard.sentences
     assert said.startswith("Play (backlash) was left out")
     assert "its starting values" in said and "operands could not be broadcast" in said
 
@@ -51,9 +51,9 @@ def test_each_item_that_crashes_is_dropped_and_named_once():
 
 def test_a_search_that_ends_for_lack_of_time_is_no_crash():
     def late():
-        raise OutOfPatienceError
+        raise OutOfTimeError
 
     guard = Guard(on=True)
-    with pytest.raises(OutOfPatienceError):
+    with pytest.raises(OutOfTimeError):
         guard.part("backlash", "its fit", late, None)
     assert guard.sentences == ()

@@ -9,15 +9,15 @@ from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
-from analysis.diagnosis.errors.standing import Standing
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.impacts import irregular, rattling
-from analysis.diagnosis.search.rivalry import Arena
+from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY
 from equalizer.effects.catalogue import CATALOGUE
@@ -34,15 +34,15 @@ LOOSE = (
 
 
 def searched(real, effects, repeats=True):
-    """The recording before a search has found anything: arena, explanation, floors."""
+    """The recording before a search has found anything: context, explanation, floors."""
     recording = real.recorded(2, effects)
     if not repeats:
         recording = replace(recording, segments=tuple(replace(one, period=0) for one in recording.segments))
     chosen = measure_of([recording], real.device(2))
-    arena = Arena(chosen.measure.shortened(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
-    given = arena.contender(evaluated(arena.measure, arena.tuning, np.zeros(len(arena.tuning.names)), NOTHING))
-    whole = arena.confirmed(given)  # as a search hands it over: with the sealed samples
-    return arena, Explanation(whole, whole, whole, (), ()), chosen.floors
+    context = SearchContext(chosen.measure.shortened(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
+    given = context.candidate(evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
+    whole = context.confirmed(given)  # as a search hands it over: with the sealed samples
+    return context, Explanation(whole, whole, whole, (), ()), chosen.floors
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
 
 def test_it_is_as_far_from_the_record_as_chance_takes_it(told):
     assert judge(told).verdict == "explained"
-    assert told.after.standing.seen < 2.5 < told.retuned.standing.seen
+    assert told.after.score.worst_channel < 2.5 < told.retuned.score.worst_channel
     assert np.all(told.statistic.chance >= 0.05)
 
 
@@ -75,10 +75,10 @@ def test_its_numbers_come_with_errors(told):
 
 
 def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sample(loose):
-    arena = loose[0]
+    context = loose[0]
     apart = tuple(replace(one, values={**one.values, "gap": GAP_M * (1 + 1e-9)}) for one in LOOSE)
-    courses = [arena.whole.residuals(arena.tuning.model, effects) for effects in (LOOSE, apart)]
-    power = BandPower(arena.whole)
+    courses = [context.whole.residuals(context.tuning.model, effects) for effects in (LOOSE, apart)]
+    power = BandPower(context.whole)
     off = power.misfits(power.predicted(courses[0]) - power.predicted(courses[1]))
     assert max(off.fit.max(), off.choose.max(), off.test.max()) < 0.2
     assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
@@ -86,7 +86,7 @@ def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sa
 
 def test_what_is_left_is_said_by_channel_and_not_by_the_course_of_blows(loose, told):
     assert impact_remainder(loose[0].whole, told) == ()
-    further = replace(told, after=replace(told.after, standing=Standing(*np.array([[1, 4, 1, 1.0]] * 3))))
+    further = replace(told, after=replace(told.after, score=FitScore(*np.array([[1, 4, 1, 1.0]] * 3))))
     (left,) = impact_remainder(loose[0].whole, further)
     assert (left.output, left.band_hz) == ("ay", (0.0, 500.0))
     assert left.share == pytest.approx(4 * told.statistic.chance[1])

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, look_of
 from analysis.diagnosis.data.operating_point import about_operating_point
-from analysis.diagnosis.search.looks import ABOUT_MEAN, look_of
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal

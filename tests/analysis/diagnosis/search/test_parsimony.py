@@ -9,8 +9,8 @@ from analysis.diagnosis.search.parsimony import both_stand, only_refines, plaine
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
 
 
-def first_of(*contenders):
-    ranked = sorted(contenders, key=lambda one: one.standing.chosen_by)
+def first_of(*fitted_candidates):
+    ranked = sorted(fitted_candidates, key=lambda one: one.score.mean_log_error)
     return plainest_first(ranked)[0].fitted.hypothesis.claims[-1].effect.name
 
 

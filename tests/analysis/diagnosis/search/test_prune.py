@@ -7,11 +7,10 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
 from analysis.diagnosis.errors.output_error import evaluated, gather_evidence
-from analysis.diagnosis.search.candidates import candidates
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
-from analysis.diagnosis.search.patience import always
-from analysis.diagnosis.search.prune import pruned
-from analysis.diagnosis.search.search import searched
+from analysis.diagnosis.search.search import pruned, searched
+from analysis.diagnosis.search.starting_hypotheses import candidates
+from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -27,13 +26,13 @@ def claim(name, **values):
     return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
-def one_after_the_other(arena, *claims):
+def one_after_the_other(context, *claims):
     """An explanation as a search leaves it that added these in this order."""
-    base, steps, whole = arena.contender(retuned_alone(arena)), [], None
+    base, steps, whole = context.candidate(retuned_alone(context)), [], None
     for one in claims:
         whole = one if whole is None else together(whole, one)
-        steps.append(arena.contender(evaluated(arena.measure, arena.tuning, base.fitted.deviations, whole)))
-    ends = (arena.confirmed(one) for one in (base, base, steps[-1]))
+        steps.append(context.candidate(evaluated(context.measure, context.tuning, base.fitted.deviations, whole)))
+    ends = (context.confirmed(one) for one in (base, base, steps[-1]))
     return Explanation(*ends, tuple((one,) for one in steps), tuple(steps))
 
 
@@ -73,7 +72,7 @@ def test_two_that_are_needed_stay(rubbing_and_pushed):
     assert pruned(rubbing_and_pushed, found, always).steps is found.steps
 
 
-def test_out_of_patience_nothing_is_fitted_again(rubbing):
+def test_out_of_time_nothing_is_fitted_again(rubbing):
     found = one_after_the_other(
         rubbing, claim("constant_force", force=0.1), claim("coulomb_friction", level=FRICTION_N)
     )
@@ -87,13 +86,13 @@ def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(rubbin
     friction = alone.steps[0].fitted.hypothesis
     both = together(friction, claim("amplifier_lag", time_constant=1e-4))
     levels = (200.0, second * 200 ** (LAST_EFFECT_SHARE / 2), second)
-    base, first, last = (standing_at(level).standing for level in levels)
-    steps = (replace(alone.steps[0], standing=first), replace(alone.steps[0], standing=last))
+    base, first, last = (standing_at(level).score for level in levels)
+    steps = (replace(alone.steps[0], score=first), replace(alone.steps[0], score=last))
     steps = (steps[0], replace(steps[1], fitted=replace(steps[1].fitted, hypothesis=both)))
     found = replace(
         alone,
-        retuned=replace(alone.retuned, standing=base),
-        after=replace(steps[1], standing=last),
+        retuned=replace(alone.retuned, score=base),
+        after=replace(steps[1], score=last),
         steps=steps,
         rounds=((steps[0],), (steps[1],)),
     )
@@ -103,15 +102,15 @@ def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(rubbin
 def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, diagnosed):
     """From below a whole number of ticks no small step leads above it."""
     late = 1.16 / diagnosed.RATE_HZ
-    arena = arena_of((placed("transport_delay", delay=late),))
-    base = retuned_alone(arena)
+    context = arena_of((placed("transport_delay", delay=late),))
+    base = retuned_alone(context)
     starts = [
         one.placed()[-1].values["delay"]
-        for one in candidates([EFFECTS["transport_delay"]], gather_evidence(arena.measure, arena.tuning, base)[0])
+        for one in candidates([EFFECTS["transport_delay"]], gather_evidence(context.measure, context.tuning, base)[0])
     ]
     assert any(start < 1 / diagnosed.RATE_HZ for start in starts)
     assert any(start > 1 / diagnosed.RATE_HZ for start in starts)
-    found = searched(arena, CATALOGUE, lambda what, share: None).found
+    found = searched(context, CATALOGUE, lambda what, share: None).found
     assert names(found) == ["transport_delay"]
     assert found.after.fitted.hypothesis.placed()[-1].values["delay"] == pytest.approx(late, rel=0.01)
-    assert np.nanmax(found.after.standing.test) < 1.1
+    assert np.nanmax(found.after.score.test) < 1.1

@@ -2,33 +2,33 @@
 
 import numpy as np
 
+from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import Fitted
-from analysis.diagnosis.errors.standing import Standing
-from analysis.diagnosis.search.rivalry import Contender
 from analysis.diagnosis.search.same_within_errors import inseparable
+from analysis.diagnosis.search.search_context import FittedCandidate
 
 
-def contender(error: float, usual: float = 0.0) -> Contender:
+def candidate(error: float, usual: float = 0.0) -> FittedCandidate:
     """error: in units of the noise."""
     at = np.array([error])
-    return Contender(Fitted(NOTHING, np.zeros(0), (), 1.0), Standing(at, at, at), usual)
+    return FittedCandidate(Fitted(NOTHING, np.zeros(0), (), 1.0), FitScore(at, at, at), usual)
 
 
 def test_what_errs_by_next_to_nothing_more_is_as_good():
-    assert inseparable(contender(1.0), contender(1.0005))
-    assert not inseparable(contender(1.0), contender(1.01))
+    assert inseparable(candidate(1.0), candidate(1.0005))
+    assert not inseparable(candidate(1.0), candidate(1.01))
 
 
 def test_far_above_the_noise_more_is_next_to_nothing():
-    assert inseparable(contender(2.0), contender(2.1))
-    assert not inseparable(contender(2.0), contender(2.3))
+    assert inseparable(candidate(2.0), candidate(2.1))
+    assert not inseparable(candidate(2.0), candidate(2.3))
 
 
 def test_what_both_gain_on_a_sound_device_tells_nothing_here():
-    assert inseparable(contender(1.0, usual=0.05), contender(1.02, usual=0.2))
-    assert not inseparable(contender(1.0, usual=0.05), contender(1.05, usual=0.2))
+    assert inseparable(candidate(1.0, usual=0.05), candidate(1.02, usual=0.2))
+    assert not inseparable(candidate(1.0, usual=0.05), candidate(1.05, usual=0.2))
 
 
 def test_what_one_alone_gains_there_does_not_make_it_the_other():
-    assert not inseparable(contender(1.0, usual=0.0), contender(1.02, usual=0.8))
+    assert not inseparable(candidate(1.0, usual=0.0), candidate(1.02, usual=0.8))

@@ -7,15 +7,15 @@ import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, claimed
 from analysis.diagnosis.errors.output_error import gather_evidence
-from analysis.diagnosis.search.candidates import within_data
 from analysis.diagnosis.search.explain import retuned_alone
+from analysis.diagnosis.search.starting_hypotheses import within_data
 from equalizer.effects.catalogue import EFFECTS
 
 
 @pytest.fixture(scope="module")
 def evidence(diagnosed, arena_of):
-    arena = arena_of(diagnosed.RUBBING)
-    return gather_evidence(arena.measure, arena.tuning, retuned_alone(arena))[0]
+    context = arena_of(diagnosed.RUBBING)
+    return gather_evidence(context.measure, context.tuning, retuned_alone(context))[0]
 
 
 def claim(name, **values):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.search.patience import counted
+from analysis.diagnosis.search.time_budget import counted
 from study.errors import StudyError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.search.learn_clean_floor import NothingLearned
+from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.errors import LeftError, StudyError, WrongUseError
 from study.store.disk.json_document import read_json

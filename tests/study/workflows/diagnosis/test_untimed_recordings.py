@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from analysis.diagnosis.confirm.fitting_measures import looks_of
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import UNTIMED, measure_of
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.wording import place_of
-from analysis.diagnosis.search.looks import looks_of
 from equalizer.plant.effect_vocabulary import matrix_unit
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal

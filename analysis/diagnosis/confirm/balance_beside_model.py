@@ -1,0 +1,134 @@
+"""The force balance beside a model that was given: its numbers are columns under the prior of their calibration.
+
+The force that the model needs is taken along the measured motion, with everything that its file names: actuator, modes,
+effects. Laws are then weighed as beside a fitted model (`balance.weigh`), by what they take of the error on held-out
+data that re-tuning leaves.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.given_base import GivenBase
+from analysis.diagnosis.balance.motion import OVERSAMPLED, Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.structures import search_structures
+from analysis.diagnosis.balance.weigh import OF_SIGNAL, Balance, weigh
+from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.forces.needed_force import band_motion, needed_force
+from analysis.diagnosis.types import TimeBudget
+from equalizer.effects.effect import PlacedEffect, Structure
+from equalizer.effects.placing import placed_effects
+from equalizer.effects.simulation.along_motion import entered_force, force_along
+from equalizer.effects.simulation.bodies import bodies_of
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+FINEST = 6.0
+"""Samples per period of the band's end at which laws are computed: they have overtones, which must not fold back."""
+MOVED = 0.1
+"""Step of the finite differences, in standard deviations of the calibration."""
+
+
+def balances_beside(
+    recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
+) -> tuple[Balance, ...]:
+    """One per command; none where not each drives a measured position or velocity."""
+    records = observed_parts(recordings, model.outputs)
+    if not all(has_motion(record.recording, model) for record in records):
+        return ()
+    try:
+        found = motions_of(records)
+        if len(found[0].channels) < model.inputs or found[0].order == 2 or not np.isfinite(found[0].band_hz):
+            return ()
+        seen = [_seen(record, motion, model) for record, motion in zip(records, found, strict=True)]
+        axes = driven_axes(model)
+        mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
+        return tuple(
+            weigh(
+                search_structures(
+                    [_along(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
+                    GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), OF_SIGNAL),
+                )
+            )
+            for axis in range(model.inputs)
+        )  # fmt: skip
+    except (NoMotionError, MechanicalModelError, np.linalg.LinAlgError):
+        return ()
+
+
+def _along(motion: Motion, axis: int) -> Motion:
+    """Of one axis alone: laws of another one's motion are no physics of the catalogue."""
+    courses = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
+    return replace(motion, channels=motion.channels[axis : axis + 1], **courses)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    motion: Motion
+    """Of the driven axes, and the force that entered there."""
+    columns: tuple[FloatArray, ...]
+    """As `GivenBase.columns`, per axis."""
+
+
+def _seen(record: Observed, motion: Motion, model: MechanicalModel) -> _Seen:
+    recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
+    known = placed_effects(model, recording.command.channels, recording.response.channels)
+    at = _structure(carrying(model, recording), known)
+    whole = needed_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
+    course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
+    entered = entered_force(model, motion.force, rate_hz, known, recording.hold)
+    added = force_along(at, known, course, (motion.force, entered - whole.force), rate_hz)
+    every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
+    position, velocity, acceleration = (each[::every] for each in course)
+    thin = replace(
+        motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (OVERSAMPLED * motion.band_hz)), 1),
+        channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
+        force=motion.within(entered + added)[::every], condition=motion.condition[::every],
+        fit=motion.fit[::every], test=motion.test[::every],
+    )  # fmt: skip
+    changes = [*_grounded(thin, model, recording), *_of_modes(thin, model, recording, known)]
+    columns = np.stack([whole.force[::every], *changes], axis=1)
+    return _Seen(thin, tuple(columns[:, :, axis] for axis in range(m)))
+
+
+def _grounded(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
+    """(n, m) each: what one standard deviation of mass, damping and stiffness at the driven axes adds, as `Tuning`
+    counts them."""
+    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    length = np.linalg.norm(model.input, axis=0)
+    for part, course in enumerate((motion.acceleration, motion.velocity, motion.position)):
+        for number, (i, j) in enumerate(pairs, part * len(pairs)):
+            added = np.zeros((len(course), m))
+            added[:, i] = course[:, j]
+            added[:, j] = course[:, i]
+            yield tuning.deviation[number] * added / length
+
+
+def _of_modes(
+    motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
+) -> Iterator[FloatArray]:
+    """(n, m) each: the same of the modes' numbers."""
+    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    first = 3 * m * (m + 1) // 2
+    if first == len(tuning.names):
+        return
+    seen = motion.position @ (model.output[:m] @ driven_axes(model)).T
+    moved = band_motion(seen, motion.rate_hz, motion.band_hz)
+    steps = MOVED * np.eye(len(tuning.names))[first:]
+    here, *there = (
+        needed_force(_structure(carrying(tuning.tuned(step), recording), known), moved).force
+        for step in (0 * steps[0], *steps)
+    )
+    yield from ((each - here) / MOVED for each in there)
+
+
+def _structure(model: MechanicalModel, known: Sequence[PlacedEffect]) -> MechanicalModel:
+    return bodies_of(model, [effect for effect in known if isinstance(effect.effect.acts, Structure)]).structure

@@ -1,0 +1,249 @@
+"""From laws that a force balance weighed to effects that are fitted by output error, and what may be said of them.
+
+Used where the model itself was fitted to the recordings: then no calibration says how large its errors may be, and
+evidence is the gain on held-out data instead of a remainder in units of noise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.actuator import NO_COLUMN
+from analysis.diagnosis.balance.plainest_structure import NOTABLE
+from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.balance.weigh import Balance, family_of
+from analysis.diagnosis.balance.weighed import Weighed
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed, together
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.identifiability import final_errors
+from analysis.diagnosis.search.search import Searched, Unconfirmed
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
+from analysis.diagnosis.search.without_effect import without_effect
+from analysis.diagnosis.settings import HELD_OUT_ERROR, INTERVAL_FACTOR
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.signals.signal import FloatArray
+
+CONSTANT = "constant_force"
+CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
+"""Effects that are numbers of a fitted model, and their values."""
+SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
+"""Effects of a sensor that its own signal shows, whatever moves before it."""
+ONLY_BESIDE_CALIBRATION = (
+    "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
+    "calibrated model, or recordings of the device in order, would tell"
+)
+VAGUE = 1.96 * INTERVAL_FACTOR
+"""Standard errors of a logarithm from which an interval reaches a number that is none."""
+HELD_BY_SIMULATION = 0.9
+"""Times the re-tuned model's held-out error that the completed one may leave at most, in the measure that suits."""
+
+
+def searched_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> Searched | None:
+    """repeats: the noise is known from what repeats; else nothing counts as explained. None where nothing is named, or
+    where simulations do not bear it out."""
+    named = [
+        (axis, law)
+        for axis, balance in enumerate(balances)
+        for law in balance.named
+        if law.law.effect != CONSTANT and _plays(balance.searched.regression.beside.own, law)
+    ]
+    if not named:
+        return None
+    constant = _constants(balances)
+    given = evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), constant)
+    before, retuned = context.confirmed(context.candidate(given)), context.candidate(refine(context, given))
+    confirmed = context.confirmed(retuned)
+    named = _refitted(balances, named)
+    while named:
+        steps, after = _from_starts(context, balances, (retuned, confirmed), named)
+        ends = (before, confirmed, after)
+        explained = Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
+        vague: int | None = len(named) - 1
+        errors: FloatArray | None = None
+        if _borne_out(confirmed, ends[2]):
+            errors = final_errors(context, explained)
+            vague = _vague(explained, errors[len(context.tuning.names) :], len(constant.claims))
+        if vague is None:
+            sealed = float(np.nanmax(ends[2].score.test, initial=0.0))
+            whole = repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
+            judged = Judgement("explained" if whole else "partly_explained", True)
+            return Searched(context, explained, judged, errors=errors)
+        named = _refitted(balances, [law for number, law in enumerate(named) if number != vague])
+    return None
+
+
+def borne_out(seen: Searched, repeats: bool) -> Searched:
+    """Of what a search beside balances named, the name only where it takes as much of the held-out error power as a
+    law of a balance must, and `explained` only where repeats show the noise; what is a number of the model needs no
+    name, and no proof."""
+    found = seen.found
+    while found.steps and not _takes_enough(seen.context, found):
+        if len(found.steps) > 1:
+            found = without_effect(seen.context, found, len(found.steps) - 1)
+        else:
+            found = replace(found, after=found.retuned, steps=())
+        seen = replace(seen, found=found, judged=judge(found), errors=None)
+    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed()}
+    if repeats or seen.judged.verdict != "explained" or names <= set(CONSTANTS):
+        return seen
+    return replace(seen, judged=replace(seen.judged, verdict="partly_explained"))
+
+
+def unconfirmed_beside_motion(seen: Searched) -> Searched:
+    """Effects of actuator and sensor that a search beside balances named become candidates, except where the signal
+    itself shows them: the model was fitted to these very recordings, so that its numbers give way to whatever bends,
+    and a law of the motion that no catalogue holds looks like a bent or late sensor."""
+    found, told = seen.found, []
+    doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
+    for place in reversed(doubtful):
+        gain = held_out_gain(seen.context.whole, found.retuned, seen.context.confirmed(found.steps[place]))
+        if gain is not None and gain.gain > 0:
+            told.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, ONLY_BESIDE_CALIBRATION))
+        if len(found.steps) > 1:
+            found = without_effect(seen.context, found, place)
+        else:
+            found = replace(found, after=found.retuned, steps=())
+    if not doubtful:
+        return seen
+    kept = tuple(sorted(told, key=lambda each: -each.gain))
+    return replace(seen, found=found, judged=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
+
+
+def _takes_enough(context: SearchContext, found: Explanation) -> bool:
+    """Whether the last effect takes a notable share of the held-out error power beside those before it."""
+    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.retuned
+    left, without = (float(np.nanmean(np.log(each.score.test))) for each in (found.after, before))
+    return not left > without + np.log(1 - NOTABLE) / 2
+
+
+def _refitted(balances: Sequence[Balance], named: Sequence[tuple[int, Weighed]]) -> list[tuple[int, Weighed]]:
+    """With the numbers that the balances give these laws alone."""
+    found = []
+    for axis, law in named:
+        if law.place == NO_COLUMN:
+            found.append((axis, law))
+            continue
+        regression = balances[axis].searched.regression
+        places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
+        values = values_of(regression, places)[places.index(law.place)]
+        found.append((axis, law if values is None else replace(law, values=values)))
+    return found
+
+
+def _from_starts(
+    context: SearchContext,
+    balances: Sequence[Balance],
+    without: tuple[FittedCandidate, FittedCandidate],
+    named: Sequence[tuple[int, Weighed]],
+) -> tuple[list[FittedCandidate], FittedCandidate]:
+    """The steps, and the last of them on all samples. without: the re-tuned model, and the same on all samples. From
+    the balance's linear numbers; where that ends beside the law, from the model's own."""
+    retuned, confirmed = without
+    released = _released(context.tuning, balances, [law.place for _, law in named])
+    steps = _steps(context, retuned, named, released)
+    after = context.confirmed(steps[-1])
+    if np.any(released) and not _borne_out(confirmed, after):
+        again = _steps(context, retuned, named, np.zeros(len(released)))
+        other = context.confirmed(again[-1])
+        if np.nanmean(np.log(other.score.test)) < np.nanmean(np.log(after.score.test)):
+            return again, other
+    return steps, after
+
+
+def _steps(
+    context: SearchContext, retuned: FittedCandidate, named: Sequence[tuple[int, Weighed]], deviations: FloatArray
+) -> list[FittedCandidate]:
+    """The laws one after the other beside the constants, each fitted with those before it."""
+    whole = retuned.fitted.hypothesis
+    steps = [retuned for _ in whole.claims]
+    for axis, law in named:
+        start = evaluated(context.measure, context.tuning, deviations, together(whole, _claimed(axis, law)))
+        found = refine(context, start)
+        steps.append(context.candidate(found))
+        whole, deviations = found.hypothesis, found.deviations
+    return steps
+
+
+def _vague(explained: Explanation, errors: FloatArray, constants: int) -> int | None:
+    """The place among the named laws of a law whose main number's interval holds zero, or any number's, where the law
+    only refines another of its family; None where there is none."""
+    begin, hypothesis = 0, explained.steps[-1].fitted.hypothesis
+    families = [family_of(claim.effect.name) for claim in hypothesis.claims]
+    for place, claim in enumerate(hypothesis.claims):
+        free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
+        refines = place > constants and families[place] in families[constants:place]
+        for number, parameter in enumerate(free[: None if refines else 1], begin):
+            size = {"log": 1.0, "signed": abs(float(hypothesis.point[number])), "linear": np.inf}[parameter.scale]
+            if place >= constants and VAGUE * errors[number] >= size:
+                return place - constants
+        begin += len(free)
+    return None
+
+
+def leaves_open(searched: Searched) -> bool:
+    """Whether the interval of any positive number of a law reaches zero: a stiffness before sliding, say."""
+    assert searched.errors is not None
+    numbers = searched.found.steps[-1].fitted.hypothesis.numbers
+    errors = searched.errors[len(searched.context.tuning.names) :]
+    return any(
+        number.parameter.scale == "log" and VAGUE * error >= 1 for number, error in zip(numbers, errors, strict=True)
+    )
+
+
+def _constants(balances: Sequence[Balance]) -> Hypothesis:
+    """A constant force along each axis: a weight, or the offset of an amplifier or sensor, which no model's matrices
+    hold."""
+    whole = NOTHING
+    for axis, balance in enumerate(balances):
+        regression = balance.searched.regression
+        if regression.prior is not None:
+            continue
+        force = -float(regression.weights(regression.chosen(()))[-1])
+        if force:
+            claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
+            whole = together(whole, claimed(claim, [{"force": force}]))
+    return whole
+
+
+def _plays(own: int, weighed: Weighed) -> bool:
+    effect = EFFECTS.get(weighed.law.effect)
+    if effect is None or weighed.law.channel != own:
+        return False
+    return all(
+        parameter.name in weighed.values and parameter.lower <= weighed.values[parameter.name] <= parameter.upper
+        for parameter in effect.parameters
+    )
+
+
+def _claimed(axis: int, weighed: Weighed) -> Hypothesis:
+    effect = EFFECTS[weighed.law.effect]
+    return claimed(Claim(effect, "one", (axis,)), [{p.name: weighed.values[p.name] for p in effect.parameters}])
+
+
+def _released(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+    """Mass, damping and stiffness as they are beside laws of the only balance, not as they were fitted without them."""
+    start = np.zeros(len(tuning.names))
+    if any(balance.searched.regression.prior is not None for balance in balances):
+        return start
+    model = tuning.model
+    if len(balances) != 1 or model.coordinates != 1:
+        return start
+    regression = balances[0].searched.regression
+    weights = regression.weights(regression.chosen(laws))[: regression.matrices]
+    given = (model.mass, model.damping, model.stiffness)
+    for place, (weight, matrix) in enumerate(zip(weights, given, strict=False)):
+        if place == 0:
+            weight = max(weight, matrix[0, 0] / 10)
+        start[place] = np.clip((weight - matrix[0, 0]) / tuning.deviation[place], -3.9, 3.9)
+    return start
+
+
+def _borne_out(retuned: FittedCandidate, after: FittedCandidate) -> bool:
+    left, right = (float(np.mean(np.log(each.score.test))) for each in (retuned, after))
+    return not np.isfinite(left) or right <= left + np.log(HELD_BY_SIMULATION)

@@ -1,0 +1,94 @@
+"""How errors are measured of what a force balance named: in which measures its laws are fitted, one after the other."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.data.operating_point import about_operating_point
+from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
+from analysis.diagnosis.errors.fit_score import fit_score
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.first_model.model_of_balance import first_model, share_within
+from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduced_recordings
+from analysis.diagnosis.forces.predicted_force import PredictedForce
+from analysis.diagnosis.settings import LAWS_WITHIN
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Recording
+
+MENDED = 0.9
+"""Times the error that a constant may leave at most to be worth saying; principle: as a named law, `confirm_laws`.
+"""
+ABOUT_MEAN = (
+    "The fitted model holds no constants: one was added to the command, with which it keeps the mean position of what "
+    "was fitted to. Weights, offsets of sensor and amplifier, and the point that the device works at are all in it."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """A model, and how its errors are measured."""
+
+    model: MechanicalModel
+    chosen: Chosen
+    narrow: bool = False
+    """Only up to where noise is small in the force, which may leave numbers of laws open."""
+
+
+def look_of(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    clean: Sequence[Recording],
+    compared: Compared,
+    about_mean: bool = False,
+) -> Look:
+    """about_mean: the model was fitted to what changes, and is played about the mean where that leaves less."""
+    look = Look(model, measure_of(recordings, model, clean, compared))
+    moved = about_operating_point(recordings, model) if about_mean and not clean else None
+    if moved is None or look.chosen.measure.name != "free simulation":
+        return look
+    other = measure_of(moved, model, clean, compared)
+    if other.measure.name != "free simulation" or _left(model, other) > MENDED * _left(model, look.chosen):
+        return look
+    return Look(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
+
+
+def _left(model: MechanicalModel, chosen: Chosen) -> float:
+    """As the model is, on what may be fitted to: the error over the noise."""
+    measure = chosen.measure
+    tuning = tuning_of(model, measure.records[0].recording.command.channels)
+    given = evaluated(measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    return fit_score(measure, given.residuals).worst_channel
+
+
+def looks_of(
+    recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
+) -> Iterator[Look]:
+    """In a free simulation, the strictest, where the fitted model bears one; else along the measured motion, with the
+    balance's own linear numbers: up to where noise is small, where that holds what the laws push, or else as far as the
+    balance looked."""
+    if not any(balance.named for balance in balances):
+        return
+    chosen = measure_of(recordings, model)
+    if time_unit(recordings[0]) != "s":
+        yield Look(model, chosen)
+        return
+    if chosen.measure.name == "free simulation" and compared != "force":
+        yield Look(model, chosen)
+    if compared == "motion":
+        return
+    try:
+        reduced = reduced_recordings(recordings, balances) if is_reduced(balances) else recordings
+        rigid = first_model(balances, reduced[0], model.name)
+        if rigid is not None:
+            narrow = measure_by_force(reduced, rigid, None)
+            held = share_within(balances, narrow.measure.band_hz) if isinstance(narrow.measure, PredictedForce) else 0.0
+            if held >= LAWS_WITHIN:
+                yield Look(rigid, narrow, narrow=True)
+            yield Look(rigid, measure_by_force(reduced, rigid, balances[0].searched.regression.motions[0].band_hz))
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return

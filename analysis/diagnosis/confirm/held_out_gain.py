@@ -1,0 +1,56 @@
+"""The share of the held-out error power that goes with an effect, with an interval from resampled stretches.
+
+No device is within its sensors' noise of any model, so that no remainder in units of noise says whether an effect is
+right: what it foretells of samples that nothing was fitted to does. Stretches are resampled, for residuals are
+correlated (Kunsch, Ann. Stat. 17:1217, 1989).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.balance.weighed import LEVEL, drawn_of
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.search.search_context import FittedCandidate
+from equalizer.signals.signal import FloatArray
+
+STRETCHES = 16
+"""Of all that is held out together, about."""
+LEAST_STRETCHES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutGain:
+    """Shares of the error power, the mean over the channels of each one's."""
+
+    gain: float
+    low: float
+    """At 2.5 %,"""
+    high: float
+    """and at 97.5 %."""
+
+
+def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: FittedCandidate) -> HeldOutGain | None:
+    """measure: with the sealed samples, as both fitted_candidates' fits. None where too little is held out."""
+    left, right = (_powers(measure, each) for each in (without, with_it))
+    if len(left) < LEAST_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
+        return None
+    # Each channel in units of what is left of it without the effect: no channel drowns the others.
+    size = np.maximum(left.sum(axis=0), np.finfo(float).tiny)
+    before, after = (left / size).mean(axis=1), (right / size).mean(axis=1)
+    drawn = drawn_of(len(before))
+    shares = 1 - after[drawn].sum(axis=1) / np.maximum(before[drawn].sum(axis=1), np.finfo(float).tiny)
+    low, high = np.quantile(shares, [LEVEL, 1 - LEVEL])
+    return HeldOutGain(float(1 - after.sum() / before.sum()), float(low), float(high))
+
+
+def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
+    """(stretches, c): sums of squares of the held-out residuals."""
+    total = sum(int(record.test.sum()) for record in measure.records)
+    found = []
+    for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):
+        places = np.flatnonzero(record.test)
+        if len(places):
+            count = int(np.clip(round(STRETCHES * len(places) / total), 1, len(places)))
+            found += [np.sum(residuals[part] ** 2, axis=0) for part in np.array_split(places, count)]
+    return np.array(found).reshape(len(found), -1)

@@ -1,0 +1,139 @@
+"""What a search beside a given model may claim where its errors are not those of noise: by held-out gain.
+
+Where repeats tell a noise that is about as large as what is left, the verdict is the likelihood's (`verdict`).
+Elsewhere a real device is far from any model in units of its noise, and no true law brings the error anywhere near it.
+A name is then confirmed by what it takes of the held-out error power: against the re-tuned model, against its best
+rival, and against what could be taken at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.plainest_structure import NOTABLE
+from analysis.diagnosis.balance.weigh import CEILING, PLAYED_AS, Balance
+from analysis.diagnosis.confirm.balance_beside_model import balances_beside
+from analysis.diagnosis.confirm.confirm_laws import searched_by_balance
+from analysis.diagnosis.confirm.fitting_measures import Look
+from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
+from analysis.diagnosis.errors.hypothesis import Claim
+from analysis.diagnosis.search.parsimony import only_refines
+from analysis.diagnosis.search.search import Searched, Unconfirmed
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.settings import NAMED_ERROR, RETUNING_BOUND
+from analysis.diagnosis.types import TimeBudget
+from equalizer.signals.recording import Recording
+
+AT_LIMIT = 0.97
+"""Of the bound of a re-tuned number, from which it presses against it."""
+SHOWN = 3
+"""Contenders of the last round that are told with their gain."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beside:
+    searched: Searched
+    balances: tuple[Balance, ...] = ()
+    """Empty where nothing is missing, or no motion was measured."""
+
+
+def weighed_beside(recordings: Sequence[Recording], look: Look, seen: Searched, time_left: TimeBudget) -> Beside:
+    """seen: by simulation."""
+    if seen.judged.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
+        return Beside(seen)
+    known_noise = all(floor.how == "repeats" for floor in look.chosen.floors)
+    balances = balances_beside(recordings, look.model, seen.context.barred, time_left)
+    near = float(np.nanmax(seen.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
+    if seen.judged.named or seen.found.barred:
+        return Beside(seen, balances)
+    if known_noise and near:
+        why_not = "the noise is known here, and what it leaves is more than noise"
+        return Beside(replace(seen, unconfirmed=_unconfirmed(seen, why_not)), balances)
+    why_not = objection(seen, balances)
+    if seen.found.steps and not why_not:
+        return Beside(replace(seen, judged=Judgement("partly_explained", True)), balances)
+    found = searched_by_balance(seen.context, balances, known_noise) if balances else None
+    if found is not None and not objection(found, balances):
+        judged = replace(found.judged, verdict="partly_explained")
+        return Beside(replace(found, judged=judged, remarks=seen.remarks), balances)
+    return Beside(replace(seen, unconfirmed=_unconfirmed(seen, why_not)), balances)
+
+
+def objection(seen: Searched, balances: Sequence[Balance]) -> str:
+    """Why what was found is not named, as a sentence; empty where it is to be."""
+    context, found = seen.context, seen.found
+    if not found.steps:
+        return "it takes too little of the error to be added"
+    whole = held_out_gain(context.whole, found.retuned, found.after)
+    before = context.confirmed(found.steps[-2]) if len(found.steps) > 1 else found.retuned
+    last = held_out_gain(context.whole, before, found.after)
+    if whole is None or last is None:
+        return "too little was held out to confirm it"
+    if min(whole.low, last.low) <= 0:
+        return "its gain on held-out data is not larger than what varies between stretches"
+    if min(whole.gain, last.gain) < NOTABLE:
+        return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
+    if np.any(np.abs(found.after.fitted.deviations) >= AT_LIMIT * RETUNING_BOUND):
+        return "beside it, a number of the model stands at the end of its tolerance"
+    rival = _best_rival(context, seen)
+    if rival is not None and _not_better(context, rival, found.after):
+        return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
+    claims = found.after.fitted.hypothesis.claims
+    if whole.gain < CEILING and not all(_told_by_balance(claim, balances) for claim in claims):
+        return "it takes less than half of the error's power, and the force balance does not bear it out"
+    return ""
+
+
+def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCandidate) -> bool:
+    ahead = held_out_gain(context.whole, rival, after)
+    return ahead is None or ahead.low <= 0
+
+
+def _best_rival(context: SearchContext, seen: Searched) -> FittedCandidate | None:
+    """Of the last step that was added: the best other effect that is no refinement of it, with the sealed samples."""
+    steps = seen.found.steps
+    if len(seen.found.rounds) < len(steps):
+        return None
+    best = steps[-1]
+    others = [
+        other
+        for other in seen.found.rounds[len(steps) - 1]
+        if other.newest != best.newest and not only_refines(other, best)
+    ]
+    return context.confirmed(others[0]) if others else None
+
+
+def _told_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
+    if claim.spread != "one" or claim.sites[0] >= len(balances):
+        return False
+    names = {
+        name
+        for weighed in balances[claim.sites[0]].named
+        for name in (weighed.law.effect, PLAYED_AS.get(weighed.law.effect, ""), *weighed.alike)
+    }
+    return claim.effect.name in names
+
+
+def _unconfirmed(seen: Searched, why_not: str) -> tuple[Unconfirmed, ...]:
+    """The best fitted_candidates of the round in which the search ended, the largest gain first."""
+    rounds = [fitted_candidates for fitted_candidates in seen.found.rounds if fitted_candidates]
+    if not rounds:
+        return ()
+    number = max(min(len(seen.found.steps), len(rounds)) - 1, 0)
+    first: dict[str, FittedCandidate] = {}
+    for candidate in rounds[number]:
+        first.setdefault(candidate.newest, candidate)
+    found = []
+    for place, candidate in enumerate([*first.values()][:SHOWN]):
+        gain = held_out_gain(seen.context.whole, seen.found.retuned, seen.context.confirmed(candidate))
+        if gain is not None and gain.gain > 0:
+            found.append(Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _behind(gain)))
+    return tuple(sorted(found, key=lambda each: -each.gain))
+
+
+def _behind(gain: HeldOutGain) -> str:
+    if gain.low <= 0:
+        return "its gain on held-out data is not larger than what varies between stretches"
+    return "another leaves less of what was fitted to"

@@ -1,0 +1,249 @@
+"""Checks before a diagnosis: recordings of one device, a model of that device, enough data. What fails here is refused
+and gets no verdict, not even `unexplained`."""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from analysis.diagnosis.data.carried_weight import weight_problems
+from analysis.diagnosis.data.driven_response import answer
+from analysis.diagnosis.data.growth import growth_rate, motions
+from analysis.diagnosis.data.observed_parts import samples_to_fit
+from analysis.diagnosis.settings import (
+    ANSWER_DEVIATIONS,
+    CYCLES_SHARE,
+    LARGEST_VALUE,
+    LEAST_CYCLES,
+    LEAST_SAMPLES,
+    LEAST_SAMPLES_TO_FIT,
+    MOST_GROWTH,
+    SHORTEST_S,
+    SHORTEST_SAMPLES,
+)
+from equalizer.effects.placing import PlacingError, placed_effects
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+FEW_CYCLES = "cycles of what was commanded, which is too short"
+
+
+class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
+    """`problems`: one sentence each, without a full stop."""
+
+    def __init__(self, problems: tuple[str, ...]) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
+
+
+def require_alike(
+    recordings: Sequence[Recording], names: Sequence[str], what_now: str = "diagnose them one by one"
+) -> None:
+    """Of one device with the same channels, units and rate. Raises NothingToDiagnose."""
+    if not recordings:
+        raise NothingToDiagnose(("there is no recording",))
+    first, problems = recordings[0], []
+    for other, name in zip(recordings[1:], names[1:], strict=True):
+        for what, expected, two in (
+            ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
+            ("command", _words(first.command), _words(other.command)),
+            ("response", _words(first.response), _words(other.response)),
+        ):
+            if expected != two:
+                problems.append(f"{name} has the {what} {two}, {names[0]} has {expected}; {what_now}")
+    if problems:
+        raise NothingToDiagnose(tuple(problems))
+
+
+def require_something(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+    """A command throughout, and responses that move, for long enough. Raises NothingToDiagnose."""
+    problems = [
+        problem for recording, name in zip(recordings, names, strict=True) for problem in _gaps(recording.command, name)
+    ]
+    problems += [
+        problem for recording, name in zip(recordings, names, strict=True) for problem in _absurd(recording, name)
+    ]
+    problems += _never(recordings)
+    if not problems:
+        known = sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
+        cycles = sum(_cycles(recording) for recording in recordings)
+        if known < LEAST_SAMPLES:
+            problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
+        elif known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S:
+            problems.append(
+                f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording; at least "
+                f"{SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
+            )
+        elif (fitted := samples_to_fit(recordings)) < LEAST_SAMPLES_TO_FIT:
+            problems.append(
+                f"only {fitted} samples of what may be fitted to hold a response, and a position where there is one; "
+                "the rest of it is missing, or has the role of a test"
+            )
+        elif cycles < LEAST_CYCLES:
+            needed = f"at least {LEAST_CYCLES:g} are needed, one part to fit and one to test"
+            problems.append(f"the recording holds about {cycles:.2g} {FEW_CYCLES}; {needed}")
+        elif (sure := answer(recordings)) is not None and sure < ANSWER_DEVIATIONS:
+            problems.append(
+                "the responses have nothing to do with the commands: what they share is no more than noise shares with "
+                "anything, so the recording is noise, of another device, or its command was not played"
+            )
+    if problems:
+        raise NothingToDiagnose(tuple(problems))
+
+
+def require_different(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+    """A recording that is taken twice would be tested by what it was fitted to. Raises NothingToDiagnose."""
+    problems = [
+        f"{names[two]} holds the same samples as {names[first]}, and a recording counts once"
+        for first, two in combinations(range(len(recordings)), 2)
+        if np.array_equal(recordings[first].response.samples, recordings[two].response.samples, equal_nan=True)
+        and np.array_equal(recordings[first].command.samples, recordings[two].command.samples, equal_nan=True)
+    ]
+    if problems:
+        raise NothingToDiagnose(tuple(problems))
+
+
+def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) -> None:
+    """recordings: alike. Raises NothingToDiagnose where the model cannot be of their device."""
+    first = recordings[0]
+    names = [recording.device or f"recording {number}" for number, recording in enumerate(recordings, 1)]
+    problems = (*_size(model, first), *_kind(model, first), *_absurd_model(model))
+    problems = problems or weight_problems(model, recordings, names)
+    if not problems:
+        problems = (*_idle(model, first), *_runaway(model, recordings), *_fast(model, first), *_effects(model, first))
+    if problems:
+        raise NothingToDiagnose(problems)
+
+
+def _gaps(command: Signal, name: str) -> Iterator[str]:
+    missing = int((~np.isfinite(command.samples)).any(axis=1).sum())
+    if missing:
+        first = int(np.argmax((~np.isfinite(command.samples)).any(axis=1)))
+        yield (
+            f"{name} misses the command in {missing} samples (the first is {first}), so it is not known what "
+            "the device was told; cut the recording there, or let its import bridge them (gap_s of the clock)"
+        )
+
+
+def _absurd(recording: Recording, name: str) -> Iterator[str]:
+    for side in ("command", "response", "position"):
+        signal: Signal | None = getattr(recording, side)
+        for channel in range(0 if signal is None else len(signal.channels)):
+            assert signal is not None
+            size = float(np.nanmax(np.abs(signal.samples[:, channel]), initial=0.0))
+            if size > LARGEST_VALUE:
+                yield (
+                    f"{name} holds values up to {size:.3g} {signal.units[channel]} in {side} "
+                    f"{signal.channels[channel]}, which no device reaches"
+                )
+
+
+def _never(recordings: Sequence[Recording]) -> Iterator[str]:
+    if all(np.ptp(recording.command.samples, axis=0).max(initial=0.0) == 0 for recording in recordings):
+        yield "the command never changes, so the device was not excited"
+    for side in ("response", "position"):
+        signals: list[Signal] = [found for recording in recordings if (found := getattr(recording, side)) is not None]
+        for channel, name in enumerate(signals[0].channels if signals else ()):
+            columns = [signal.samples[:, channel] for signal in signals]
+            finite = [column[np.isfinite(column)] for column in columns]
+            if not any(len(column) for column in finite):
+                yield f"{side} {name} holds no number, only missing values"
+            elif side == "response" and all(not len(column) or np.ptp(column) == 0 for column in finite):
+                yield f"{side} {name} never changes: it was not connected, or nothing moved"
+
+
+def _cycles(recording: Recording) -> float:
+    """Of the frequency below which most of the command's power lies; constant parts excite nothing."""
+    power = (np.abs(np.fft.rfft(recording.command.samples, axis=0)) ** 2).sum(axis=1)
+    power[0] = 0.0
+    return float(np.searchsorted(np.cumsum(power), CYCLES_SHARE * power.sum())) if power.any() else 0.0
+
+
+def _size(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    for side, own, channels in (
+        ("command", model.inputs, recording.command.channels),
+        ("response", model.outputs, recording.response.channels),
+    ):
+        if own != len(channels):
+            whose = "input" if side == "command" else "output"
+            yield (
+                f"the model has {own} {whose}{'s' if own != 1 else ''}, but the recording has {len(channels)} "
+                f"{side} channel{'s' if len(channels) != 1 else ''} ({', '.join(channels)})"
+            )
+
+
+def _kind(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    other = [quantity for quantity in recording.response.quantities if quantity != model.quantity]
+    if other:
+        words = ", ".join(sorted(set(other)))
+        yield f"the model answers with {model.quantity}, but the recording's response is {words}"
+    turning = _turning(recording)
+    if turning is not None and turning != model.rotational:
+        kinds = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
+        own, its = kinds[model.rotational], kinds[turning]
+        yield f"the model is {own}, but the recording is {its}: {_words(recording.response)}"
+
+
+def _turning(recording: Recording) -> bool | None:
+    """None where the units do not tell, such as volts."""
+    units = recording.response.units
+    if any(unit.split("/")[0] == "rad" for unit in units):
+        return True
+    return False if any(unit.split("/")[0] == "m" for unit in units) else None
+
+
+def _absurd_model(model: MechanicalModel) -> Iterator[str]:
+    for name in ("mass", "damping", "stiffness", "input", "output"):
+        size = float(np.abs(getattr(model, name)).max())
+        if size > LARGEST_VALUE:
+            yield f"the model's {name} holds {size:.3g}, which no device has"
+    if (lightest := float(np.linalg.eigvalsh(model.mass)[0])) < 1 / LARGEST_VALUE:
+        yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
+
+
+def _idle(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """What drives or sees nothing."""
+    idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
+    blind = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
+    if idle:
+        yield f"the model's input lets {', '.join(idle)} drive nothing"
+    elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
+        yield (
+            f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
+            "be told apart; make one command of those that push the same"
+        )
+    if blind:
+        yield f"the model's output lets {', '.join(blind)} see nothing"
+
+
+def _runaway(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
+    fastest = growth_rate(model)
+    longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
+    if fastest * longest_s > MOST_GROWTH:
+        yield (
+            f"the model is unstable: undisturbed it grows e-fold in {1 / fastest:.3g} s; damping and stiffness must "
+            "not be negative"
+        )
+
+
+def _fast(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    """Where the rate is a thousand times too low, most likely."""
+    swings_hz = np.abs(motions(model).imag) / (2 * np.pi)
+    slowest_hz = min((float(swing_hz) for swing_hz in swings_hz if swing_hz > 0), default=0.0)
+    if slowest_hz > recording.sample_rate_hz / 2:
+        yield (
+            f"the model swings at {slowest_hz:.3g} Hz and faster, which cannot be seen at a rate of "
+            f"{recording.sample_rate_hz:g} Hz; the recording must state its rate in hertz"
+        )
+
+
+def _effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+    try:
+        placed_effects(model, recording.command.channels, recording.response.channels)
+    except PlacingError as problem:
+        yield str(problem)
+
+
+def _words(signal: Signal) -> str:
+    return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))

@@ -1,0 +1,56 @@
+"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves of a sound device.
+
+The whitened residual is the one-step prediction error (Yule 1927, Walker 1931): each frequency is weighted by the
+inverse of the residual's spectrum on a device in order.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import fftconvolve
+
+from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.types import Mask
+from equalizer.signals.signal import FloatArray
+
+MOST_LAGS, SAMPLES_PER_LAG = 64, 50
+"""Largest order of the autoregression, and samples per lag."""
+FLAT = 1e-4
+"""White part added to the power, as a share of it: bounds the weight of any frequency."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WhiteningFilter:
+    steps: FloatArray
+    """(lags + 1, c): the whitening filter, the first row 1."""
+
+    @property
+    def lags(self) -> int:
+        return len(self.steps) - 1
+
+    def whitened(self, left: FloatArray) -> FloatArray:
+        """(n, c), NaN where it was. The filter is causal; unknown samples count as 0."""
+        known = np.isfinite(left)
+        filled = np.where(known, left, 0.0)
+        return np.where(known, fftconvolve(filled, self.steps, axes=0)[: len(left)], np.nan)
+
+    def warm(self, left: FloatArray) -> Mask:
+        """(n,): where all samples that the filter uses are known."""
+        unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(left).all(axis=1)])
+        until = np.concatenate([[0.0], np.cumsum(unknown)])
+        return np.asarray(until[self.lags + 1 :] == until[: len(left)], dtype=np.bool_)
+
+
+def whitening_filter(courses: Sequence[FloatArray], least: FloatArray) -> WhiteningFilter:
+    """courses: (n, c) each, NaN where not known. least: (c,), rms of noise that is white."""
+    count = sum(int(np.isfinite(course).all(axis=1).sum()) for course in courses)
+    lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
+    alike: FloatArray = np.sum([lagged_products(course, lags) for course in courses], axis=0) / max(count, 1)
+    alike[0] = alike[0] * (1 + FLAT) + least**2
+    steps = np.zeros((lags + 1, len(least)))
+    steps[0] = 1.0
+    for c, row in enumerate(alike.T):
+        steps[1:, c] = -solve_toeplitz(row[:-1], row[1:])
+    return WhiteningFilter(steps)

@@ -1,0 +1,150 @@
+"""Which structure a first model gets: the one asked for, or the plainest that held-out errors do not speak against."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import sliding
+from analysis.diagnosis.balance.motion import Motion, NoMotionError
+from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.first_model.model_structures import (
+    GAINED,
+    Balanced,
+    Kind,
+    StructureFit,
+    StructureRefused,
+    balanced,
+    modal,
+    plainest,
+    structure_of,
+)
+from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
+from equalizer.identification.mechanical.mechanical_lines import roles, segment_lines
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+MODES_GAIN = 0.1
+"""Of the held-out error in a free simulation, that modes must take off."""
+SHOWN = 0.1
+"""Of the power that remains, from which a shape in it is told."""
+SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
+    "the direction of motion, as dry friction does": lambda m: sliding(m.velocity, 0.01 * float(m.velocity.std())),
+    "the square of the speed": lambda m: m.velocity * np.abs(m.velocity),
+    "the square of the position": lambda m: (m.position - m.position.mean(axis=0)) ** 2,
+    "the cube of the position, as a hardening spring does": lambda m: (m.position - m.position.mean(axis=0)) ** 3,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    kind: Kind
+    error: float | None
+    """Root-mean-square over the signal's; None where it was refused."""
+    why_not: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    fit: StructureFit
+    tried: tuple[Tried, ...]
+    reason: str
+    remains: str
+
+
+def first_structure(
+    recordings: Sequence[Recording], wanted: Kind | None, on_progress: Callable[[float], None]
+) -> Choice:
+    """wanted: None = the best. Raises StructureRefused."""
+    try:
+        given: Balanced | None = balanced(recordings)
+        why = ""
+    except NoMotionError as problem:
+        given, why = None, str(problem)
+    if wanted is not None:
+        by_force = given is not None and wanted != "two-mode"
+        fit = structure_of(given, wanted) if by_force and given else modal(recordings, wanted, on_progress)
+        return Choice(fit, (Tried(fit.kind, fit.error, ""),), "It was asked for.", remains(given, fit))
+    fits, tried = _all(given, recordings, on_progress)
+    if not fits:
+        raise StructureRefused("; ".join(f"{one.kind}: {one.why_not}" for one in tried))
+    if given is None:
+        ordered = sorted(fits, key=lambda each: each.model.coordinates)
+        best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
+        said = f"Structures were compared by the held-out error of a free simulation, because {why}."
+        return Choice(best, tried, said, remains(None, best))
+    best = plainest(fits)
+    reason = (
+        f"{best.kind} is the structure of fewest numbers from which no other takes {100 * GAINED:.0f} % of the error "
+        "power, fold by fold."
+    )
+    return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)
+
+
+def remains(given: Balanced | None, fit: StructureFit) -> str:
+    """A sentence on what the model leaves."""
+    left = f"{100 * fit.error:.3g} % of the {fit.compared}"
+    if given is None or fit.joint is None or given.untimed:
+        return f"{left} remains."
+    motions = given.regressions[0].motions
+    left_over = [rows[m.kept(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
+    shares = {
+        name: _share([m.reduced(shape(m))[m.kept(m.fit)] for m in motions], left_over) for name, shape in SHAPES.items()
+    }
+    name, share = max(shares.items(), key=lambda item: item[1])
+    if share < SHOWN:
+        return f"{left} remains; it goes with neither speed nor position."
+    return f"{left} remains; {100 * share:.0f} % of its power goes with {name}."
+
+
+def _share(columns: Sequence[FloatArray], left: Sequence[FloatArray]) -> float:
+    """Of the remainder's power, the largest over the axes."""
+    x, y = np.vstack(columns), np.vstack(left)
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    size = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
+    return float(((x * y).sum(axis=0) ** 2 / size).max())
+
+
+def _all(
+    given: Balanced | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
+) -> tuple[list[StructureFit], tuple[Tried, ...]]:
+    kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if given is None else ("massless", "motor", "mass-spring")
+    fits, tried = [], []
+    for kind in kinds:
+        try:
+            fit = modal(recordings, kind, on_progress) if given is None else structure_of(given, kind)
+        except StructureRefused as refusal:
+            tried.append(Tried(kind, None, str(refusal)))
+            continue
+        fits.append(fit)
+        tried.append(Tried(kind, fit.error, ""))
+    return fits, tuple(tried)
+
+
+def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]) -> Choice:
+    """The same, or two-mode where a free simulation of held-out samples speaks for it."""
+    if plain.fit.kind != "mass-spring":
+        return plain
+    if any(in_closed_loop(one) or one.meta.get("imposed") for one in recordings):
+        why = "it is fitted to spectra, which a controller or an imposed motion bends"
+        return _tried(plain, Tried("two-mode", None, why))
+    try:
+        other = modal(recordings, "two-mode", on_progress)
+    except StructureRefused as refusal:
+        return _tried(plain, Tried("two-mode", None, str(refusal)))
+    fit, test = roles(recordings)
+    lines = [found for part in test or fit if (found := segment_lines(*part)) is not None]
+    ends = [float(bound(one.frequency_hz[one.excited])) for one in lines for bound in (np.min, np.max)]
+    errors = [
+        float(simulation_errors(model, lines, (min(ends), max(ends)))[0][-1])
+        for model in (plain.fit.model, other.model)
+    ]
+    said = f"In a free simulation mass-spring leaves {100 * errors[0]:.3g} %, two-mode {100 * errors[1]:.3g} %."
+    if errors[1] < (1 - MODES_GAIN) * errors[0]:
+        tried = (*plain.tried, Tried("two-mode", other.error, ""))
+        return Choice(other, tried, said, remains(None, other))
+    return _tried(plain, Tried("two-mode", other.error, "modes take too little off"), said)
+
+
+def _tried(plain: Choice, tried: Tried, said: str = "") -> Choice:
+    return Choice(plain.fit, (*plain.tried, tried), f"{plain.reason} {said}".rstrip(), plain.remains)

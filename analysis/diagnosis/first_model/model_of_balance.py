@@ -1,0 +1,102 @@
+"""The linear model that a force balance gives: one body per command."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.diagnosis.balance.motion import Motion
+from analysis.diagnosis.balance.weigh import Balance
+from analysis.diagnosis.first_model.reduced_recordings import is_reduced
+from analysis.diagnosis.settings import MASSLESS_SHARE
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+OPEN = 0.1
+"""Of the numbers found, one standard deviation at least."""
+
+
+def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
+    """recording: what `reduced_recordings` makes of it, where the balances hold more than one body per command. None
+    where not each command drives one measured motion. Raises MechanicalModelError."""
+    regressions = [balance.searched.regression for balance in balances]
+    count = len(balances)
+    if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
+        return None
+    places = [regression.beside.own for regression in regressions]
+    plain, full = (
+        [_numbers(balance, laws, places) for balance, laws in zip(balances, kinds, strict=True)]
+        for kinds in (
+            [()] * count,
+            [tuple(law.place for law in balance.named if law.place >= 0) for balance in balances],
+        )
+    )
+    matrices = [np.array([row[part] for row in plain]) for part in range(3)]
+    beside = [np.array([row[part] for row in full]) for part in range(3)]
+    mass, damping, stiffness = ((each + each.T) / 2 for each in matrices)
+    floor = MASSLESS_SHARE * _rms(np.vstack([each.force for each in regressions[0].motions]))
+    moved = [np.gradient(each.velocity[:, places], 1 / each.rate_hz, axis=0) for each in regressions[0].motions]
+    floor = floor / np.maximum(_rms(np.vstack(moved)), 1e-300)
+    mass = mass + np.diag(np.maximum(floor - np.diagonal(mass), 0.0))
+    spread = [
+        float(np.max(np.abs(given - full)) / 2 + OPEN * np.abs(given).max())
+        for given, full in zip((mass, damping, stiffness), beside, strict=True)
+    ]
+    turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
+    return MechanicalModel(
+        name,
+        recording.response.quantities[0],
+        mass,
+        damping,
+        stiffness,
+        np.eye(count),
+        np.eye(count),
+        tolerance=Tolerance(max(spread[0], 1e-12), max(spread[1], 1e-12), max(spread[2], 1e-12), None),
+        rotational=turning,
+    )
+
+
+def plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
+    """`first_model` where laws are named along the motions of one body per command: then it needs no other fit."""
+    if not any(balance.named for balance in balances) or is_reduced(balances):
+        return None
+    try:
+        return first_model(balances, recording, name)
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return None
+
+
+def share_within(balances: Sequence[Balance], band_hz: float) -> float:
+    """Of each named law's force, the power below a frequency; the least of them."""
+    shares = [1.0]
+    for balance in balances:
+        regression = balance.searched.regression
+        laws = [law.place for law in balance.named if law.place >= 0]
+        weights, begin = regression.weights(regression.chosen(laws)), regression.base
+        for place in (regression.places[law] for law in laws):
+            own = weights[begin : begin + place.stop - place.start]
+            begin += len(own)
+            shares.append(_below([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz))
+    return min(shares)
+
+
+def _below(courses: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+    within, whole = 0.0, 1e-300
+    for course, motion in zip(courses, motions, strict=True):
+        power = np.abs(np.fft.rfft(course - course.mean())) ** 2
+        frequency_hz = np.fft.rfftfreq(len(course), motion.step / motion.rate_hz)
+        within, whole = within + float(power[frequency_hz <= band_hz].sum()), whole + float(power.sum())
+    return within / whole
+
+
+def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows of mass, damping and stiffness, of the motions at these places."""
+    regression = balance.searched.regression
+    weights = regression.weights(regression.chosen(laws))[: regression.matrices]
+    d = len(regression.motions[0].channels)
+    rows = [*weights.reshape(-1, d)[:, list(places)], np.zeros(len(places))]
+    return rows[0], rows[1], rows[2]
+
+
+def _rms(samples: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.mean((samples - samples.mean(axis=0)) ** 2, axis=0)))

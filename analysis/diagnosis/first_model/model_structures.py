@@ -1,0 +1,256 @@
+"""Structures of a first model, each fitted to the same recordings, and the choice among them by held-out error."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from analysis.diagnosis.balance.law import scales_of
+from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
+from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
+from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR
+from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
+from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
+from equalizer.identification.mechanical.open_tolerance import opened
+from equalizer.plant.effect_vocabulary import matrix_unit
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, with_units_of
+from equalizer.signals.recording import Recording
+from equalizer.signals.unit_system import UnitSystem
+
+Kind = Literal["mass-spring", "two-mode", "gravity", "massless", "motor"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+PARTS_OF: dict[Kind, tuple[Part, ...]] = {
+    "massless": ("damping", "stiffness"),
+    "motor": ("mass", "damping"),
+    "mass-spring": PARTS,
+    "gravity": PARTS,
+}
+STUCK = 1e-6
+"""Of the least mass, and one standard deviation of what nothing tells, where no time is known."""
+GAINED = 0.02
+"""Of the plainer structure's error power, and"""
+SURE = 2.0
+"""standard errors over the folds, that a richer one must take off."""
+NAME = "first model, {}"
+FORCE, MOTION = "force along the measured motion", "free simulation"
+
+
+class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
+    """The recordings do not carry this structure; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    name: str
+    unit: str
+    value: float
+    half: float | None
+    """Of the 95 % interval; None where nothing tells it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StructureFit:
+    kind: Kind
+    model: MechanicalModel
+    numbers: tuple[Number, ...]
+    held_out: tuple[float, ...]
+    """Per axis or response channel: rms of the held-out error over that of the signal;"""
+    channels: tuple[str, ...]
+    compared: str
+    """what that signal is."""
+    joint: JointFit | None
+    """None where it was fitted to accelerations, or has modes."""
+    remarks: tuple[str, ...]
+
+    @property
+    def error(self) -> float:
+        """What structures are compared by: of folds, else of held-out samples."""
+        return self.joint.folds_error if self.joint else float(np.sqrt(np.mean(np.square(self.held_out))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Balanced:
+    """Recordings whose motion was measured along every command."""
+
+    recording: Recording
+    regressions: tuple[Regression, ...]
+    untimed: bool
+    turns: bool
+    rotational: bool
+
+
+def balanced(recordings: Sequence[Recording]) -> Balanced:
+    """Raises NoMotionError where forces cannot be balanced along a measured motion."""
+    first = recordings[0]
+    motions = motions_of(observed_parts(recordings, len(first.response.channels)))
+    count = len(first.command.channels)
+    if motions[0].order == 2:
+        raise NoMotionError("only accelerations were measured")
+    if len(motions[0].channels) != count or len(first.response.channels) != count:
+        raise NoMotionError("not every command has one measured motion of its own")
+    if not any(one.kept(one.fit).any() for one in motions):
+        raise NoMotionError("too little of the motion is to be fitted to")
+    rotational = any(unit.startswith(("rad", "N m")) for unit in (*first.response.units, *first.command.units))
+    turns = any(scales_of(motions, axis, rotational).turns for axis in range(count))
+    untimed = not np.isfinite(motions[0].band_hz)
+    return Balanced(first, regressions_of(motions, turns), untimed, turns, rotational)
+
+
+def structure_of(given: Balanced, kind: Kind) -> StructureFit:
+    """By the force balance. Raises StructureRefused."""
+    _refuse(given, kind)
+    parts = ("stiffness",) if given.untimed else PARTS_OF[kind]
+    try:
+        fit = joint_fit(given.regressions, parts)
+        model = _model(given, fit, kind)
+    except np.linalg.LinAlgError as problem:
+        raise StructureRefused("the motion does not tell its numbers apart") from problem
+    except MechanicalModelError as problem:
+        raise StructureRefused(f"its numbers are no mechanism: {problem}") from problem
+    names = given.recording.command.channels
+    return StructureFit(
+        kind,
+        model,
+        _numbers(given, fit, (model.system, parts)),
+        tuple(fit.held_out.tolist()),
+        names,
+        FORCE,
+        fit,
+        _remarks(given, kind),
+    )
+
+
+def modal(recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]) -> StructureFit:
+    """By spectra, for accelerations and for modes. Raises StructureRefused."""
+    if kind not in ("mass-spring", "two-mode"):
+        raise StructureRefused("it needs a measured position or velocity along every command")
+    axes = len(recordings[0].command.channels)
+    settings = MechanicalFitSettings(most_modes=axes if kind == "two-mode" else 0)
+    try:
+        fit = fit_mechanical_model(recordings, settings, on_progress, NAME.format(kind))
+    except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as problem:
+        raise StructureRefused(str(problem)) from problem
+    if kind == "two-mode" and fit.model.coordinates == axes:
+        raise StructureRefused("a mode on an axis does not lower the error on lines that were left out")
+    errors = tuple(one.fit if one.held_out is None else one.held_out for one in fit.errors)
+    remarks = (*(f"{text[:1].upper()}{text[1:].rstrip('.')}." for text in fit.remarks),)
+    channels = recordings[0].response.channels
+    first = recordings[0]
+    model = with_units_of(opened(fit.model), first.command.units, first.response.units)
+    return StructureFit(
+        kind,
+        model,
+        _modal_numbers(replace(fit.model, units=model.units), first),
+        errors,
+        channels,
+        MOTION,
+        None,
+        remarks,
+    )
+
+
+def plainest(fits: Sequence[StructureFit]) -> StructureFit:
+    """Of balanced fits, the one with fewest numbers from which no richer one takes a noticed part off, fold by fold; a
+    part below which no model goes is not noticed."""
+    ordered = sorted(fits, key=lambda one: (len(one.numbers), one.error))
+    best = ordered[0]
+    for other in ordered[1:]:
+        assert best.joint is not None and other.joint is not None
+        gains = best.joint.folds - other.joint.folds
+        spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+        if gains.sum() > max(GAINED * float(best.joint.folds.sum()), SURE * spread, MODEL_FLOOR**2):
+            best = other
+    return best
+
+
+def _refuse(given: Balanced, kind: Kind) -> None:
+    if given.untimed and kind != "massless":
+        raise StructureRefused("no time is known, so neither speeds nor accelerations are: only massless can be fitted")
+    if kind == "two-mode":
+        raise StructureRefused("it is fitted to spectra")
+    if given.turns and kind != "motor":
+        raise StructureRefused("the shaft goes round and round, where no spring holds it: only motor can be fitted")
+    if kind == "gravity" and not given.rotational:
+        raise StructureRefused("along a line a weight is a constant force, not a spring: gravity is of pendulums")
+
+
+def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
+    """Raises MechanicalModelError."""
+    mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
+    if kind == "massless":
+        mass = np.diag(_least_mass(given.regressions[0].motions)) * (STUCK if given.untimed else 1.0)
+    problems = tuple(
+        f"the {name} is negative ({matrix.diagonal().min():.3g})"
+        for name, matrix in (("mass", mass), ("damping", damping))
+        if matrix.diagonal().min() < 0
+    )
+    if problems:
+        raise MechanicalModelError(problems)
+    if np.linalg.eigvalsh(damping)[0] < 0:
+        damping = np.diag(np.diagonal(damping))
+    eye = np.eye(len(mass))
+    own = [fit.deviations[part] or None for part in PARTS]
+    recording = given.recording
+    model = MechanicalModel(
+        NAME.format(kind), given.recording.response.quantities[0], mass, damping, stiffness, eye, eye,
+        tolerance=Tolerance(own[0], own[1], own[2], None), rotational=given.rotational,
+    )  # fmt: skip
+    wide = opened(model)
+    assert wide.tolerance is not None
+    sizes = wide.tolerance
+    stated = Tolerance(sizes.mass_kg, sizes.damping_n_s_per_m or None, sizes.stiffness_n_per_m or None, None)
+    if given.untimed:
+        stated = Tolerance(STUCK, STUCK, sizes.stiffness_n_per_m, None)
+    units = recording.command.units, recording.response.units
+    return with_units_of(replace(wide, tolerance=stated), *units, time_unit(recording))
+
+
+def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """(d,): no simulation goes without one."""
+    force = np.vstack([one.force for one in motions]).std(axis=0)
+    moved = np.vstack([np.gradient(one.velocity, 1 / one.rate_hz, axis=0) for one in motions]).std(axis=0)
+    return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
+
+
+def _numbers(given: Balanced, fit: JointFit, said: tuple[UnitSystem, Sequence[Part]]) -> tuple[Number, ...]:
+    names, (system, parts) = given.recording.command.channels, said
+    return tuple(
+        Number(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
+               float(fit.halves[part][k, k]))
+        for part in parts
+        for k, name in enumerate(names)
+    )  # fmt: skip
+
+
+def _modal_numbers(model: MechanicalModel, recording: Recording) -> tuple[Number, ...]:
+    along, found = driven_axes(model), []
+    own = model.tolerance or Tolerance()
+    spread = (own.mass_kg, own.damping_n_s_per_m, own.stiffness_n_per_m)
+    for part, matrix, one in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
+        values = np.einsum("ni,nk,ki->i", along, matrix, along)
+        for name, value in zip(recording.command.channels, values.tolist(), strict=True):
+            found.append(Number(f"{part} {name}", matrix_unit(part, model.system), value, one and 1.96 * one))
+    inner = model.coordinates - model.inputs
+    if inner > 0:
+        squares = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real
+        swing = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        found += [Number(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(swing.tolist()), start=1)]
+    return tuple(found)
+
+
+def _remarks(given: Balanced, kind: Kind) -> tuple[str, ...]:
+    if kind == "gravity":
+        return (
+            "The weight is linearised: its stiffness is mass times lever times the acceleration of gravity at the mean "
+            "position, negative above the pivot; the vocabulary has no law of gravity, so large angles are not "
+            "described.",
+        )
+    if kind == "massless":
+        timed = "" if not given.untimed else " No time is known: samples are numbered, and damping is not fitted."
+        return (f"The mass in the file is a floor that no force shows; simulations need one.{timed}",)
+    return ()

@@ -1,0 +1,211 @@
+"""Recordings of any form as ones whose forces can be balanced along a measured motion; what was done is said.
+
+Only where no model is given: a model says itself what its commands and responses are.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.friction_laws import SHARP
+from analysis.diagnosis.balance.law import sliding
+from analysis.diagnosis.balance.motion import NoMotionError, motions_of
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.first_model.rectified import restored
+from analysis.diagnosis.first_model.unnamed_motion import with_named_motion
+from analysis.wording import listed
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+
+FORCES = frozenset({"force", "torque"})
+DRIVES = FORCES | {"voltage", "current"} | set(DERIVATIVE_OF_QUANTITY)
+"""What moves something; all else that is commanded is a condition."""
+STILL = 1e-9
+"""Of its size: what changes by less is the rounding of numbers."""
+MOTIONS = frozenset(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+
+Recordings = tuple[Recording, ...]
+Step = Callable[[Recordings], tuple[Recordings, str]]
+
+
+def plain_form(recordings: Sequence[Recording]) -> tuple[Recordings, tuple[str, ...]]:
+    """recordings: alike in channels, units and rate. And a sentence for each change."""
+    found, said = tuple(recordings), []
+    steps = (
+        with_named_motion, _conditions, _moving_commands, _moving_responses, _pushing_responses,
+        restored, _still, _summed,
+    )  # fmt: skip
+    for step in steps:
+        found, sentence = step(found)
+        said.append(sentence)
+    return found, tuple(filter(None, said))
+
+
+def _conditions(recordings: Recordings) -> tuple[Recordings, str]:
+    """Temperatures and settings among the commands."""
+    command = recordings[0].command
+    others = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVES]
+    if not others or len(others) == len(command.channels):
+        return recordings, ""
+    kept = [k for k in range(len(command.channels)) if k not in others]
+    names = listed([command.channels[k] for k in others])
+    return (
+        tuple(
+            replace(each, command=each.command.picked(kept), condition=_joined(each.condition, each.command, others),
+                    excitation=None if each.excitation is None else _same(each.excitation, each.command, kept))
+            for each in recordings
+        ),
+        f"{names} among the commands is no force: it was taken as a condition that laws may depend on.",
+    )  # fmt: skip
+
+
+def _moving_commands(recordings: Recordings) -> tuple[Recordings, str]:
+    """An imposed motion whose position and speed were both written down."""
+    command, response = recordings[0].command, recordings[0].response
+    if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
+        return recordings, ""
+    kept = _lowest(command)
+    if len(kept) == len(command.channels):
+        return recordings, ""
+    return tuple(replace(each, command=each.command.picked(kept), excitation=None) for each in recordings), (
+        f"The imposed motion was taken from {listed([command.channels[k] for k in kept])} alone."
+    )
+
+
+def _moving_responses(recordings: Recordings) -> tuple[Recordings, str]:
+    """Motions of one kind beside others, or beside what is no motion."""
+    response = recordings[0].response
+    quantities = set(response.quantities)
+    if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
+        return recordings, ""
+    kept = _lowest(response)
+    left = [name for k, name in enumerate(response.channels) if k not in kept]
+    return tuple(replace(each, response=each.response.picked(kept)) for each in recordings), (
+        f"Forces are balanced along {listed([response.channels[k] for k in kept])}; {listed(left)}, of another kind, "
+        "was left out."
+    )
+
+
+def _pushing_responses(recordings: Recordings) -> tuple[Recordings, str]:
+    """Several forces along fewer imposed motions."""
+    command, response = recordings[0].command, recordings[0].response
+    if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
+        return recordings, ""
+    count = len(command.channels)
+    if len(response.channels) <= count:
+        return recordings, ""
+    samples = np.vstack([each.response.samples for each in recordings])
+    sizes = np.array(
+        [np.std(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0 for column in samples.T]
+    )
+    kept = sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
+    left = [name for k, name in enumerate(response.channels) if k not in kept]
+    return tuple(replace(each, response=each.response.picked(kept)) for each in recordings), (
+        f"Of the forces along one motion the strongest, {listed([response.channels[k] for k in kept])}, was balanced; "
+        f"for {listed(left)}, import the recording with that force as its only response."
+    )
+
+
+def _still(recordings: Recordings) -> tuple[Recordings, str]:
+    """Commands that never change: nothing of their axis can be known. The motion of an axis is left out with its
+    command, where there is one for each."""
+    command, response = recordings[0].command, recordings[0].response
+    samples = np.vstack([each.command.samples for each in recordings])
+    samples = samples[np.isfinite(samples).all(axis=1)]
+    if len(command.channels) < len(response.channels) or not len(samples):
+        return recordings, ""
+    kept = np.flatnonzero(np.ptp(samples, axis=0) > STILL * np.abs(samples).max(axis=0)).tolist()
+    if len(kept) in (0, len(command.channels)):
+        return recordings, ""
+    paired = len(command.channels) == len(response.channels)
+    left = [name for k, name in enumerate(command.channels) if k not in kept]
+    gone = [name for k, name in enumerate(response.channels) if k not in kept] if paired else []
+    also = f" with {listed(gone)}, which no command moves" if gone else ""
+    return (
+        tuple(_with_axes(each, kept, paired) for each in recordings),
+        f"{listed(left)} among the commands never {_verb(left, 'changes')}, and {_verb(left, 'was')} left out{also}.",
+    )
+
+
+def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording:
+    """Of some commands; paired: and of the responses, and positions, in the same places."""
+    command, position, excitation = recording.command, recording.position, recording.excitation
+    alike = position is not None and len(position.channels) == len(recording.response.channels)
+    return replace(
+        recording,
+        command=command.picked(kept),
+        excitation=None if excitation is None else _same(excitation, command, kept),
+        response=recording.response.picked(kept) if paired else recording.response,
+        position=position.picked(kept) if paired and alike and position is not None else position,
+    )
+
+
+def _verb(names: Sequence[str], one: str) -> str:
+    plural = {"changes": "change", "was": "were", "drives": "drive"}
+    return one if len(names) == 1 else plural[one]
+
+
+def _summed(recordings: Recordings) -> tuple[Recordings, str]:
+    """More commands than motions: those that push the same motion become one, each with the gain that fits."""
+    command, response = recordings[0].command, recordings[0].response
+    if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCES:
+        return recordings, ""
+    try:
+        gains, main = _gains(recordings)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return recordings, ""
+    others = [name for k, name in enumerate(command.channels) if k != main]
+    return (
+        tuple(
+            replace(each, command=replace(each.command.picked([main]), samples=each.command.samples @ gains[:, None]),
+                    excitation=None)
+            for each in recordings
+        ),
+        f"{listed(others)} {_verb(others, 'drives')} the same motion as {command.channels[main]}: one command was made "
+        f"of them, {' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
+    )  # fmt: skip
+
+
+def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
+    """(m,), 1 for the command that pushes the strongest; and which that is."""
+    motions = motions_of(observed_parts(recordings, 1))
+    rows, aims = [], []
+    for motion in motions:
+        rubbing = sliding(motion.velocity, SHARP * max(float(motion.velocity.std()), 1e-300))
+        courses = [motion.force, motion.velocity, motion.position, rubbing]
+        if not np.isfinite(motion.band_hz):
+            courses, aim = [motion.force, rubbing], motion.position
+        else:
+            aim = motion.acceleration
+        kept = motion.kept(motion.fit)
+        rows.append(np.hstack([motion.reduced(np.hstack(courses)), np.ones((len(aim[:: motion.step]), 1))])[kept])
+        aims.append(motion.reduced(aim)[kept])
+    x, y = np.vstack(rows), np.vstack(aims)[:, 0]
+    size = np.maximum(x.std(axis=0), 1e-300)
+    size[-1] = 1.0
+    pushed = np.linalg.lstsq(x / size, y, rcond=None)[0][: motions[0].force.shape[1]]
+    main = int(np.argmax(np.abs(pushed)))
+    own = pushed / size[: len(pushed)]
+    return np.asarray(own / own[main]), main
+
+
+def _lowest(signal: Signal) -> list[int]:
+    """Channels of the lowest derivative."""
+    orders = [DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTIONS else 9 for quantity in signal.quantities]
+    return [k for k, order in enumerate(orders) if order == min(orders)]
+
+
+def _same(excitation: Signal, command: Signal, kept: Sequence[int]) -> Signal | None:
+    return excitation.picked(kept) if len(excitation.channels) == len(command.channels) else None
+
+
+def _joined(condition: Signal | None, command: Signal, places: Sequence[int]) -> Signal:
+    more = command.picked(places)
+    if condition is None:
+        return more
+    return Signal(
+        np.hstack([condition.samples, more.samples]), more.sample_rate_hz, (*condition.quantities, *more.quantities),
+        (*condition.units, *more.units), (*condition.channels, *more.channels),
+    )  # fmt: skip

@@ -1,0 +1,112 @@
+"""Recordings as forces along the measured motion: choice of the band, and the noise in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.data.measured_motion import MeasuredMotion, measured_motion
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.forces.inverse_lines import inverse_lines
+from analysis.diagnosis.forces.needed_force import band_motion
+from analysis.diagnosis.forces.predicted_force import PredictedForce, edge_samples
+from analysis.diagnosis.noise.channel_noise import ChannelNoise
+from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from equalizer.effects.simulation.along_motion import entered_force
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.band_limited import band_limited, low_pass
+from equalizer.signals.signal import FloatArray, Signal
+
+KNOWN = 0.01
+"""Share of its rms to which an actuator's force is known at best: counted as noise, for nothing else tells it."""
+NOISE_SHARE = 0.02
+"""Of the force's rms: what the motion's noise may make of it. Differentiation makes more the wider the band is."""
+WIDEST, NARROWEST = 0.2, 0.002
+"""Bands, over the sample rate."""
+REACH = 10.0
+"""The band ends at so many times the frequency below which half of the force's power lies, or earlier."""
+UNKNOWN = 1e-4
+"""Share of the motion's rms taken for its noise where nothing tells it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceViews:
+    measure: PredictedForce
+    floors: tuple[NoiseFloor, ...]
+    """Of the views, per record."""
+
+
+def force_views(
+    records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
+) -> ForceViews:
+    """records: with motion, see `has_motion`. band_hz: up to which forces are compared; None = by the noise."""
+    motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
+    entered = [
+        entered_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
+        for record in records
+    ]
+    band_hz = band_hz or _band(records, motions, entered, floors, model)
+    views, seen = [], []
+    for record, motion, force, floor in zip(records, motions, entered, floors, strict=True):
+        view = _view(record, force, band_hz)
+        views.append(view)
+        seen.append(_floor(model, motion, floor, band_hz))
+    noise = np.fmin.reduce([view.response_rms for view in seen])
+    known = KNOWN * np.sqrt(np.mean(np.vstack([view.measured for view in views]) ** 2, axis=0))
+    noise = np.asarray(np.hypot(noise, known))
+    rate_hz = records[0].recording.sample_rate_hz
+    courses = tuple(band_motion(motion.position, rate_hz, band_hz) for motion in motions)
+    measure = PredictedForce(tuple(views), courses, noise, noise, band_hz)
+    return ForceViews(measure, tuple(seen))
+
+
+def _band(
+    records: Sequence[Observed],
+    motions: Sequence[MeasuredMotion],
+    entered: Sequence[FloatArray],
+    floors: Sequence[NoiseFloor],
+    model: MechanicalModel,
+) -> float:
+    """The widest in which the noise stays a small share of the force, in the quietest record."""
+    rate_hz = records[0].recording.sample_rate_hz
+    power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in entered)
+    widest = REACH * float(np.median([_middle_hz(force, rate_hz) for force in entered])) / rate_hz
+    for band_hz in np.geomspace(min(max(widest, NARROWEST), WIDEST), NARROWEST, 24) * rate_hz:
+        noise = min(
+            float(np.max(_floor(model, motion, floor, float(band_hz)).response_rms))
+            for motion, floor in zip(motions, floors, strict=True)
+        )
+        if noise <= NOISE_SHARE * np.sqrt(power):
+            break
+    return float(band_hz)
+
+
+def _middle_hz(force: FloatArray, rate_hz: float) -> float:
+    """Below which half of the power lies."""
+    power = (np.abs(np.fft.rfft(force - force.mean(axis=0), axis=0)) ** 2).sum(axis=1)
+    return float(np.searchsorted(np.cumsum(power), power.sum() / 2)) * rate_hz / len(force)
+
+
+def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
+    recording = record.recording
+    rate_hz, command = recording.sample_rate_hz, recording.command
+    within = band_limited(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
+    signal = Signal(within, rate_hz, command.quantity, command.unit, command.channels)
+    view = replace(recording, response=signal, position=None)
+    edge = min(edge_samples(rate_hz, band_hz), len(within) // 8)
+    inside = np.zeros(len(within), dtype=np.bool_)
+    inside[edge : len(within) - edge] = True
+    return Observed(
+        view, record.command, signal.samples, record.fit & inside, record.choose & inside, record.test & inside
+    )
+
+
+def _floor(model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float) -> NoiseFloor:
+    frequency_hz, m = floor.frequency_hz, model.inputs
+    within = low_pass(frequency_hz, band_hz)[:, None, None]
+    gain = np.abs(within * inverse_lines(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
+    guessed = (UNKNOWN * np.std(motion.position, axis=0)) ** 2
+    density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, guessed))
+    freedom = np.full(m, float(np.max(floor.response.freedom, initial=1.0)))
+    noise = ChannelNoise(np.sqrt(density.mean(axis=0)), density, freedom, np.zeros(m))
+    return NoiseFloor(floor.how, frequency_hz, noise, None, floor.remarks)

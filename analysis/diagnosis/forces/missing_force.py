@@ -1,0 +1,47 @@
+"""The force along each driven axis that would explain a model's residual, and the motion that it causes.
+
+Deconvolution through the model, line by line, with the noise as the measure of what may be left (a latent force in the
+sense of Rogers and Friis 2021, by Wiener's filter).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+
+from analysis.diagnosis.forces.transfer import axis_transfer
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+_SETTLING_S = 2.0
+"""Zeros behind the record, so that its end does not run into its start."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MissingForce:
+    force: FloatArray
+    """(n, m), N"""
+    position: FloatArray
+    """(n, m): what that force adds to the motion of the driven axes,"""
+    velocity: FloatArray
+    """and to their velocity."""
+
+
+def missing_force(
+    model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_n: FloatArray
+) -> MissingForce:
+    """residuals: (n, c) in units of `unit` (c,); the response's channels, then the position's. expected_n: (m,), rms
+    that such a force may have; larger ones are let through, with more noise."""
+    n, c = residuals.shape
+    length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
+    seen = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
+    through = np.concatenate([seen.response, seen.position], axis=1)[:, :c] / unit[:c, None]
+    spectrum = rfft(residuals, length, axis=0)
+    adjoint = np.conj(np.swapaxes(through, 1, 2))
+    normal = adjoint @ through + np.diag(1 / expected_n**2)
+    force = np.linalg.solve(normal, adjoint @ spectrum[:, :, None])
+    back = [
+        irfft(part[:, :, 0], length, axis=0)[:n]
+        for part in (force, seen.axis_position @ force, seen.axis_velocity @ force)
+    ]
+    return MissingForce(*back)

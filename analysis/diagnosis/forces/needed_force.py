@@ -1,0 +1,101 @@
+"""Inverse dynamics: the force that a model needs for a measured motion, line by line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.forces.inverse_lines import inverse_lines, inverse_of
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.band_limited import low_pass, straight, through
+from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import FloatArray
+
+_NEARLY_STILL_HZ = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NeededForce:
+    """All (n, m), within a band."""
+
+    force: FloatArray
+    axis_position: FloatArray
+    axis_velocity: FloatArray
+    axis_acceleration: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BandMotion:
+    """A measured motion within a band: what every model's force is drawn from."""
+
+    position: FloatArray
+    """(n, m): as measured, finite, of the model's first m outputs' rows."""
+    sample_rate_hz: float
+    band_hz: float
+    at: tuple[FloatArray, FloatArray, FloatArray]
+    """(n, m) each: position, velocity and acceleration at each instant,"""
+    around: tuple[FloatArray, FloatArray, FloatArray]
+    """and their means over a sample's time around it."""
+
+
+def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
+    m = position.shape[1]
+
+    def gain(frequency_hz: FloatArray) -> ComplexArray:
+        wave = 2j * np.pi * frequency_hz
+        mean = np.sinc(frequency_hz / sample_rate_hz)
+        rows = [shape * wave**order for shape in (1.0, mean) for order in range(3)]
+        within = low_pass(frequency_hz, band_hz) * np.array(rows)
+        return np.asarray(np.einsum("rl,ij->lrij", within, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
+
+    found = through(position, sample_rate_hz, gain).reshape(len(position), 6, m)
+    slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
+    found[:, [0, 3]] += straight(position)[:, None]
+    found[:, [1, 4]] += slope
+    x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(found[:, k]) for k in range(6))
+    return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
+
+
+def needed_force(model: MechanicalModel, motion: BandMotion) -> NeededForce:
+    """Actuator, sensor and effects apart; the mean force over a sample's time around each instant. Raises
+    numpy.linalg.LinAlgError where these rows do not say how the model moves."""
+    if model.coordinates == model.inputs:
+        return _of_seen_bodies(model, motion)
+    position, sample_rate_hz = motion.position, motion.sample_rate_hz
+    m, learned = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
+
+    def gain(frequency_hz: FloatArray) -> ComplexArray:
+        within = low_pass(frequency_hz, motion.band_hz)[:, None, None]
+        inverse = learned(frequency_hz)
+        inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
+        wave = 2j * np.pi * frequency_hz[:, None, None]
+        axes = inverse[:, m:]
+        return np.asarray(within * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
+
+    found = through(position, sample_rate_hz, gain) + _along_line(model, position, sample_rate_hz)
+    return NeededForce(*(found[:, part * m : (part + 1) * m] for part in range(4)))
+
+
+def _of_seen_bodies(model: MechanicalModel, motion: BandMotion) -> NeededForce:
+    """Where every coordinate is seen: no spectrum has to be taken again."""
+    moved = np.linalg.inv(model.output[: model.inputs])
+    pushed = np.linalg.inv(model.input)
+    matrices = model.stiffness, model.damping, model.mass
+    force = sum(
+        (course @ (pushed @ matrix @ moved).T for course, matrix in zip(motion.around, matrices, strict=True)),
+        np.zeros_like(motion.position),
+    )
+    along = (driven_axes(model).T @ moved).T
+    return NeededForce(force, *(course @ along for course in motion.at))
+
+
+def _along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
+    """(n, 4 m): of the straight line between the first and the last position, after which all has settled."""
+    m = model.inputs
+    line = straight(position)
+    slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
+    still = inverse_lines(model, np.array([0.0, _NEARLY_STILL_HZ]))
+    static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
+    moved = line @ static.T + slope @ rate.T
+    along = np.broadcast_to(slope @ static[m:].T, (len(line), m))
+    return np.hstack([moved, along, np.zeros((len(line), m))])

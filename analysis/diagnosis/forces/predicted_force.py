@@ -1,0 +1,172 @@
+"""The force that entered against the force that the model needs along the measured motion, within a band."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self, TypeVar, cast
+
+import numpy as np
+
+from analysis.diagnosis.data.carried_weight import carrying
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.forces.needed_force import BandMotion, NeededForce, band_motion, needed_force
+from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
+from equalizer.effects.simulation.along_motion import entered_force, force_along
+from equalizer.effects.simulation.bodies import bodies_of
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.band_limited import band_limited
+from equalizer.signals.signal import FloatArray
+
+EDGE = 0.5
+"""Periods of the band's end."""
+_Found = TypeVar("_Found")
+WEAKEST = 1e-3
+"""Of what is commanded: an actuator that gives no more gives nothing, and is none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictedForce:
+    """For a plant in closed loop, where the command hangs on the response, and for one that drifts freely."""
+
+    records: tuple[Observed, ...]
+    """Views: their `measured` is the force that entered, as far as it lies within the band."""
+    motions: tuple[BandMotion, ...]
+    """Per record: of the model's first m outputs, as measured."""
+    unit: FloatArray
+    noise: FloatArray
+    """(m,): rms of what the noise of the motion makes in the force."""
+    band_hz: float
+    name: str = "predicted force"
+    known: tuple[PlacedEffect, ...] = ()
+    """What the model's own file names: it is part of every simulation."""
+    least: float = 0.0
+    remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
+    """By what and record: what it was found of last, and what was found. Laws are compared on one model, and models on
+    one command."""
+
+    def with_records(self, records: tuple[Observed, ...]) -> Self:
+        return replace(self, records=records)
+
+    def with_floor(self, rms: FloatArray) -> Self:
+        return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
+
+    def shortened(self) -> "PredictedForce":
+        kept = [
+            (self._cut(record), motion)
+            for record, motion in zip(self.records, self.motions, strict=True)
+            if (record.fit | record.choose).any()
+        ]
+        records = tuple(record for record, _ in kept)
+        motions = tuple(self._beginning(motion, len(record.command)) for record, motion in kept)
+        return replace(self, records=records, motions=motions)
+
+    def _beginning(self, motion: BandMotion, count: int) -> BandMotion:
+        whole = motion.position
+        return motion if count == len(whole) else band_motion(whole[:count], motion.sample_rate_hz, self.band_hz)
+
+    def _cut(self, record: Observed) -> Observed:
+        """At the last sample that decisions may see; what lies just before feels that nothing follows."""
+        cut, edge = record.shortened(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
+        inside = np.arange(len(cut.command)) < len(cut.command) - edge
+        return replace(cut, fit=cut.fit & inside, choose=cut.choose & inside)
+
+    def can_observe(self, effect: Effect) -> bool:
+        """Not of sensors: their reading is taken for the motion."""
+        return isinstance(effect.acts, (Structure, AxisForce, OnCommand))
+
+    def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        return tuple(
+            self._balance(model, (*self.known, *effects), number).left / self.unit
+            for number in range(len(self.records))
+        )
+
+    def evidence(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
+    ) -> tuple[Evidence, ...]:
+        return tuple(self._evidence(model, (*self.known, *effects), number) for number in range(len(self.records)))
+
+    def _balance(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Balance":
+        record, motion = self.records[number], self.motions[number]
+        rate_hz = record.recording.sample_rate_hz
+        model = carrying(model, record.recording)
+        structure = bodies_of(
+            model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
+        ).structure
+        needed = self._same("needed", number, (structure, motion), lambda: needed_force(structure, motion))
+        entered = self._entered(model, effects, number)
+        ahead = np.concatenate([needed.force[1:], needed.force[-1:]])
+        course = needed.axis_position, needed.axis_velocity, needed.axis_acceleration
+        pushing = entered.within - (needed.force + ahead) / 2
+        added = force_along(structure, effects, course, (record.command, pushing), rate_hz)
+        # Both are means over the step that begins at a sample; the needed force is that around it.
+        total = entered.around
+        if added.any():
+            total = total + band_limited(added, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+        # A weaker actuator must not make every error smaller.
+        strength = _rms(record.command)
+        weaker = strength / np.maximum(_rms(entered.force), WEAKEST * strength + np.finfo(float).tiny)
+        return _Balance(needed, (total - needed.force) * weaker, total)
+
+    def _entered(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Entered":
+        record = self.records[number]
+        rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
+        changed = [one for one in effects if isinstance(one.effect.acts, OnCommand)]
+
+        def found() -> _Entered:
+            force = entered_force(model, record.command, rate_hz, changed, hold)
+            late = band_limited(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+            return _Entered(force, band_limited(force, rate_hz, self.band_hz), late)
+
+        return found() if changed else self._same("entered", number, (model.actuator, record.command), found)
+
+    def _same(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
+        """As it was found last where it was of the very same."""
+        known = self.remembered.get((what, number))
+        if known is None or any(one is not other for one, other in zip(known[0], of, strict=True)):
+            known = of, find()
+            self.remembered[what, number] = known
+        return cast(_Found, known[1])
+
+    def _evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> Evidence:
+        record, found = self.records[number], self._balance(model, effects, number)
+        return Evidence(
+            model=carrying(model, record.recording),
+            sample_rate_hz=record.recording.sample_rate_hz,
+            command=record.command,
+            axis_position=found.needed.axis_position,
+            axis_velocity=found.needed.axis_velocity,
+            axis_force=-found.left,
+            response=found.needed.force,
+            predicted=found.total,
+            noise=self.noise,
+            used=(record.fit | record.choose).astype(np.float64),
+        )
+
+
+def edge_samples(sample_rate_hz: float, band_hz: float) -> int:
+    """At a record's end, where the filter has nothing to look at."""
+    return int(EDGE * sample_rate_hz / band_hz)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Entered:
+    """(n, m) each: the force that entered, mean over the step that begins at a sample; within the band; and there, as
+    the mean around the sample."""
+
+    force: FloatArray
+    within: FloatArray
+    around: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Balance:
+    needed: NeededForce
+    left: FloatArray
+    """(n, m): what entered, effects included, less what the motion needed; as if the actuator were as strong as it is
+    said to be."""
+    total: FloatArray
+    """(n, m): what entered, effects included."""
+
+
+def _rms(samples: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.mean(samples**2, axis=0)))

@@ -1,0 +1,95 @@
+"""A linear model of a device in closed loop, where none is given: masses, dampers and springs by least squares on
+forces, as rigid robots are identified (Gautier, Vandanjon and Pressé 1994). Spectra would be bent by the controller."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.closed_loop import in_closed_loop
+from analysis.diagnosis.data.measured_motion import has_motion
+from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.forces.force_views import force_views
+from analysis.diagnosis.forces.needed_force import needed_force
+from analysis.diagnosis.forces.predicted_force import PredictedForce
+from analysis.diagnosis.noise.noise_floor import noise_floor
+from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError, Tolerance
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+_ROUNDS = 2
+
+
+def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
+    """Whether a controller made the commands, or a motion was imposed."""
+    return can_be_rigid(recordings) and any(
+        in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
+    )
+
+
+def can_be_rigid(recordings: Sequence[Recording]) -> bool:
+    """Whether there is one measured position or velocity for every command."""
+    return all(_is_square(recording) for recording in recordings)
+
+
+def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
+    """One body per command. Raises MechanicalModelError where the forces give no mass."""
+    model = _unit_masses(recordings[0], name)
+    records = observed_parts(recordings, model.outputs)
+    if not all(has_motion(record.recording, model) for record in records):
+        raise MechanicalModelError(("neither positions nor velocities were measured",))
+    floors = [noise_floor(record.recording) for record in records]
+    for _ in range(_ROUNDS):
+        model = _by_forces(model, force_views(records, model, floors).measure)
+    return model
+
+
+def _is_square(recording: Recording) -> bool:
+    orders = [DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recording.response.quantities]
+    square = len(recording.command.channels) == len(recording.response.channels)
+    seen = recording.position if max(orders) == 2 else recording.response
+    return square and len(set(orders)) == 1 and seen is not None and len(seen.channels) == len(orders)
+
+
+def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
+    eye = np.eye(len(recording.command.channels))
+    turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
+    return MechanicalModel(name, recording.response.quantities[0], eye, 0 * eye, 0 * eye, eye, eye, rotational=turning)
+
+
+def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
+    rows, aims = [], []
+    for record, motion in zip(measure.records, measure.motions, strict=True):
+        moved = needed_force(model, motion)
+        used = record.fit | record.choose
+        courses = moved.axis_acceleration, moved.axis_velocity, moved.axis_position, np.ones((len(used), 1))
+        rows.append(np.hstack(courses)[used])
+        aims.append(record.measured[used])
+    shapes, aim, m = np.vstack(rows), np.vstack(aims), model.inputs
+    whole, left = _least_squares(shapes, aim)
+    loose, left_loose = _least_squares(np.delete(shapes, range(2 * m, 3 * m), axis=1), aim)
+    sprung = left < (1 - SPRING_SHARE) * left_loose
+    mass, damping = ((matrix + matrix.T) / 2 for matrix in (whole if sprung else loose)[: 2 * m].reshape(2, m, m))
+    mass = mass + np.diag(np.maximum(_least_mass(shapes[:, :m], aim) - np.diagonal(mass), 0.0))
+    stiffness = (whole[2 * m : 3 * m] + whole[2 * m : 3 * m].T) / 2 if sprung else np.zeros((m, m))
+    # A body that pushes itself is no linear model; what makes it seem so is for the diagnosis.
+    damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
+    stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
+    largest = [float(np.abs(np.diagonal(matrix)).max()) for matrix in (mass, damping, stiffness)]
+    open_ = Tolerance(
+        RIGID_MASS_SHARE * largest[0], RIGID_SHARE * largest[1] or None, RIGID_SHARE * largest[2] or None, None
+    )
+    return replace(model, mass=mass, damping=damping, stiffness=stiffness, tolerance=open_)
+
+
+def _least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
+    """(m,): of bodies whose inertia shows in no force: no simulation goes without one."""
+    return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
+
+
+def _least_squares(shapes: FloatArray, aim: FloatArray) -> tuple[FloatArray, float]:
+    """(k, m), and the mean square that is left."""
+    size = np.maximum(np.linalg.norm(shapes, axis=0), np.finfo(float).tiny)
+    found = np.linalg.lstsq(shapes / size, aim, rcond=None)[0] / size[:, None]
+    return np.asarray(found), float(np.mean((aim - shapes @ found) ** 2))

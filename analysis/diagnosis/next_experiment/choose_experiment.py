@@ -1,0 +1,123 @@
+"""Optimal experiment to discriminate two rivals: where they differ most after the rival was re-tuned.
+
+Hunter and Reiner (1965), with what has been recorded so far holding the rival's numbers. A difference that the rival
+can tune away, or that its tolerance covers, is none.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.data.carried_weight import heavier
+from analysis.diagnosis.document import NextExperiment
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import MOVED, Fitted
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.next_experiment.experiment_menu import Experiment
+from analysis.diagnosis.settings import TELLING_GAIN
+from equalizer.effects.simulation.simulator import simulate_mechanism
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.signals.recording import Hold
+from equalizer.signals.signal import FloatArray
+
+RETUNED = 3
+"""Steps of the rival towards the named one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bench:
+    """Where an experiment is played on paper."""
+
+    tuning: Tuning
+    sample_rate_hz: float
+    hold: Hold
+    noise: FloatArray
+    """(c,): rms per channel, response then position."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Foreseen:
+    experiment: Experiment
+    gain: float
+    """Log likelihood by which the true one would win."""
+
+
+def foresee(
+    bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
+) -> tuple[Foreseen, ...]:
+    """The most telling for its cost first, those that tell too little last. known: (t + numbers, twice), the
+    information on the rival's numbers that has been recorded so far, calibration included."""
+    found = [Foreseen(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu]
+    return tuple(
+        sorted(found, key=lambda foreseen: (foreseen.gain < TELLING_GAIN, -foreseen.gain / foreseen.experiment.minutes))
+    )
+
+
+def as_document(best: Foreseen, names: tuple[str, str]) -> NextExperiment | None:
+    """None where even the most telling recording would leave the rivals as good as each other."""
+    if best.gain < TELLING_GAIN:
+        return None
+    said = "; the recording's meta must say the weight (added_mass_kg, or added_inertia_kg_m2)"
+    return NextExperiment(
+        command=f"record {best.experiment.words}",
+        splits=names,
+        why=f"there the two differ by more than the noise and the tolerances can hide: the right one would win by "
+        f"{best.gain:.3g} in log likelihood{said if best.experiment.added else ''}",
+    )
+
+
+def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experiment: Experiment) -> float:
+    base = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
+    differs = _predicted(bench, named.deviations, named.hypothesis, named.hypothesis.point, experiment) - base
+    columns = []
+    for number in range(len(rival.deviations)):
+        there = rival.deviations.copy()
+        there[number] += MOVED
+        columns.append((_predicted(bench, there, rival.hypothesis, rival.hypothesis.point, experiment) - base) / MOVED)
+    for number, of in enumerate(rival.hypothesis.numbers):
+        point = rival.hypothesis.point.copy()
+        point[number] += of.move
+        columns.append((_predicted(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
+    return _left(bench, rival, known, (experiment, differs, np.array(columns))) / 2
+
+
+def _left(bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]) -> float:
+    """Squares that stay when the rival re-tunes, by steps that are tried out: what numbers do is no straight line.
+    seen: the experiment, the difference to be tuned away, and what each of the rival's numbers does to it."""
+    experiment, differs, moves = seen
+    tuned, t = np.zeros(len(known)), len(rival.deviations)
+    wanted = _predicted(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
+    whole, least, rest = float(differs @ differs), np.inf, differs
+    pull = moves @ differs
+    straight = whole - float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
+    for _ in range(RETUNED):
+        step = np.linalg.lstsq(moves @ moves.T + known, moves @ rest - known @ tuned, rcond=None)[0]
+        tuned = tuned + step
+        try:
+            there = _predicted(
+                bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], experiment
+            )
+        except (MechanicalModelError, np.linalg.LinAlgError):
+            break
+        rest = wanted - there
+        with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+            squares = float(rest @ rest + tuned @ known @ tuned)
+        if not squares < least:
+            break
+        least = squares
+    # Where the steps led away, what a straight line foresees: rather too little is promised.
+    return least if least < whole else max(straight, 0.0)
+
+
+def _predicted(
+    bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
+) -> FloatArray:
+    model: MechanicalModel = bench.tuning.tuned(deviations)
+    model = heavier(model, experiment.added) if experiment.added else model
+    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+        played = simulate_mechanism(
+            model, experiment.commands, bench.sample_rate_hz, hypothesis.placed(point), bench.hold
+        )
+        signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
+        return np.asarray((signals / bench.noise).ravel())

@@ -1,0 +1,77 @@
+"""The next recording for a finished search whose data could not tell two effects apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.diagnosis.document import NextExperiment
+from analysis.diagnosis.errors.output_error import fitting, own_columns
+from analysis.diagnosis.next_experiment.choose_experiment import Bench, Foreseen, as_document, foresee
+from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.parsimony import both_stand
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, sensitivity_at
+from equalizer.effects.placing import place_of_effect
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """For two that the data hold alike."""
+
+    names: tuple[str, str]
+    axis: int
+    level: float
+    """With which the menu was made."""
+    foreseen: tuple[Foreseen, ...]
+    """All of the menu, the best first."""
+
+    @property
+    def document(self) -> NextExperiment | None:
+        """None where no recording of the menu would tell."""
+        return as_document(self.foreseen[0], self.names)
+
+
+def proposed_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
+    """For the first pair of rivals that some recording would tell apart, else for the last pair; None where no rival
+    is as good as what is named."""
+    proposal = None
+    for fitted_candidates in found.rounds[: len(found.steps)]:
+        rival = _rival(fitted_candidates)
+        if rival is None:
+            continue
+        named, other = fitted_candidates[0].fitted, rival.fitted
+        claims = named.hypothesis.claims[-1], other.hypothesis.claims[-1]
+        record = context.measure.records[0]
+        sensed = place_of_effect(claims[0].effect) == "sensor"
+        axis = min(claims[0].sites[0], record.command.shape[1] - 1) if sensed else claims[0].sites[0]
+        level = float(np.abs(record.command).max())
+        rate_hz = record.recording.sample_rate_hz
+        bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
+        menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
+        foreseen = foresee(bench, named, other, _known(context, rival), menu)
+        proposal = Proposal((claims[0].effect.name, claims[1].effect.name), axis, level, foreseen)
+        if proposal.document is not None:
+            break
+    return proposal
+
+
+def _rival(fitted_candidates: tuple[FittedCandidate, ...]) -> FittedCandidate | None:
+    """The best of those that the answer holds beside the named effect."""
+    best = fitted_candidates[0]
+    name = best.newest
+    for other in fitted_candidates[1:]:
+        if other.newest != name and both_stand(best, other):
+            return other
+    return None
+
+
+def _known(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
+    """What has been recorded so far says of a candidate's numbers: the information matrix, with the calibration."""
+    fitted = candidate.fitted
+    own = own_columns(context.measure, context.tuning, fitted, fitting(context.measure, fitted.residuals))
+    columns = np.vstack([sensitivity_at(context, fitted.deviations, fitted.hypothesis).columns, own])
+    known = columns @ columns.T
+    t = len(fitted.deviations)
+    known[:t, :t] += np.eye(t)
+    return np.asarray(known)

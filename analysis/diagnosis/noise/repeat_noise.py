@@ -1,0 +1,115 @@
+"""Noise from the differences between repeated periods.
+
+Noise is as strong whatever is driven; a device that varies or rattles differs the more, the more it is driven. So the
+quietest segments count, and where even they differ by more than what is heard at rest, the rest does.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from analysis.diagnosis.noise.channel_noise import ChannelNoise, SegmentNoise
+from analysis.diagnosis.noise.periods import Periods, look_samples, look_spectra
+from analysis.diagnosis.noise.quiet_noise import hiss_at_rest
+from analysis.diagnosis.noise.rounding import rounded_noise, rounding_step
+from analysis.diagnosis.types import Mask
+from equalizer.identification.frequency_response.noise_floor import over_neighbours, spread_over_looks
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+_SMOOTHED_LINES = 9
+_ALIKE = 1e-4
+"""Chance that equal noise is taken for unequal."""
+_STEPS_MOVED = 1.2
+"""Rms of a movement in steps of rounding: with less, rounding may hide noise or add to it by chance."""
+_TINY = np.finfo(np.float64).tiny
+
+
+def repeat_noise(
+    recording: Recording, samples: FloatArray, periods: Sequence[Periods], lines_hz: FloatArray
+) -> ChannelNoise:
+    """periods: each with two looks or more. lines_hz: where the density is wanted."""
+    spreads = [_spread(recording, samples, period, lines_hz) for period in periods]
+    density, freedom = np.stack([spread for spread, _ in spreads]), np.stack([free for _, free in spreads])
+    variance = density.mean(axis=1)
+    moved = _moved(samples, periods)
+    counted = moved & quietest(np.where(moved, variance, np.inf), freedom)
+    weights = np.where(counted, freedom, 0.0)
+    pooled = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
+    freedom_pooled = weights.sum(axis=0)
+    varies = np.asarray(moved & ~counted)
+    floor, loud = _no_more_than_rest(recording, samples, pooled, freedom_pooled, np.asarray(varies.any(axis=0)))
+    smooth = over_neighbours(floor, _SMOOTHED_LINES)
+    smooth *= floor.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
+    whole, rounding = with_rounding(smooth, samples)
+    segments = tuple(
+        SegmentNoise(
+            period.index,
+            period.segment.amplitude,
+            variance[k],
+            freedom[k],
+            tuple(counted[k].tolist()),
+            tuple(varies[k].tolist()),
+        )
+        for k, period in enumerate(periods)
+    )
+    return ChannelNoise(np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(loud.tolist()))
+
+
+def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The density with what repeats of the rounding, and that part alone: (lines, channels), (channels,)."""
+    parts = [
+        rounded_noise(float(variance), rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
+        for variance, channel in zip(density.mean(axis=0), samples.T, strict=True)
+    ]
+    rounding: FloatArray = np.array(parts)
+    return density + rounding, rounding
+
+
+def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
+    """Which rows are as quiet as the quietest of their column. Both (rows, channels)."""
+    least = np.argmin(variance, axis=0)
+    columns = np.arange(variance.shape[1])
+    bound = f_distribution.isf(_ALIKE, freedom, freedom[least, columns])
+    return np.asarray(variance <= bound * variance[least, columns], dtype=np.bool_)
+
+
+def equal_lines(density: FloatArray) -> FloatArray:
+    """As many lines of equal power vary as much in total. density: (lines, channels)."""
+    equal: FloatArray = density.sum(axis=0) ** 2 / np.maximum(np.sum(density**2, axis=0), _TINY)
+    return np.maximum(equal, 1.0)
+
+
+def _spread(
+    recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    density = spread_over_looks(look_spectra(samples, periods)) * periods.length
+    freedom = 2 * (periods.looks - 1) * equal_lines(over_neighbours(density, _SMOOTHED_LINES))
+    own_hz = periods.frequency_hz(recording.sample_rate_hz)
+    if len(own_hz) != len(lines_hz):
+        density = np.stack([np.interp(lines_hz, own_hz, channel) for channel in density.T], axis=1)
+    return density, freedom
+
+
+def _moved(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
+    """(segments, channels): where a channel moves over its steps of rounding; all where it never does."""
+    steps = np.array([rounding_step(channel) for channel in samples.T])
+    moved = np.array([look_samples(samples, period).std(axis=(0, 1)) >= _STEPS_MOVED * steps for period in periods])
+    return np.asarray(moved | ~moved.any(axis=0), dtype=np.bool_)
+
+
+def _no_more_than_rest(
+    recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: Mask
+) -> tuple[FloatArray, Mask]:
+    """The density, capped by the hiss at rest in channels whose segments varied and where all are louder than it."""
+    none = np.zeros(len(varied), dtype=np.bool_)
+    hiss = hiss_at_rest(recording, samples)
+    if hiss is None or not varied.any():
+        return density, none
+    quiet = quietest(hiss.variance, hiss.freedom)
+    weights = np.where(quiet, hiss.freedom, 0.0)
+    rest = np.sum(weights * hiss.variance, axis=0) / weights.sum(axis=0)
+    bound = f_distribution.isf(_ALIKE, freedom, weights.sum(axis=0))
+    loud = varied & (density.mean(axis=0) > bound * rest) & (rest > 0)
+    return np.where(loud, np.minimum(density, rest), density), np.asarray(loud, dtype=np.bool_)

@@ -1,0 +1,170 @@
+"""The findings on one real recording as plain values."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from analysis.diagnosis.effect_words import numbers_text
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnNumber, RealAnswer
+from analysis.diagnosis.result.candidate_wording import candidate_sentences
+from analysis.diagnosis.result.findings import Course, Findings
+from analysis.diagnosis.result.localisation_words import localisation_sentences
+from analysis.diagnosis.result.wording import (
+    answer_of,
+    device_of,
+    effect_title,
+    inseparable_sentence,
+    remainder_sentence,
+)
+from analysis.wording import capital
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+_REACH = 1.96
+
+
+def answer_of_findings(
+    found: Findings,
+    recording: Recording,
+    names: tuple[str, str, str],
+    nominal: Mapping[str, float],
+) -> RealAnswer:
+    """names: of folder, recording and what it is. What only the caller knows (further tests, a pair, objections, the
+    time it took) is left empty."""
+    diagnosis, box = found.diagnosis, found.black_box
+    folder, recording_name, title = names
+    return RealAnswer(
+        folder=folder,
+        recording=recording_name,
+        title=title,
+        device=recording.device,
+        verdict=diagnosis.verdict,
+        answer=answer_of(found),
+        model=model_sentence(found),
+        error=diagnosis.error,
+        fitted=diagnosis.fit.fit,
+        held_out=diagnosis.fit.test,
+        black_box=None if box is None or not np.isfinite(box.test) else box.test,
+        where=localisation_sentences(found.local) if found.maps else (),
+        named=named_sentences(found),
+        effects=tuple(effect.effect for effect in diagnosis.effects),
+        left=remainder_sentence(diagnosis, device_of(found)),
+        remarks=found.remarks,
+        numbers=own_numbers(found, nominal),
+        stretches=held_out_stretches(found.courses),
+        excerpt=drawn_excerpt(found.courses),
+        further=(),
+        pair=None,
+        objections=(),
+        seconds=0.0,
+        candidates=diagnosis.candidates,
+        not_confirmed=candidate_sentences(diagnosis, device_of(found)),
+    )
+
+
+def named_sentences(found: Findings) -> tuple[str, ...]:
+    """Each effect with its numbers, and what these data cannot tell from it."""
+    single = found.given.inputs == 1
+    return tuple(
+        " ".join(
+            filter(
+                None,
+                (
+                    f"{capital(effect_title(effect, single))}, {numbers_text(effect.effect, effect.parameters)}.",
+                    inseparable_sentence(effect),
+                ),
+            )
+        )
+        for effect in found.diagnosis.effects
+    )
+
+
+def model_sentence(found: Findings) -> str:
+    given = found.given
+    bodies = "one body" if given.coordinates == 1 else f"{given.coordinates} bodies or modes"
+    driven = "one command" if given.inputs == 1 else f"{given.inputs} commands"
+    seen = "one response" if given.outputs == 1 else f"{given.outputs} responses"
+    return f"{capital(given.name)}: linear, {bodies}, {driven}, {seen} ({given.quantity})."
+
+
+def held_out_stretches(courses: Sequence[Course]) -> tuple[HeldOutStretch, ...]:
+    found = []
+    for course in courses:
+        for start, stop in course.tested:
+            part = slice(start, stop)
+            for c, channel in enumerate(course.channels):
+                measured = course.measured[part, c]
+                known = np.isfinite(measured)
+                if not known.any():
+                    continue
+                sizes = [
+                    float(np.sqrt(np.mean((measured - other)[known] ** 2)))
+                    for other in (measured[known].mean(), course.retuned[part, c], course.after[part, c])
+                ]
+                times = start / course.sample_rate_hz, stop / course.sample_rate_hz
+                if np.isfinite(sizes).all():
+                    found.append(HeldOutStretch(course.name, channel, course.units[c], *times, *sizes))
+    return tuple(found)
+
+
+DRAWN = 900
+"""Samples of an excerpt, around where re-tuned and final prediction differ most."""
+
+
+def drawn_excerpt(courses: Sequence[Course]) -> DrawnExcerpt | None:
+    stretches = [(course, *ends) for course in courses for ends in course.tested]
+    if not stretches:
+        return None
+    course, first, last = max(stretches, key=lambda stretch: float(_change(*stretch).max(initial=0.0)))
+    changed = _change(course, first, last)
+    at, c = divmod(int(np.argmax(changed)), changed.shape[1])
+    begin = max(min(first + at - DRAWN // 2, last - DRAWN), first)
+    part = slice(begin, min(begin + DRAWN, last))
+    measured, retuned, after = (
+        tuple(np.nan_to_num(course_of[part, c]).tolist())
+        for course_of in (course.measured, course.retuned, course.after)
+    )
+    step_s = 1 / course.sample_rate_hz
+    return DrawnExcerpt(
+        course.name, course.channels[c], course.units[c], begin * step_s, step_s, measured, retuned, after
+    )
+
+
+def _change(course: Course, start: int, stop: int) -> FloatArray:
+    """(samples, c): how far what was found moves the prediction, as a share of the channel's rms."""
+    size = np.maximum(np.nanstd(course.measured, axis=0), np.finfo(float).tiny)
+    return np.asarray(np.nan_to_num(np.abs(course.retuned - course.after)[start:stop] / size))
+
+
+# The simple model's own numbers after a diagnosis, with their intervals, where it is one body.
+def own_numbers(found: Findings, nominal: Mapping[str, float]) -> tuple[OwnNumber, ...]:
+    """Mass, damping and stiffness of one body; none where there are more. nominal: by these words, SI.
+
+    The intervals are at the end of the search, on the samples that were fitted to. Where what is left is no noise, they
+    are widened by how many times the noise it is: a law that is a little wrong shifts what stands beside it.
+    """
+    model, tuning = found.given, found.tuning
+    if model.coordinates != 1 or found.explanation.statistic is not None or tuning is None or found.own_errors is None:
+        return ()
+    after = found.explanation.after
+    wide = max(after.score.worst_channel, 1.0)
+    return _numbers(tuning, model, tuning.values(after.fitted.deviations), found.own_errors * wide, nominal)
+
+
+def _numbers(
+    tuning: Tuning, model: MechanicalModel, changes: FloatArray, errors: FloatArray, nominal: Mapping[str, float]
+) -> tuple[OwnNumber, ...]:
+    given = (model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0])
+    words = ("mass", "damping", "stiffness")
+    rows = zip(words, given, tuning.units, changes, errors, strict=False)
+    return tuple(_number(name, unit, float(start + by), float(error), nominal) for name, start, unit, by, error in rows)
+
+
+def _number(name: str, unit: str, value: float, error: float, nominal: Mapping[str, float]) -> OwnNumber:
+    reach = _REACH * error
+    sure = bool(np.isfinite(reach))
+    return OwnNumber(
+        name, unit, value, value - reach if sure else None, value + reach if sure else None, nominal.get(name)
+    )

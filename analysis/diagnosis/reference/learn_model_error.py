@@ -1,0 +1,180 @@
+"""The residual of a sound device from its re-tuned model, learned from clean recordings: it counts as noise."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.diagnosis.errors.choose_measure import Chosen, measure_of
+from analysis.diagnosis.errors.coloured_measure import ColouredMeasure, coloured
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.tuning import Tuning, tuning_of
+from analysis.diagnosis.errors.whitening_filter import WhiteningFilter, whitening_filter
+from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
+from analysis.diagnosis.localisation.mismatch_maps import cells_of
+from analysis.diagnosis.search.explain import retuned_alone
+from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, reference_recording
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.settings import LEARNED_TOO_MUCH
+from analysis.diagnosis.types import Mapper, Progress
+from analysis.wording import listed
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+
+LEARNING = "learning from the clean recordings"
+BEGUN = 0.02
+"""Share of the whole diagnosis that is done when learning ends."""
+
+
+class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
+    """The clean recordings cannot be compared with those to diagnose; a sentence without a full stop."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lesson:
+    measure: ErrorMeasure
+    tuning: Tuning
+    retuned: FittedCandidate
+    cells: tuple[MismatchCell, ...]
+    channels: FloatArray
+    """(c,): share of the signal."""
+
+    @property
+    def courses(self) -> tuple[FloatArray, ...]:
+        """Residuals, (n, c) each, in the channels' own units; NaN where samples do not count."""
+        return tuple(
+            np.where((record.fit | record.choose | record.test)[:, None], residual * self.measure.unit, np.nan)
+            for record, residual in zip(self.measure.records, self.retuned.fitted.residuals, strict=True)
+        )
+
+    @property
+    def signal(self) -> FloatArray:
+        return _signal(self.measure, self.retuned.fitted.residuals)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learned:
+    floor: CleanFloor
+    colour: WhiteningFilter
+    share: FloatArray
+    """(c,): rms of the whitened residual over the signal's; see `_signal`."""
+    sound: ReferenceRecordings
+
+    def beside(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
+        """The error measure of the recordings to diagnose, with this residual as coloured noise."""
+        return coloured(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
+
+
+def learned_from(
+    clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
+) -> Learned:
+    """clean: of the same device, alike in channels and units; the model is re-tuned to each by itself, for days differ.
+    diagnosed: what is to be diagnosed, measured alike. Raises NothingLearned where that cannot be."""
+    error = measure_of(diagnosed, model, clean).measure.name
+    lessons: list[_Lesson] = []
+    for number, recording in enumerate(clean):
+        progress(LEARNING, BEGUN * number / len(clean))
+        chosen = measure_of((recording,), model, (*diagnosed, *clean))
+        require_alike(chosen.measure.name, error)
+        lessons.append(_lesson(chosen, model, recording, map_))
+    floor = learn_floor([lesson.cells for lesson in lessons])
+    largest = np.max([lesson.channels for lesson in lessons], axis=0)
+    floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
+    return _with_colour(floor, lessons, map_)
+
+
+def floor_of(
+    clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
+) -> CleanFloor:
+    """As `learned_from`: what a given model misses of the clean recordings, too; none where they tell nothing."""
+    try:
+        return learned_from(clean, model, diagnosed, map_, progress).floor
+    except (NothingLearned, np.linalg.LinAlgError):
+        return CleanFloor()
+
+
+def require_alike(learned_by: str, error: str) -> None:
+    """Raises NothingLearned."""
+    if learned_by != error:
+        raise NothingLearned(
+            f"the clean recordings can only be compared by {learned_by}, those to diagnose by {error}, so that one "
+            "says nothing of the other"
+        )
+
+
+def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> Learned:
+    courses = [course for lesson in lessons for course in lesson.courses]
+    colour = whitening_filter(courses, np.min([lesson.measure.noise for lesson in lessons], axis=0))
+    shares = [
+        _rms([colour.whitened(course) for course in lesson.courses])
+        / _signal(lesson.measure, lesson.retuned.fitted.residuals)
+        for lesson in lessons
+    ]
+    share = np.max(shares, axis=0)
+    sound = [
+        reference_recording(
+            coloured(floored(lesson.measure, floor), colour, share * lesson.signal),
+            lesson.tuning,
+            lesson.retuned.fitted.deviations,
+            map_,
+        )
+        for lesson in lessons
+    ]
+    return Learned(floor, colour, share, ReferenceRecordings(tuple(sound), floor.beyond))
+
+
+def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
+    """(c,): rms about the mean of what was measured or of what the model foresees of it, the smaller of both: neither a
+    hum or a drift makes it larger, nor a model that is far off."""
+    measured = [record.measured for record in measure.records]
+    foreseen = [course - left * measure.unit for course, left in zip(measured, residuals, strict=True)]
+    sizes = [np.nanstd(np.vstack(courses), axis=0) for courses in (measured, foreseen)]
+    return np.asarray(np.maximum(np.fmin(*sizes), np.finfo(float).tiny))
+
+
+def _rms(courses: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(np.sqrt(np.nanmean(np.vstack(courses) ** 2, axis=0)))
+
+
+def _lesson(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
+    whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
+    context = SearchContext(whole.shortened(), whole, tuning, map_)
+    retuned = context.confirmed(context.candidate(retuned_alone(context)))
+    cells = cells_of(whole, retuned.fitted, chosen.floors)
+    return _Lesson(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
+
+
+def _channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:
+    """(c,): the largest over the samples to fit, to choose and to test by."""
+    stands = retuned.score
+    times = np.nanmax(np.maximum([stands.fit, stands.choose, stands.test], 1.0), axis=0)
+    return np.asarray(np.sqrt(times**2 - 1) * measure.noise / np.maximum(_size(measure), np.finfo(float).tiny))
+
+
+def floored(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
+    """With the learned residual counted as noise."""
+    return measure.with_floor(np.array(floor.channels) * _size(measure)) if floor.channels else measure
+
+
+def _size(measure: ErrorMeasure) -> FloatArray:
+    """(c,): rms of the signal."""
+    return np.asarray(np.nanstd(np.vstack([record.measured for record in measure.records]), axis=0))
+
+
+def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
+    """Empty where nothing was learned."""
+    if not floor.channels:
+        return ""
+    shares = listed([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
+    count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
+    said = (
+        f"What a sound device differs by from its re-tuned model was learned from {count}: {shares} of the channel's "
+        f"signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise here, more "
+        "of it where in frequency more of it lies. Named is only what explains more of what is diagnosed than "
+        f"{floor.beyond:.2g} times what it explains of a clean recording."
+    )
+    if max(floor.channels) <= LEARNED_TOO_MUCH:
+        return said
+    return f"{said} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."

@@ -1,0 +1,104 @@
+"""The search beside clean recordings: for effects that these do not show."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.fit_score import fit_score
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.reference.learn_model_error import Learned, floored
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.no_prediction import is_without_prediction
+from analysis.diagnosis.search.search import Searched, searched
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
+from analysis.diagnosis.types import Progress, TimeBudget
+from equalizer.effects.effect import Effect
+
+
+def searched_beside_reference(
+    context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Searched:
+    """context: as without sound recordings, but for what is certain. What is found has its residuals by the context's
+    own measure, with what a sound device differs by counted as noise.
+
+    Where much more is left than on a sound device, its colour is of little use: then what is simply larger than that
+    is looked for, too, and whichever leaves less stands.
+    """
+    fine = _by_contrast(context, learned, catalogue, progress, time_left)
+    if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
+        return fine
+    coarse = _by_size(context, learned, catalogue, progress, time_left)
+    return coarse if coarse.judged.named and _left(fine.context, coarse) < _left(fine.context, fine) else fine
+
+
+def _left(context: SearchContext, seen: Searched) -> float:
+    """Mean log error power of what is named, on the samples to fit and to choose by."""
+    stands = seen.found.after if seen.judged.named else seen.found.retuned
+    fitted = evaluated(context.measure, context.tuning, stands.fitted.deviations, stands.fitted.hypothesis)
+    return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
+
+
+def _by_size(
+    context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Searched:
+    wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
+    plain = floored(context.whole, wide)
+    seen = searched(replace(context, measure=plain.shortened(), whole=plain), catalogue, progress, time_left)
+    back = floored(context.whole, learned.floor).with_records(seen.context.whole.records)
+    own = replace(context, measure=back.shortened(), whole=back)
+    return replace(seen, context=own, found=_by(own, seen.found))
+
+
+def _by_contrast(
+    context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Searched:
+    plain = floored(context.whole, learned.floor)
+    whole = learned.beside(plain, context.tuning.model)
+    beside = replace(context, measure=whole.shortened(), whole=whole, sound=learned.sound)
+    seen = searched(beside, catalogue, progress, time_left)
+    plain = plain.with_records(seen.context.whole.records)
+    back = replace(context, measure=plain.shortened(), whole=plain)
+    found = _by(back, seen.found)
+    if context.certain:
+        return replace(seen, context=back, found=found, judged=_judged(found, True, learned.floor.beyond), remarks=())
+    named = seen.judged.named and not is_without_prediction(plain, found.after)
+    return replace(seen, context=back, found=found, judged=_judged(found, named, learned.floor.beyond))
+
+
+def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
+    """The bars are raised by the factor `beyond`, because a sound device differs from day to day, too."""
+    if named:
+        return Judgement(
+            "explained" if found.after.score.worst_channel <= beyond * EXPLAINED_ERROR else "partly_explained", True
+        )
+    if found.before.score.worst_channel <= beyond * NOISE_ALONE:
+        return Judgement("no_mismatch", False)
+    return Judgement(
+        "parameters" if found.retuned.score.worst_channel <= beyond * NOISE_ALONE else "unexplained", False
+    )
+
+
+def _by(context: SearchContext, found: Explanation) -> Explanation:
+    """Effects are chosen on the whitened residual, their numbers fitted on the residual itself: where a law is not
+    exact, frequencies with little weight would bias them."""
+    after = found.after.fitted
+    if after.hypothesis.claims and not context.certain:
+        start = evaluated(context.measure, context.tuning, after.deviations, after.hypothesis)
+        after = refine(context, start)
+    steps = [*found.steps[:-1], *(replace(step, fitted=after) for step in found.steps[-1:])]
+    return replace(
+        found,
+        before=_seen_by(context.whole, context, found.before),
+        retuned=_seen_by(context.whole, context, found.retuned),
+        after=_seen_by(context.whole, context, replace(found.after, fitted=after)),
+        steps=tuple(_seen_by(context.measure, context, step) for step in steps),
+    )
+
+
+def _seen_by(measure: ErrorMeasure, context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+    return replace(
+        candidate, fitted=evaluated(measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
+    )

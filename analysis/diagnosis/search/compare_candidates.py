@@ -1,0 +1,118 @@
+"""The best hypotheses fitted to the end, and ordered by their errors."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.diagnosis.errors.hypothesis import alike
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, fitting
+from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, sensitivity_at
+from analysis.diagnosis.search.short_recordings import short_recordings_of
+from analysis.diagnosis.settings import (
+    MOST_REFINED,
+    NO_SECOND_START,
+    REACHES_NOISE,
+    RICHER_LAW_SQUARES,
+    WORTH_REFINING,
+)
+
+SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
+MOST_REFRESHED, SETTLED, SETTLED_FAR, STALE = 4, 0.0005, 0.01, 0.5
+"""What the model's numbers do is recomputed so often, or until that gains no more than such a share, or, far above the
+noise, such a share of the logarithm of what is left; and only where one of them has moved by so many standard
+deviations since, for it costs a simulation for each."""
+
+
+def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
+    """The best first. fits: as `first_fits` leaves them."""
+    worth = _worth_refining(base, fits)
+
+    def refit(law: Fitted) -> Fitted:
+        return refine(context, law)
+
+    refined: list[Fitted] = list(context.guard.over(map, FITTING)(refit, worth[:1]))  # type: ignore[arg-type]
+    others = worth[1:MOST_REFINED]
+    if refined and context.candidate(refined[0]).score.worst_channel <= NO_SECOND_START:
+        others = [law for law in others if context.candidate(law).score.worst_channel <= REACHES_NOISE]
+    rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
+    plain = [plain_law for plain_law in rest if any(_holds(richer, plain_law) for richer in refined[:1])][:1]
+    refined += context.guard.over(context.map_, FITTING)(refit, [*others, *plain])  # type: ignore[arg-type]
+    fitted_candidates = [context.candidate(law) for law in [*refined, *(law for law in rest if law not in plain)]]
+    return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
+
+
+def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """fits: the best first."""
+    gained = [base.cost - found.cost for found in fits]
+    return [found for found, gain in zip(fits, gained, strict=True) if gain >= WORTH_REFINING * gained[0] > 0]
+
+
+def refine(context: SearchContext, fitted: Fitted) -> Fitted:
+    """Fitted until it settles: where a drive repeats, first to one period of each segment, whose sensitivities then
+    stand for all of them."""
+    short_form = short_recordings_of(context, fitted.hypothesis)
+    if short_form is None:
+        return _settled(context, fitted)[0]
+    short = short_form.context
+    near, known = _settled(short, evaluated(short.measure, short.tuning, fitted.deviations, fitted.hypothesis))
+    start = evaluated(context.measure, context.tuning, near.deviations, near.hypothesis)
+    found = fit(context.measure, context.tuning, start, short_form.repeated(known), WHOLE_ROUNDS, context.map_)
+    # What one period leaves open may run away on the whole.
+    return _plainest(context, found) if found.cost <= fitted.cost else _settled(context, fitted)[0]
+
+
+def _settled(context: SearchContext, fitted: Fitted) -> tuple[Fitted, Sensitivity]:
+    """With sensitivities recomputed; where more than noise is left, also from the calibration, because re-tuning may
+    have absorbed the missing effect and ended in another minimum."""
+    here, known = _refined_from(context, fitted, None)
+    here, known = _of_alike(context, here, known)
+    if context.candidate(here).score.worst_channel <= NO_SECOND_START:
+        return here, known
+    calibrated = evaluated(context.measure, context.tuning, np.zeros_like(here.deviations), here.hypothesis)
+    there, beside = _refined_from(context, calibrated, known)
+    return (there, beside) if there.cost < here.cost else (here, known)
+
+
+def _of_alike(context: SearchContext, fitted: Fitted, known: Sensitivity) -> tuple[Fitted, Sensitivity]:
+    """The best of the hypotheses that behave almost alike, each fitted; the plain one where it is as good as any."""
+    best = fitted, known
+    for other in alike(fitted.hypothesis):
+        beside = _refined_from(context, evaluated(context.measure, context.tuning, fitted.deviations, other), known)
+        best = beside if beside[0].cost < best[0].cost else best
+    return _plainest(context, best[0]), best[1]
+
+
+def _plainest(context: SearchContext, fitted: Fitted) -> Fitted:
+    best = fitted
+    for other in alike(fitted.hypothesis):
+        plain = evaluated(context.measure, context.tuning, best.deviations, other)
+        samples = len(fitting(context.measure, plain.residuals))
+        best = plain if plain.cost < best.cost + RICHER_LAW_SQUARES / samples else best
+    return best
+
+
+def _refined_from(context: SearchContext, fitted: Fitted, known: Sensitivity | None) -> tuple[Fitted, Sensitivity]:
+    """known: sensitivity at another point of the same hypothesis; None = not computed yet."""
+    best = fitted
+    complete = known is not None
+    there = known or sensitivity_at(context, best.deviations, best.hypothesis)
+    before = np.inf
+    for _ in range(MOST_REFRESHED):
+        better = fit(context.measure, context.tuning, best, there, SECOND_ROUNDS, context.map_)
+        gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
+        # Gains shrink about evenly, so that the next one can be foreseen.
+        foreseen, before = gained * min(gained / before, 1.0) if before > 0 else gained, gained
+        best = better
+        settled = (foreseen if complete else gained) < max(SETTLED, SETTLED_FAR * np.log(max(best.cost, 1.0)))
+        if (complete and settled) or (context.candidate(best).score.worst_channel <= NO_SECOND_START and settled):
+            break
+        if not complete or np.abs(best.deviations - there.at).max(initial=0.0) > STALE:
+            there = sensitivity_at(context, best.deviations, best.hypothesis, with_forces=True)
+            complete = True
+    return best, there
+
+
+def _holds(richer: Fitted, plain: Fitted) -> bool:
+    """Whether the last claim contains the other's as a special case: then both must be fitted equally well."""
+    last, other = richer.hypothesis.claims[-1], plain.hypothesis.claims[-1]
+    return other.effect.name in last.effect.simpler and set(other.sites) <= set(last.sites)

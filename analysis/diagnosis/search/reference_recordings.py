@@ -1,0 +1,77 @@
+"""What an explanation gains on clean recordings, where its effect is absent: a baseline for its gain elsewhere."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
+from analysis.diagnosis.errors.fit_score import rms_over
+from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, together, without_claim
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, gather_evidence, sensitivity
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.starting_hypotheses import candidates
+from analysis.diagnosis.types import Mapper
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.signals.signal import FloatArray
+
+ROUNDS = 4
+TRIED = 2
+"""Starts that are followed to their end."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceRecording:
+    measure: ColouredMeasure
+    tuning: Tuning
+    base: Fitted
+    """Re-tuned, without any effect."""
+    known: Sensitivity
+    """Of the model's numbers, there."""
+    evidence: Evidence
+
+    def gained(self, wanted: Hypothesis) -> FloatArray:
+        """(c,): fall of the logarithm of the rms error by the hypothesis, both fitted."""
+        measure, tuning = self.measure, self.tuning
+        starts = [evaluated(measure, tuning, self.base.deviations, hypothesis) for hypothesis in self._starts(wanted)]
+        starts.sort(key=lambda fitted: fitted.cost)
+        ends = [fit(measure, tuning, start, self.known, ROUNDS) for start in starts[:TRIED]]
+        best = min([*ends, self.base], key=lambda fitted: fitted.cost)
+        without, with_it = self._left(self.base), self._left(best)
+        return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
+
+    def _starts(self, wanted: Hypothesis) -> list[Hypothesis]:
+        """Where the recordings to diagnose have it, and where this one's own course suggests it for the last claim."""
+        last = wanted.claims[-1]
+        own = [hypothesis for hypothesis in candidates([last.effect], self.evidence) if hypothesis.claims == (last,)]
+        held = without_claim(wanted, len(wanted.claims) - 1)
+        return [wanted, *(together(held, hypothesis) for hypothesis in own)]
+
+    def _left(self, fitted: Fitted) -> FloatArray:
+        masks = [record.fit | record.choose for record in self.measure.records]
+        return rms_over(self.measure.records, fitted.residuals, masks)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceRecordings:
+    each: tuple[ReferenceRecording, ...]
+    beyond: float
+    """A gain counts by what is more than so many times that on the sound ones: the fewer, the more."""
+    seen: dict[object, FloatArray] = field(default_factory=dict)
+
+    def gained(self, hypothesis: Hypothesis) -> FloatArray:
+        """(c,): the gain that is counted against the hypothesis; 0 for a model without effects."""
+        if not hypothesis.claims:
+            return np.zeros(1)
+        if hypothesis.key not in self.seen:
+            gains = np.max([sound.gained(hypothesis) for sound in self.each], axis=0)
+            self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
+        return self.seen[hypothesis.key]
+
+
+def reference_recording(
+    measure: ColouredMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper
+) -> ReferenceRecording:
+    """deviations: of the model re-tuned to it."""
+    known = sensitivity(measure, tuning, deviations, NOTHING, map_)
+    base = fit(measure, tuning, evaluated(measure, tuning, deviations, NOTHING), known, ROUNDS)
+    return ReferenceRecording(measure, tuning, base, known, gather_evidence(measure, tuning, base)[0])

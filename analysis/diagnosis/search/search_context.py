@@ -1,0 +1,157 @@
+"""What all fits share, and the first fits of the hypotheses that passed the screening."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.fit_score import FitScore, fit_score
+from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluated, fit, sensitivity
+from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.search.guard import Guard
+from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
+from analysis.diagnosis.search.screening import Screened
+from analysis.diagnosis.settings import LEAST_FITTED, MOST_FITTED, WORTH_FITTING
+from analysis.diagnosis.types import Mapper
+from equalizer.effects.effect import AxisForce, JointForce
+from equalizer.signals.signal import FloatArray
+
+FIRST_ROUNDS = 3
+STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
+"""What is done once for each effect."""
+FELT = 0.06
+"""Change of an axis's channel, as a share of the largest that any number makes there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedCandidate:
+    fitted: Fitted
+    score: FitScore
+    usual: float = 0.0
+    """Mean log error power that it gains on clean recordings, which is counted against it here."""
+
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last."""
+        return self.fitted.hypothesis.claims[-1].effect.name
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchContext:
+    """What all fits share."""
+
+    measure: ErrorMeasure
+    """Of the samples to fit and to choose by,"""
+    whole: ErrorMeasure
+    """and with the sealed samples."""
+    tuning: Tuning
+    map_: Mapper
+    barred: frozenset[str] = frozenset()
+    """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
+    only where its refinement shows, and without it that law is the barred one."""
+    sound: ReferenceRecordings | None = None
+    """Clean recordings: what a candidate gains on them is counted against it."""
+    certain: tuple[Hypothesis, ...] = ()
+    """Faults that a recording shows by itself (`model_free_faults`): added without a search."""
+    guard: Guard = field(default_factory=Guard)
+    """Of what is done once for each effect."""
+
+    def half_opened(self) -> "SearchContext":
+        """With the first half of every sealed stretch to fit and to choose by."""
+        whole = self.whole.with_records(tuple(record.unsealed() for record in self.whole.records))
+        return replace(self, measure=whole.shortened(), whole=whole)
+
+    def candidate(self, fitted: Fitted) -> FittedCandidate:
+        """On the samples to fit and to choose by; its `test` is NaN."""
+        return self._scored(fitted, self.measure)
+
+    def confirmed(self, candidate: FittedCandidate) -> FittedCandidate:
+        """With the sealed samples."""
+        fitted = evaluated(self.whole, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
+        return self._scored(fitted, self.whole)
+
+    def _scored(self, fitted: Fitted, measure: ErrorMeasure) -> FittedCandidate:
+        score = fit_score(measure, fitted.residuals)
+        if self.sound is None:
+            return FittedCandidate(fitted, score)
+        gained = self.sound.gained(fitted.hypothesis)
+        return FittedCandidate(fitted, score.larger(np.exp(gained)), 2 * float(gained.mean()))
+
+
+def first_fits(context: SearchContext, base: Fitted, known: Sensitivity, screened: Sequence[Screened]) -> list[Fitted]:
+    """Of those that the screening foresees a gain of, the best first."""
+    measure, tuning = context.measure, context.tuning
+
+    def first(entry: Screened) -> Fitted:
+        return fit(measure, tuning, evaluated(measure, tuning, base.deviations, entry.hypothesis), known, FIRST_ROUNDS)
+
+    each = context.guard.over(context.map_, FITTING)
+    fits: list[Fitted] = list(each(first, _worth_fitting(base, screened)))  # type: ignore[arg-type]
+    return sorted(fits, key=lambda found: found.cost)
+
+
+def sensitivity_at(
+    context: SearchContext, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
+) -> Sensitivity:
+    """Of the prediction to the model's own numbers. Motion-dependent forces are left out first: simulations are quick
+    without them, and small forces hardly change the sensitivity."""
+    kept = hypothesis
+    for number in reversed(range(len(hypothesis.claims))):
+        if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
+            kept = without_claim(kept, number)
+    plain = sensitivity(context.measure, context.tuning, deviations, kept, context.map_)
+    if not with_forces or kept is hypothesis:
+        return plain
+    felt = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
+    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, felt))
+
+
+def _worth_fitting(base: Fitted, screened: Sequence[Screened]) -> list[Screened]:
+    varied = _varied(screened)
+    best = max((base.cost - entry.cost for entry in varied), default=0.0)
+    worth = [entry for entry in varied if base.cost - entry.cost >= WORTH_FITTING * best]
+    return (worth if len(worth) >= LEAST_FITTED else varied[:LEAST_FITTED])[:MOST_FITTED]
+
+
+def _varied(screened: Sequence[Screened]) -> list[Screened]:
+    """The best start of each hypothesis before the second start of any."""
+    seen: dict[object, int] = {}
+    ranked = []
+    for entry in screened:
+        key = entry.hypothesis.key
+        seen[key] = seen.get(key, -1) + 1
+        ranked.append((seen[key], entry))
+    return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
+
+
+# Which of a model's numbers a force at an axis can feel: those that change how that axis moves.
+def sensitive_parameters(
+    measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis
+) -> list[int]:
+    """Numbers whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
+    plain: sensitivity without motion-dependent forces."""
+    forces = [effect for effect in hypothesis.placed() if isinstance(effect.effect.acts, (AxisForce, JointForce))]
+    model = tuning.tuned(np.zeros(len(tuning.names)))
+    if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):
+        return list(range(len(tuning.names)))
+    reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
+    sites = {site for force in forces for site in force.sites}
+    strength = _strengths(measure, plain.columns, model.outputs)
+    felt = np.zeros(len(tuning.names), dtype=bool)
+    for site in sites:
+        in_channel = strength[:, int(np.argmax(reached[:, site]))]
+        felt |= in_channel > FELT * in_channel.max(initial=0.0)
+    return np.flatnonzero(felt).tolist()
+
+
+def _strengths(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:
+    """(t, p): rms in each response channel."""
+    squares, first = np.zeros((len(columns), outputs)), 0
+    for record in measure.records:
+        count, channels = int(record.fit.sum()), record.measured.shape[1]
+        part = columns[:, first : first + count * channels].reshape(len(columns), count, channels)[:, :, :outputs]
+        squares += np.einsum("tnc,tnc->tc", part, part)
+        first += count * channels
+    return np.sqrt(squares)

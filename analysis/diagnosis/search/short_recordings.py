@@ -1,0 +1,159 @@
+"""A shorter stand-in for the recordings, laws are compared on it first: of a periodic segment one settled period.
+
+The further periods of a segment repeat the first but for noise. What is kept is joined end to end and simulated as one
+course; before each kept stretch a run-in lets the model forget where it came from (Pintelon and Schoukens 2012, System
+Identification, ch. 2: transients of periodic excitation).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from analysis.diagnosis.data.growth import growth_rate
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import Sensitivity
+from analysis.diagnosis.forces.inverse_lines import zeros_of
+from analysis.diagnosis.forces.needed_force import band_motion
+from analysis.diagnosis.forces.predicted_force import PredictedForce
+from analysis.diagnosis.noise.periods import settled_periods
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.settings import BRIEF_SHARE, RUN_IN_CONSTANTS
+from analysis.diagnosis.types import Mask
+from equalizer.effects.starts.evidence import Evidence
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import FloatArray
+
+Places = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cut:
+    kept: Places
+    """Samples of one record."""
+    fit: Mask
+    """Which of all are fitted to,"""
+    instead: Places
+    """and for each of all the one that repeats it and is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShortRecordings:
+    context: SearchContext
+    """Its measure holds the kept samples alone; what there is to fit is also what is chosen by."""
+    kept: tuple[np.ndarray, ...]
+    """Per record of the long measure that has any, the samples that are kept."""
+    stands_in: Places
+    """(samples to fit of the long measure,): which of the kept samples to fit stands for each."""
+
+    def repeated(self, known: Sensitivity) -> Sensitivity:
+        """As it is on the long measure: what one period does, all of them do."""
+        times = np.sqrt(np.bincount(self.stands_in, minlength=self._samples)).repeat(
+            known.columns.shape[1] // self._samples
+        )
+        weighed = known.columns * times
+        return Sensitivity(known.at, known.columns, weighed @ weighed.T, self.stands_in)
+
+    @property
+    def _samples(self) -> int:
+        return sum(int(record.fit.sum()) for record in self.context.measure.records)
+
+    def of(self, evidence: Evidence) -> Evidence:
+        """The first record's, at the kept samples."""
+        kept, n = self.kept[0], len(evidence.command)
+        fit = np.concatenate([record.fit for record in self.context.measure.records])[: len(kept)]
+        cut = {
+            field.name: value[kept]
+            for field in fields(evidence)
+            if isinstance(value := getattr(evidence, field.name), np.ndarray) and len(value) == n and value.ndim
+        }
+        used: FloatArray = fit.astype(np.float64)
+        # The noise is per channel, whatever its length happens to be.
+        return replace(
+            evidence, **{**cut, "used": used, "noise": evidence.noise, "position_noise": evidence.position_noise}
+        )
+
+
+def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecordings | None:
+    """None where little would be saved, where what is held hangs on when a sample was taken, and where the first
+    record, of which evidence is taken, has nothing to fit."""
+    measure = context.measure
+    if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.sound is not None:
+        return None
+    if any(placed.effect.of_time for placed in (*measure.known, *held.placed())):
+        return None
+    around = _around(measure, context.tuning.model)
+    cut = [_cut(record, around) for record in measure.records]
+    before = sum(len(record.command) for record in measure.records)
+    if not len(cut[0].kept) or sum(len(one.kept) for one in cut) > BRIEF_SHARE * before:
+        return None
+    short = _in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _spliced(measure, cut)
+    if short is None:
+        return None
+    return ShortRecordings(
+        replace(context, measure=short), tuple(one.kept for one in cut if len(one.kept)), _stands_in(measure, cut)
+    )
+
+
+def _stands_in(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
+    found, before = [], 0
+    for record, one in zip(measure.records, cut, strict=True):
+        found.append(before + (np.cumsum(one.fit) - 1)[one.instead[record.fit]])
+        before += int(one.fit.sum())
+    return np.concatenate(found)
+
+
+def _around(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
+    """Seconds before and behind a stretch that its errors hang on. A simulation forgets as the model comes to rest; a
+    force that was needed hangs on the motion before and after, as far as the model's inverse rings."""
+    if isinstance(measure, FreeSimulation):
+        return RUN_IN_CONSTANTS / max(-growth_rate(model), np.finfo(float).tiny), 0.0
+    rates = np.abs(zeros_of(model, 2 * np.pi * measure.band_hz).real)
+    rings_s = RUN_IN_CONSTANTS / max(float(rates.min(initial=np.inf)), np.finfo(float).tiny)
+    return (rings_s + RUN_IN_CONSTANTS / measure.band_hz,) * 2
+
+
+def _cut(record: Observed, around_s: tuple[float, float]) -> _Cut:
+    fit, instead = record.fit.copy(), np.arange(len(record.fit))
+    for periods in settled_periods(record.recording):
+        inside = slice(periods.segment.start, periods.segment.stop)
+        last = slice(periods.starts[-1], periods.starts[-1] + periods.length)
+        if periods.settled and fit[inside].any() and last.stop <= len(fit) and record.fit[last].all():
+            fit[inside] = False
+            fit[last] = True
+            instead[inside] = last.start + (instead[inside] - last.start) % periods.length
+    before, behind = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
+    needed, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
+    for start, stop in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):
+        needed[max(start - before, 0) : stop + behind] = True
+    return _Cut(np.flatnonzero(needed), fit, instead)
+
+
+def _spliced(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
+    """End to end, as one course."""
+    pairs = zip(measure.records, cut, strict=True)
+    return measure.with_records(tuple(_piece(record, one.kept, one.fit) for record, one in pairs if len(one.kept)))
+
+
+def _in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
+    """Each stretch a record of its own; None where one drives an axis that the whole record drives, but it does not:
+    errors count over what is commanded."""
+    records, motions = [], []
+    for record, motion, one in zip(measure.records, measure.motions, cut, strict=True):
+        driven = np.abs(record.command).max(axis=0) > 0
+        for kept in np.split(one.kept, np.flatnonzero(np.diff(one.kept) > 1) + 1):
+            piece = _piece(record, kept, one.fit)
+            if not len(kept) or (driven & (np.abs(piece.command).max(axis=0) == 0)).any():
+                return None
+            records.append(piece)
+            motions.append(band_motion(motion.position[kept], motion.sample_rate_hz, measure.band_hz))
+    return replace(measure, records=tuple(records), motions=tuple(motions))
+
+
+def _piece(record: Observed, kept: Places, fit: Mask) -> Observed:
+    sealed = np.zeros(len(kept), dtype=np.bool_)
+    return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], sealed)

@@ -1,0 +1,27 @@
+"""An explanation with one of its effects removed."""
+
+from dataclasses import replace
+
+from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+
+
+def without_effect(context: SearchContext, found: Explanation, number: int) -> Explanation:
+    """number: of the effect, in the order in which they were found; those after it are fitted anew. There must be
+    another."""
+    earlier, later = found.steps[:number], list(found.steps[number + 1 :])
+    if not later:
+        return replace(found, after=context.confirmed(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
+    alone = [_without(context, candidate, number) for candidate in later]
+    alone[-1] = context.candidate(refine(context, alone[-1].fitted))
+    others = [candidate for candidate in found.rounds[number] if candidate.newest != alone[0].newest]
+    rounds = (*found.rounds[:number], (alone[0], *others), *found.rounds[number + 2 :])
+    return replace(found, after=context.confirmed(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
+
+
+def _without(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:
+    fewer: Hypothesis = without_claim(candidate.fitted.hypothesis, number)
+    return context.candidate(evaluated(context.measure, context.tuning, candidate.fitted.deviations, fewer))

@@ -1,0 +1,118 @@
+"""Where named laws are fitted from, and which of several is dropped because the data leave its numbers open."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.confirm import confirm_laws as by_balance
+from analysis.diagnosis.confirm.confirm_laws import (
+    ONLY_BESIDE_CALIBRATION,
+    VAGUE,
+    _from_starts,
+    _vague,
+    unconfirmed_beside_motion,
+)
+from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
+from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.verdict import Judgement
+from equalizer.effects.catalogue import EFFECTS
+
+OPEN, SURE = 1.01 / VAGUE, 0.1 / VAGUE
+"""Standard errors of a logarithm whose interval holds zero, and of one that is well known."""
+DRY = ("coulomb_friction", {"level": 2.0})
+BENDING = ("presliding_hysteresis", {"level": 0.5, "stiffness": 100.0})
+RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
+
+
+def explained(*laws):
+    whole = claimed(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 1.0}])
+    for name, values in laws:
+        whole = together(whole, claimed(Claim(EFFECTS[name], "one", (0,)), [values]))
+    return SimpleNamespace(steps=(SimpleNamespace(fitted=SimpleNamespace(hypothesis=whole)),))
+
+
+@pytest.mark.parametrize(
+    ("laws", "errors", "dropped"),
+    [
+        ((DRY, BENDING), (SURE, SURE, SURE), None),
+        ((DRY, BENDING), (SURE, SURE, OPEN), 1),
+        ((BENDING,), (SURE, OPEN), None),
+        ((BENDING,), (OPEN, SURE), 0),
+        ((DRY, RIPPLE), (SURE, SURE, OPEN, OPEN), None),
+        ((DRY, RIPPLE), (OPEN, SURE, SURE, SURE), 0),
+    ],
+    ids=["all known", "refinement open", "secondary open alone", "main open", "another family", "first open"],
+)
+def test_a_law_goes_by_its_main_number_and_a_refinement_by_any(laws, errors, dropped):
+    assert _vague(explained(*laws), np.array([0.0, *errors]), 1) == dropped
+
+
+def ends_at(error):
+    return SimpleNamespace(score=SimpleNamespace(test=np.array([error])))
+
+
+@pytest.mark.parametrize(
+    ("from_balance", "from_model", "end", "starts"),
+    [(2.0, 1.0, 2.0, 1), (9.0, 1.0, 1.0, 2), (9.0, 20.0, 9.0, 2)],
+    ids=["borne out at once", "ended beside the law", "neither start helps"],
+)
+def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_beside_them(
+    monkeypatch, from_balance, from_model, end, starts
+):
+    tried = []
+
+    def steps(context, retuned, named, deviations):
+        tried.append(deviations)
+        return [ends_at(from_balance if np.any(deviations) else from_model)]
+
+    monkeypatch.setattr(by_balance, "_steps", steps)
+    monkeypatch.setattr(by_balance, "_released", lambda tuning, balances, laws: np.array([1.0, -2.0]))
+    context = SimpleNamespace(tuning=None, confirmed=lambda candidate: candidate)
+    _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
+    assert after.score.test[0] == end
+    assert len(tried) == starts
+
+
+def candidate(*names):
+    hypothesis = SimpleNamespace(claims=names)
+    score = SimpleNamespace(worst_channel=9.0, mean_log_error=9.0, test=np.array([9.0]))
+    return SimpleNamespace(
+        newest=names[-1] if names else "", fitted=SimpleNamespace(hypothesis=hypothesis), score=score
+    )
+
+
+def searched_to(*names):
+    retuned = candidate()
+    steps = tuple(candidate(*names[: place + 1]) for place in range(len(names)))
+    found = Explanation(retuned, retuned, steps[-1], (), steps)
+    context = SimpleNamespace(whole=None, confirmed=lambda each: each)
+    return Searched(context, found, Judgement("partly_explained", True))
+
+
+@pytest.fixture
+def gains_half(monkeypatch):
+    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
+
+
+@pytest.mark.usefixtures("gains_half")
+@pytest.mark.parametrize("name", ["sensor_nonlinearity", "slew_limit", "transport_delay", "force_gain"])
+def test_what_bends_or_delays_beside_a_fitted_model_is_a_candidate(name):
+    seen = unconfirmed_beside_motion(searched_to(name))
+    assert seen.judged == Judgement("unexplained", False)
+    assert not seen.found.steps
+    (told,) = seen.unconfirmed
+    assert (told.hypothesis.claims, told.gain, told.why_not) == ((name,), 0.5, ONLY_BESIDE_CALIBRATION)
+
+
+@pytest.mark.usefixtures("gains_half")
+def test_what_the_signal_itself_shows_keeps_its_name():
+    seen = searched_to("sensor_clipping")
+    assert unconfirmed_beside_motion(seen) is seen
+
+
+def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
+    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
+    assert unconfirmed_beside_motion(searched_to("slew_limit")).unconfirmed == ()

@@ -1,0 +1,114 @@
+"""The force balance beside a given model, and what a gain on held-out data is worth."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.confirm import laws_beside_model as beside_given
+from analysis.diagnosis.confirm.balance_beside_model import balances_beside
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain
+from analysis.diagnosis.confirm.laws_beside_model import objection
+from analysis.diagnosis.search.time_budget import always
+from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ, MASS, DAMPING, LEVEL = 200.0, 2.0, 5.0, 3.0
+GIVEN = MechanicalModel(
+    "slide", "position", np.eye(1) * MASS, np.eye(1) * DAMPING, np.zeros((1, 1)), np.eye(1), np.eye(1),
+    tolerance=Tolerance(0.05, 0.5, 1.0),
+)  # fmt: skip
+
+
+def rubbing(level, mass=MASS):
+    seconds = np.arange(6000) / RATE_HZ
+    lines = [(0.05, 2 * np.pi * 0.31), (0.02, 2 * np.pi * 0.83), (0.008, 2 * np.pi * 1.7)]
+    x = sum(size * np.sin(w * seconds) for size, w in lines)
+    v = sum(size * w * np.cos(w * seconds) for size, w in lines)
+    a = sum(-size * w**2 * np.sin(w * seconds) for size, w in lines)
+    noise = np.random.default_rng(3).normal(0, [1e-6, 0.01], (len(x), 2))
+    force = mass * a + DAMPING * v + level * np.tanh(v / 1e-3)
+    return Recording(
+        "slide",
+        Signal((force + noise[:, 1])[:, None], RATE_HZ, "force", "N", ("force",)),
+        Signal((x + noise[:, 0])[:, None], RATE_HZ, "position", "m", ("x",)),
+        meta={"imposed": True},
+    )
+
+
+@pytest.fixture(scope="module")
+def with_friction():
+    return balances_beside((rubbing(LEVEL),), GIVEN, frozenset(), always)[0]
+
+
+def test_what_a_given_model_lacks_is_named_by_the_balance(with_friction):
+    law = with_friction.named[0]
+    assert law.law.effect == "coulomb_friction"
+    assert law.values["level"] == pytest.approx(LEVEL, rel=0.1)
+    assert law.gain_low > 0.5
+
+
+@pytest.mark.parametrize("mass", [MASS, MASS + 0.05], ids=["as calibrated", "a standard deviation off"])
+def test_a_device_within_its_calibration_lacks_nothing(mass):
+    (balance,) = balances_beside((rubbing(0.0, mass),), GIVEN, frozenset(), always)
+    assert balance.named == ()
+    assert balance.linear < 0.05
+
+
+def test_a_calibrated_number_does_not_take_friction_on_itself(with_friction):
+    """Fitted freely, damping would hold part of it; its prior keeps it within a few standard deviations."""
+    regression = with_friction.searched.regression
+    deviations = regression.weights(regression.chosen(()))[1 : regression.base - 1]
+    assert np.abs(deviations).max() < 10
+    loose = replace(regression, prior=None)
+    assert loose.crossed(loose.chosen(())).sum() <= regression.crossed(regression.chosen(())).sum()
+
+
+def candidate(residuals, name="coulomb_friction", deviations=(0.0,)):
+    claim = SimpleNamespace(effect=SimpleNamespace(name=name, simpler=()), spread="one", sites=(0,))
+    hypothesis = SimpleNamespace(claims=(claim,))
+    fitted = SimpleNamespace(residuals=(residuals,), hypothesis=hypothesis, deviations=np.array(deviations))
+    return SimpleNamespace(fitted=fitted, newest=name)
+
+
+MEASURE = SimpleNamespace(records=(SimpleNamespace(test=np.ones(1600, dtype=bool)),))
+NOISE = np.random.default_rng(5).normal(size=(1600, 2))
+
+
+def test_a_gain_is_the_share_of_the_error_power_that_goes():
+    found = held_out_gain(MEASURE, candidate(NOISE), candidate(0.5 * NOISE))
+    assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
+
+
+def test_chance_is_no_gain():
+    other = np.random.default_rng(6).normal(size=(1600, 2))
+    found = held_out_gain(MEASURE, candidate(NOISE), candidate(other))
+    assert found.low < 0 < found.high
+
+
+def searched(after, rival=None):
+    context = SimpleNamespace(whole=MEASURE, confirmed=lambda each: each)
+    rounds = ((after, *(() if rival is None else (rival,))),)
+    found = SimpleNamespace(steps=(after,), retuned=candidate(NOISE), after=after, rounds=rounds)
+    return SimpleNamespace(context=context, found=found)
+
+
+@pytest.mark.parametrize(
+    ("after", "rival", "said"),
+    [
+        (candidate(0.3 * NOISE), None, ""),
+        (candidate(0.3 * NOISE), candidate(0.6 * NOISE, "backlash"), ""),
+        (candidate(0.3 * NOISE), candidate(0.3 * NOISE, "backlash"), "cannot tell it from backlash"),
+        (candidate(0.95 * NOISE), None, "not a third"),
+        (candidate(0.8 * NOISE), None, "the force balance does not bear it out"),
+        (candidate(1.2 * NOISE), None, "what varies between stretches"),
+        (candidate(0.3 * NOISE, deviations=(4.0,)), None, "at the end of its tolerance"),
+    ],
+)
+def test_a_name_is_confirmed_by_what_it_foretells(monkeypatch, after, rival, said):
+    monkeypatch.setattr(beside_given, "only_refines", lambda other, best: False)
+    found = objection(searched(after, rival), ())
+    assert said in found
+    assert bool(found) == bool(said)

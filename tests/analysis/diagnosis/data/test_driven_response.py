@@ -1,0 +1,64 @@
+"""Whether responses have anything to do with commands: told from noise of any colour, and not judged where short."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from analysis.diagnosis.data.driven_response import answer
+from analysis.diagnosis.settings import ANSWER_DEVIATIONS
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ = 500.0
+
+
+def recording(command, response) -> Recording:
+    names = "xyz"[: command.shape[1]]
+    return Recording(
+        "bench",
+        Signal(command, RATE_HZ, "force", "N", tuple("f" + name for name in names)),
+        Signal(response, RATE_HZ, "acceleration", "m/s^2", tuple("a" + name for name in names)),
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("colour", ["white", "walk", "narrow"])
+def test_noise_of_any_colour_answers_nothing(colour, seed):
+    rng = np.random.default_rng(seed)
+    white = rng.standard_normal((12_000, 3))
+    noise = {
+        "white": white,
+        "walk": np.cumsum(white, axis=0),
+        "narrow": lfilter([1.0], [1.0, -1.8, 0.98], white, axis=0),
+    }[colour]
+    sure = answer([recording(rng.standard_normal((12_000, 3)), noise)])
+    assert sure is not None and sure < ANSWER_DEVIATIONS
+
+
+def test_one_channel_that_answers_weakly_is_enough():
+    rng = np.random.default_rng(1)
+    command, response = rng.standard_normal((12_000, 3)), rng.standard_normal((12_000, 3))
+    response[:, 1] += 0.3 * command[:, 2]
+    sure = answer([recording(command, response)])
+    assert sure is not None and sure > 2 * ANSWER_DEVIATIONS
+
+
+def test_a_recording_too_short_for_it_is_not_judged():
+    rng = np.random.default_rng(1)
+    assert answer([recording(rng.standard_normal((100, 1)), rng.standard_normal((100, 1)))]) is None
+
+
+def test_gaps_in_the_response_are_left_out():
+    rng = np.random.default_rng(1)
+    command = rng.standard_normal((12_000, 1))
+    response = 2 * command
+    response[3000:5000] = np.nan
+    sure = answer([recording(command, response)])
+    assert sure is not None and sure > ANSWER_DEVIATIONS
+
+
+def test_every_labelled_case_answers_its_commands(shared):
+    from study.store.formats.recording_file import read_recording
+
+    sure = answer([read_recording(shared / "cases" / "open-05.h5")])
+    assert sure is not None and sure > 10 * ANSWER_DEVIATIONS

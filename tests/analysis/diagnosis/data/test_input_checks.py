@@ -1,0 +1,208 @@
+"""What cannot be diagnosed is refused by name: recordings that differ, nothing recorded, a model of something else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.data.input_checks import (
+    NothingToDiagnose,
+    require_alike,
+    require_different,
+    require_model_of,
+    require_something,
+)
+from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+RATE_HZ = 500.0
+
+
+def model(axes=1, quantity="acceleration", damping=4.0, stiffness=100.0, rotational=False) -> MechanicalModel:
+    eye = np.eye(axes)
+    return MechanicalModel("m", quantity, 0.25 * eye, damping * eye, stiffness * eye, eye, eye, rotational=rotational)
+
+
+def recording(samples=5000, axes=1, rate_hz=RATE_HZ, units=("N", "m/s^2"), seed=0, gain=4.0, noise=0.1) -> Recording:
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal((samples, axes))
+    y = gain * u + noise * rng.standard_normal((samples, axes))
+    quantities = {"N": "force", "N m": "torque", "m/s^2": "acceleration", "rad/s^2": "acceleration", "m": "position"}
+    return Recording(
+        "bench",
+        Signal(u, rate_hz, quantities[units[0]], units[0], tuple("f" + name for name in "xyz"[:axes])),
+        Signal(y, rate_hz, quantities[units[1]], units[1], tuple("a" + name for name in "xyz"[:axes])),
+    )
+
+
+def with_samples(one: Recording, side: str, samples) -> Recording:
+    return replace(one, **{side: replace(getattr(one, side), samples=samples)})
+
+
+def refusal(check, *arguments) -> str:
+    with pytest.raises(NothingToDiagnose) as refused:
+        check(*arguments)
+    return str(refused.value)
+
+
+def test_what_belongs_together_is_taken():
+    one = recording()
+    require_alike([one, recording(seed=1)], ["a", "b"])
+    require_something([one], ["a"])
+    require_model_of(model(), [one])
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        (recording(rate_hz=1000.0), "b has the sample rate 1000 Hz, a has 500 Hz"),
+        (recording(axes=2), "b has the command fx (N), fy (N), a has fx (N)"),
+        (recording(units=("N", "m")), "b has the response ax (m), a has ax (m/s^2)"),
+    ],
+    ids=["rate", "channels", "unit"],
+)
+def test_recordings_of_different_kinds_are_told_apart(other, words):
+    assert words in refusal(require_alike, [recording(), other], ["a", "b"])
+
+
+def test_no_recording_is_nothing():
+    assert "there is no recording" in refusal(require_alike, [], [])
+
+
+def test_a_gap_in_the_command_is_named_by_its_place():
+    gap = recording().command.samples.copy()
+    gap[70:80] = np.nan
+    said = refusal(require_something, [with_samples(recording(), "command", gap)], ["a.h5"])
+    assert "a.h5 misses the command in 10 samples (the first is 70)" in said
+
+
+def test_a_command_that_never_changes_excites_nothing():
+    still = with_samples(recording(), "command", np.ones((5000, 1)))
+    assert "the command never changes" in refusal(require_something, [still], ["a"])
+
+
+def test_a_response_without_a_number_and_one_that_never_changes_are_named():
+    missing = with_samples(recording(), "response", np.full((5000, 1), np.nan))
+    assert "response ax holds no number" in refusal(require_something, [missing], ["a"])
+    dead = with_samples(recording(), "response", np.zeros((5000, 1)))
+    assert "response ax never changes" in refusal(require_something, [dead], ["a"])
+
+
+def test_too_few_samples_and_too_few_cycles_are_too_short():
+    assert "100 samples are too short" in refusal(require_something, [recording(samples=100)], ["a"])
+    t = np.arange(5000)[:, None] / 5000
+    slow = with_samples(recording(), "command", np.sin(2 * np.pi * 1.5 * t))
+    assert "cycles of what was commanded, which is too short" in refusal(require_something, [slow], ["a"])
+
+
+def test_random_levels_that_change_their_side_once_hold_many_cycles_and_a_step_holds_none():
+    levels = np.repeat(np.random.default_rng(3).uniform(0.0, 1.0, 50), 100)
+    levels[2500:] *= -1
+    answered = with_samples(recording(), "response", 4 * levels[:, None])
+    require_something([with_samples(answered, "command", levels[:, None])], ["a"])
+    step = with_samples(recording(), "command", (np.arange(5000) > 2000.0)[:, None].astype(float))
+    assert "cycles of what was commanded, which is too short" in refusal(require_something, [step], ["a"])
+
+
+def test_where_only_the_test_holds_a_response_nothing_can_be_fitted():
+    whole = recording()
+    roles = (Segment(0, 4000, "noise", 1.0, 0, "fit"), Segment(4000, 5000, "noise", 1.0, 0, "test"))
+    missing = whole.response.samples.copy()
+    missing[:4000] = np.nan
+    gaps = with_samples(replace(whole, segments=roles), "response", missing)
+    assert "only 0 samples of what may be fitted to hold a response" in refusal(require_something, [gaps], ["a"])
+    missing[:2000] = whole.response.samples[:2000]
+    require_something([with_samples(gaps, "response", missing)], ["a"])
+
+
+def test_a_recording_counts_once():
+    one = recording()
+    said = refusal(require_different, [one, recording(seed=1), replace(one, device="copy")], ["a", "b", "c"])
+    assert said == "c holds the same samples as a, and a recording counts once"
+    require_different([one, recording(seed=1)], ["a", "b"])
+
+
+def test_a_second_is_too_short_where_it_holds_few_samples_and_enough_where_it_holds_many():
+    said = refusal(require_something, [recording(samples=500)], ["a"])
+    assert "500 samples, 1 s, are too short a recording; at least 1.5 s or 2000 samples are needed" in said
+    require_something([recording(samples=4000, rate_hz=4000.0)], ["a"])
+    require_something([recording(samples=800)], ["a"])
+
+
+def test_a_rate_at_which_nobody_can_see_the_model_move_is_refused():
+    said = refusal(require_model_of, model(stiffness=100.0), [recording(rate_hz=0.5)])
+    assert "the model swings at" in said
+    assert "a rate of 0.5 Hz; the recording must state its rate in hertz" in said
+    require_model_of(model(stiffness=0.0), [recording(rate_hz=0.5)])
+
+
+def test_a_recording_that_is_all_noise_is_refused():
+    rng = np.random.default_rng(5)
+    noise = with_samples(recording(), "response", rng.standard_normal((5000, 1)))
+    assert "the responses have nothing to do with the commands" in refusal(require_something, [noise], ["a"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (model(axes=3), "the model has 3 inputs, but the recording has 1 command channel (fx)"),
+        (model(axes=3), "the model has 3 outputs, but the recording has 1 response channel (ax)"),
+        (model(quantity="velocity"), "the model answers with velocity, but the recording's response is acceleration"),
+        (model(rotational=True), "the model is rotational (kg m^2, N m, rad), but the recording is translational"),
+        (model(damping=-1.0), "the model is unstable: undisturbed it grows e-fold in 0.5 s"),
+        (model(stiffness=-100.0), "the model is unstable"),
+    ],
+    ids=["inputs", "outputs", "quantity", "rotational", "damping", "stiffness"],
+)
+def test_a_model_of_something_else_is_refused(wrong, words):
+    assert words in refusal(require_model_of, wrong, [recording()])
+
+
+def test_a_translational_model_is_not_compared_with_turning():
+    turning = recording(units=("N m", "rad/s^2"))
+    assert "but the recording is rotational" in refusal(require_model_of, model(), [turning])
+
+
+def test_a_model_that_drifts_freely_is_no_unstable_one():
+    require_model_of(model(axes=3, damping=0.0, stiffness=0.0), [recording(samples=100_000, axes=3)])
+
+
+def test_numbers_that_no_device_reaches_are_refused():
+    one = recording()
+    for side in ("command", "response"):
+        high = with_samples(one, side, getattr(one, side).samples * 1e150)
+        assert f"in {side}" in refusal(require_something, [high], ["a"])
+        assert "which no device reaches" in refusal(require_something, [high], ["a"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"mass": [[1e-300]]}, "the model's lightest motion has a mass of 1e-300, which no device has"),
+        ({"stiffness": [[1e300]]}, "the model's stiffness holds 1e+300, which no device has"),
+        ({"input": [[0.0]]}, "the model's input lets fx drive nothing"),
+        ({"output": [[0.0]]}, "the model's output lets ax see nothing"),
+    ],
+    ids=["mass", "stiffness", "input", "output"],
+)
+def test_a_model_of_no_device_is_refused(changes, words):
+    assert words in refusal(require_model_of, replace(model(), **changes), [recording()])
+
+
+def test_two_actuators_of_one_motion_are_refused():
+    eye = np.eye(2)
+    both = MechanicalModel("m", "acceleration", eye, eye, eye, np.ones((2, 2)), eye)
+    assert "2 inputs drive only 1 motion, so they cannot be told apart" in refusal(
+        require_model_of, both, [recording(axes=2)]
+    )
+
+
+@pytest.mark.parametrize(
+    ("axis", "level", "words"),
+    [("z", 0.2, "the axis 'z' is none of fx"), ("x", -0.2, "coulomb_friction.level is -0.2; it must not be negative")],
+    ids=["axis", "level"],
+)
+def test_an_effect_of_the_models_own_must_be_possible(axis, level, words):
+    rubbing = replace(model(), effects=(ModelEffect("coulomb_friction", axis, {"level": level}),))
+    assert words in refusal(require_model_of, rubbing, [recording()])

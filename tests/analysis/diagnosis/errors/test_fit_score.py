@@ -1,0 +1,65 @@
+"""Errors against the noise, and how fast a model moves away by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.data.growth import growth_rate, runs_away
+from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over
+from equalizer.plant.mechanical_model import MechanicalModel
+
+
+def model(damping, stiffness):
+    one = [[1.0]]
+    return MechanicalModel("one", "position", one, [[damping]], [[stiffness]], one, one)
+
+
+def test_noise_alone_stands_at_one(arena_of):
+    measure = arena_of().whole
+    score = fit_score(measure, measure.residuals(arena_of().tuning.model, ()))
+    for part in (score.fit, score.choose, score.test):
+        assert part == pytest.approx(np.ones(2), abs=0.06)
+
+
+def test_only_its_own_samples_count_for_each_part(arena_of):
+    measure = arena_of().whole
+    (left,) = measure.residuals(arena_of().tuning.model, ())
+    (record,) = measure.records
+    louder = left.copy()
+    louder[record.test] *= 10
+    one, other = fit_score(measure, (left,)), fit_score(measure, (louder,))
+    assert np.array_equal(one.fit, other.fit) and np.array_equal(one.choose, other.choose)
+    assert other.test == pytest.approx(10 * one.test)
+
+
+def test_where_nothing_was_sealed_nothing_is_said(arena_of):
+    measure = arena_of().measure
+    assert np.isnan(fit_score(measure, measure.residuals(arena_of().tuning.model, ())).test).all()
+
+
+def test_recordings_count_by_their_samples(arena_of):
+    (record,) = arena_of().whole.records
+    long, short = np.ones((len(record.command), 1)), np.full((10, 1), 3.0)
+    cut = replace(record, fit=record.fit[:10], choose=record.choose[:10], test=record.test[:10])
+    masks = [np.ones(len(long), dtype=bool), np.ones(10, dtype=bool)]
+    n = len(long)
+    assert rms_over((record, cut), (long, short), masks) == pytest.approx(np.sqrt((n + 90) / (n + 10)))
+
+
+def test_the_worst_channel_is_seen_and_all_are_chosen_by():
+    score = FitScore(np.array([1.0, np.e]), np.array([1.0, 1.0]), np.array([9.0, 9.0]))
+    assert score.seen == pytest.approx(np.e)
+    assert score.mean_log_error == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("damping", "stiffness", "grows"), [(2.0, 100.0, False), (0.0, 0.0, False), (-2.0, 100.0, True)]
+)
+def test_a_model_that_gains_energy_runs_away(damping, stiffness, grows):
+    assert runs_away(model(damping, stiffness), 10.0) == grows
+
+
+def test_the_rate_is_that_of_the_slowest_motion():
+    assert growth_rate(model(2.0, 100.0)) == pytest.approx(-1.0)
+    assert growth_rate(model(0.0, -4.0)) == pytest.approx(2.0)

@@ -1,0 +1,234 @@
+"""Recordings of other forms than one motion per force are brought into one, and what was done is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.motion import moving_signal
+from analysis.diagnosis.data.driven_response import answer
+from analysis.diagnosis.data.force_driven import all_force_driven
+from analysis.diagnosis.first_model.plain_form import plain_form
+from analysis.diagnosis.settings import ANSWER_DEVIATIONS
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ = 100.0
+
+
+def smooth(count, seed, width=25):
+    noise = np.random.default_rng(seed).standard_normal(count + width)
+    course = np.convolve(noise, np.hanning(width), "same")[:count]
+    return course / course.std()
+
+
+def of(command, response):
+    """Each a list of (name, quantity, unit, samples)."""
+
+    def signal(channels):
+        names, quantities, units, samples = zip(*channels, strict=True)
+        return Signal(np.column_stack(samples), RATE_HZ, quantities, units, names)
+
+    return Recording("form", signal(command), signal(response))
+
+
+def speed_of(push, mass=0.05, damping=0.3):
+    """(n,): in fine steps."""
+    speed, found = 0.0, []
+    for force in push:
+        found.append(speed)
+        for _ in range(10):
+            speed += (force - damping * speed) / mass / RATE_HZ / 10
+    return np.array(found)
+
+
+def test_a_plain_recording_stays_as_it_is():
+    push = smooth(2000, 1)
+    recording = of([("u", "force", "N", push)], [("v", "velocity", "m/s", speed_of(push))])
+
+    assert plain_form((recording,)) == ((recording,), ())
+
+
+def test_a_temperature_among_the_commands_is_a_condition():
+    push, heat = smooth(2000, 1), np.linspace(20, 50, 2000)
+    recording = of(
+        [("u", "torque", "N m", push), ("T", "temperature", "degC", heat)],
+        [("w", "angular velocity", "rad/s", speed_of(push))],
+    )
+
+    (found,), (said,) = plain_form((recording,))
+
+    assert found.command.channels == ("u",)
+    assert found.condition is not None
+    assert found.condition.channels == ("T",)
+    assert "T among the commands" in said
+
+
+def test_two_commands_of_one_motion_become_one():
+    first, second = smooth(4000, 1), smooth(4000, 2)
+    recording = of(
+        [("u1", "voltage", "V", first), ("u2", "voltage", "V", second)],
+        [("w", "angular velocity", "rad/s", speed_of(first + 0.4 * second))],
+    )
+
+    (found,), (said,) = plain_form((recording,))
+
+    assert found.command.channels == ("u1",)
+    assert found.command.samples[:, 0] == pytest.approx(first + 0.4 * second, abs=0.02 * first.std())
+    assert "one command was made of them" in said
+
+
+@pytest.mark.parametrize("level", [0.0, 0.5, 50.0])
+def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(level):
+    first, second = smooth(4000, 1), smooth(4000, 2)
+    recording = of(
+        [("u1", "force", "N", first), ("u2", "force", "N", second), ("u3", "force", "N", np.full(4000, level))],
+        [("v", "velocity", "m/s", speed_of(first + 0.4 * second))],
+    )
+
+    command = recording.command.samples.copy()
+    command[2000:2010] = np.nan
+
+    (found,), (left_out, summed) = plain_form(
+        (replace(recording, command=replace(recording.command, samples=command)),)
+    )
+
+    known = np.isfinite(command).all(axis=1)
+    assert found.command.channels == ("u1",)
+    assert np.array_equal(np.isfinite(found.command.samples[:, 0]), known)
+    assert found.command.samples[known, 0] == pytest.approx((first + 0.4 * second)[known], abs=0.02 * first.std())
+    assert left_out == "u3 among the commands never changes, and was left out."
+    assert summed.startswith("u2 drives the same motion as u1")
+
+
+def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
+    """A device of two axes of which only the first was driven."""
+    push = smooth(2000, 1)
+    recording = of(
+        [("fx", "force", "N", push), ("fy", "force", "N", np.zeros(2000))],
+        [("x", "velocity", "m/s", speed_of(push)), ("y", "velocity", "m/s", 1e-3 * smooth(2000, 3))],
+    )
+
+    (found,), said = plain_form((recording,))
+
+    assert (found.command.channels, found.response.channels) == (("fx",), ("x",))
+    assert said == ("fy among the commands never changes, and was left out with y, which no command moves.",)
+    in_turn = replace(recording, command=replace(recording.command, samples=recording.command.samples[:, ::-1]))
+    assert plain_form((recording, in_turn)) == ((recording, in_turn), ())
+
+
+def test_of_motions_of_several_kinds_the_lowest_is_kept():
+    push = smooth(2000, 1)
+    speed = speed_of(push)
+    angle = np.cumsum(speed) / RATE_HZ
+    recording = of(
+        [("u", "torque", "N m", push)],
+        [("q", "angle", "rad", angle), ("w", "angular velocity", "rad/s", speed), ("i", "current", "A", push)],
+    )
+
+    (found,), (said,) = plain_form((recording,))
+
+    assert found.response.channels == ("q",)
+    assert "w and i" in said
+
+
+def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
+    way = smooth(2000, 1)
+    recording = of([("q", "displacement", "m", way)], [("a", "force", "N", 2 * way), ("b", "force", "N", 5 * way)])
+
+    formed, (said,) = plain_form((recording,))
+    (driven,) = all_force_driven(formed)
+
+    assert (driven.command.channels, driven.response.channels) == (("b",), ("q",))
+    assert "for a, import the recording" in said
+
+
+def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
+    """Without a warning, which would be an error here."""
+    push, none = smooth(2000, 1), np.full(2000, np.nan)
+    moved = of([("f", "force", "N", push)], [("x", "position", "m", none), ("y", "position", "m", push)])
+    assert (moving := moving_signal(moved)) is not None
+    assert moving.channels == ("y",)
+    pushed = of([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
+    assert plain_form((pushed,))[0][0].response.channels == ("f2",)
+
+
+def test_one_force_along_two_imposed_motions_keeps_both():
+    way, far = smooth(2000, 1), smooth(2000, 2)
+    recording = of([("q", "displacement", "m", way), ("r", "displacement", "m", far)], [("f", "force", "N", way - far)])
+
+    (driven,) = all_force_driven(plain_form((recording,))[0])
+
+    assert (driven.command.channels, driven.response.channels) == (("f",), ("q", "r"))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_sign_of_an_absolute_speed_is_restored(seed):
+    rng = np.random.default_rng(seed)
+    push = np.repeat(rng.uniform(-2, 2, 25), 20)
+    speed = speed_of(push, mass=0.1)
+    seen = np.abs(speed) + 0.005 * speed.std() * rng.standard_normal(len(speed))
+
+    (found,), (said,) = plain_form((of([("u", "voltage", "V", push)], [("w", "speed", "m/s", seen)]),))
+
+    assert np.linalg.norm(found.response.samples[:, 0] - speed) < 0.1 * np.linalg.norm(speed)
+    assert "sensor tells the amount alone" in said
+
+
+def test_a_speed_that_goes_one_way_is_none_of_amounts():
+    push = 3.0 + np.abs(smooth(1000, 3))
+    recording = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push))])
+
+    assert plain_form((recording,)) == ((recording,), ())
+
+
+def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():
+    rng = np.random.default_rng(5)
+    push = np.repeat(rng.uniform(-2, 2, 25), 20)
+    moved = of([("u", "voltage", "V", push)], [("w", "speed", "m/s", speed_of(push, mass=0.3))])
+    other = replace(moved, response=replace(moved.response, samples=rng.standard_normal((len(push), 1))))
+
+    sure, unsure = answer([moved]), answer([other])
+
+    assert sure is None or sure >= ANSWER_DEVIATIONS
+    assert unsure is not None
+    assert unsure < ANSWER_DEVIATIONS
+
+
+def position_of(push, mass=0.05, damping=0.3, stiffness=20.0):
+    """(n,): of a body on a spring, in fine steps."""
+    place = speed = 0.0
+    found = []
+    for force in push:
+        found.append(place)
+        for _ in range(10):
+            speed += (force - damping * speed - stiffness * place) / mass / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("course", "quantity"), [(speed_of, "velocity"), (position_of, "position")], ids=["motor", "body on a spring"]
+)
+@pytest.mark.parametrize("unit", ["1", "V"])
+def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_course_suggests(course, quantity, unit):
+    push = smooth(4000, 3, width=9)
+    own = "voltage" if unit == "V" else "1"
+    recording = of([("u", own, unit, push)], [("y", own, unit, course(push))])
+
+    (found,), said = plain_form((recording,))
+
+    if (quantity, unit) == ("position", "V"):  # a voltage counts as a position already
+        assert (found, said) == (recording, ())
+    else:
+        assert found.response.quantities == (quantity,)
+        assert "Nothing says what y measures" in said[0]
+
+
+def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
+    place = smooth(2000, 5)
+    recording = of([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
+
+    (found,), _ = plain_form((recording,))
+
+    assert found.response.quantities == ("force",)

@@ -1,0 +1,40 @@
+"""The inverse of a model, learned of a few lines, against each line solved for by itself."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.forces import inverse_lines as learning
+from analysis.diagnosis.forces.inverse_lines import inverse_lines, inverse_of
+from equalizer.plant.mechanical_model import MechanicalModel
+
+RATE_HZ = 1000.0
+LINES = np.linspace(0.0, RATE_HZ / 2, 5001)
+
+
+def device(coupling_n_s_per_m: float) -> MechanicalModel:
+    """A motor, a handle behind a cable, and a body that hangs on the handle, along each of two axes."""
+    k, c = np.array([[9000.0, -9000.0, 0.0], [-9000.0, 9800.0, -500.0], [0.0, -500.0, 500.0]]), coupling_n_s_per_m
+    damping = np.array([[4.0 + c, -c, 0.0], [-c, 3.0 + c, -0.4], [0.0, -0.4, 0.4]])
+    both = np.diag([1.0, 1.3])
+    one = np.eye(2)
+    return MechanicalModel(
+        name="two axes", quantity="position", mass=np.kron(np.diag([0.1, 0.15, 0.02]), both),
+        damping=np.kron(damping, one), stiffness=np.kron(k, both), input=np.kron([[1.0], [0.0], [0.0]], one),
+        output=np.kron([[0.0, 1.0, 0.0]], one),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("coupling", [0.0, 8.0])
+def test_all_lines_follow_from_a_few(coupling):
+    model = device(coupling)
+    wanted, found = inverse_lines(model, LINES), inverse_of(model, len(LINES), RATE_HZ / 2)(LINES)
+    for part in (slice(0, 2), slice(2, 4)):
+        scale = np.abs(wanted[:, part]).max(axis=(1, 2), keepdims=True)
+        assert (np.abs(found - wanted)[:, part] / scale).max() < 1e-7
+    assert not np.array_equal(found, wanted)
+
+
+def test_where_few_lines_do_not_foretell_the_others_all_are_solved_for(monkeypatch):
+    monkeypatch.setattr(learning, "zeros_of", lambda model, largest: np.array([-3.0 + 40.0j]))
+    found = inverse_of(device(8.0), len(LINES), RATE_HZ / 2)(LINES)
+    assert np.array_equal(found, inverse_lines(device(8.0), LINES))

@@ -1,0 +1,110 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.noise.noise_floor import noise_floor
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+CASES = Path(__file__).parents[4].parent / "shared" / "cases"
+
+
+def without_periods(recording: Recording) -> Recording:
+    return replace(recording, segments=tuple(replace(s, period=0) for s in recording.segments))
+
+
+def test_invented_noise_is_recovered_from_repeats(device):
+    floor = noise_floor(device(noise=0.05, position_noise=5e-6).recorded())
+    assert floor.how == "repeats"
+    assert floor.response_rms == pytest.approx(0.05, rel=0.02)
+    assert floor.position_rms == pytest.approx(5e-6, rel=0.02)
+    assert floor.response.density.mean(axis=0) == pytest.approx(0.05**2, rel=0.04)
+    assert (floor.response.freedom > 5000).all()
+    assert not any(any(segment.varies) for segment in floor.response.segments)
+    assert not floor.remarks
+
+
+def test_noise_and_distortion_that_repeats_are_not_confused(device):
+    floor = noise_floor(device(cubic=0.01, square=0.05).recorded())
+    assert floor.response_rms == pytest.approx(0.05, rel=0.02)
+
+
+def test_rounding_is_part_of_the_noise(device):
+    fine = noise_floor(device(position_noise=1e-6, step=1e-5, levels=(1.0, 2.0)).recorded())
+    assert fine.position_rms == pytest.approx(np.sqrt(1e-12 + 1e-10 / 12), rel=0.05)
+    assert (fine.position.rounding > 0.4 * 1e-10 / 12).all()
+
+
+def test_a_device_that_varies_does_not_raise_the_floor(device):
+    floor = noise_floor(device(swaying=0.2).recorded())
+    assert floor.response_rms == pytest.approx(0.05, rel=0.1)
+    assert any(any(segment.varies) for segment in floor.response.segments)
+    assert any("differ between periods" in remark for remark in floor.remarks)
+
+
+def test_a_density_follows_coloured_noise(device):
+    recording = device(noise=0.0).recorded()
+    white = 0.05 * np.random.default_rng(3).standard_normal(recording.response.samples.shape)
+    red = white + np.vstack([np.zeros((1, 2)), white[:-1]])
+    floor = noise_floor(
+        replace(recording, response=replace(recording.response, samples=recording.response.samples + red))
+    )
+    low, high = floor.frequency_hz < 100, floor.frequency_hz > 400
+    expected = 0.05**2 * 4 * np.cos(np.pi * floor.frequency_hz / 1000) ** 2
+    assert floor.response.density[low].mean() == pytest.approx(expected[low].mean(), rel=0.05)
+    assert floor.response.density[high].mean() == pytest.approx(expected[high].mean(), rel=0.1)
+
+
+def test_without_repeats_noise_is_heard_at_rest(device):
+    floor = noise_floor(without_periods(device(rest=3000).recorded()))
+    assert floor.how == "rest"
+    assert floor.response_rms == pytest.approx(0.05, rel=0.03)
+    assert "at rest" in floor.remarks[0]
+
+
+def test_without_repeats_or_rest_noise_is_heard_above_the_driven_band(device):
+    floor = noise_floor(without_periods(device(rest=0).recorded()))
+    assert floor.how == "quiet band"
+    assert floor.response_rms == pytest.approx(0.05, rel=0.05)
+    assert "above the driven band" in floor.remarks[0]
+
+
+def test_at_a_rate_of_few_samples_per_window_no_rest_is_heard(device):
+    found = device(rest=3000).recorded()
+    slow = {side: replace(getattr(found, side), sample_rate_hz=4.0) for side in ("command", "response", "position")}
+    assert noise_floor(replace(found, **slow)).how == "repeats"
+    assert noise_floor(without_periods(replace(found, **slow))).how != "rest"
+
+
+def test_where_nothing_is_quiet_the_noise_is_not_known():
+    random = np.random.default_rng(4)
+    command = Signal(random.standard_normal((4000, 1)), 1000.0, "force", "N", ("fx",))
+    response = Signal(random.standard_normal((4000, 1)), 1000.0, "acceleration", "m/s^2", ("ax",))
+    floor = noise_floor(Recording("loud", command, response, segments=(Segment(0, 4000, "noise", 1.0),)))
+    assert not floor.known
+    assert np.isnan(floor.response_rms).all()
+    assert floor.position_rms is None
+    assert "not known" in floor.remarks[0]
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 4, 5, 6, 7, 8, 9, 10])
+def test_the_noise_of_the_shared_cases_is_found(number):
+    if not CASES.is_dir():
+        pytest.skip("the shared cases lie outside the repository and are not here")
+    from study.store.formats.recording_file import read_recording
+
+    floor = noise_floor(read_recording(CASES / f"open-{number:02d}.h5"))
+    assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.03)
+    assert floor.position_rms == pytest.approx([np.hypot(4e-6, 1e-5 / np.sqrt(12))] * 3, rel=0.03)
+
+
+def test_rattling_in_every_segment_does_not_pass_for_noise():
+    if not CASES.is_dir():
+        pytest.skip("the shared cases lie outside the repository and are not here")
+    from study.store.formats.recording_file import read_recording
+
+    floor = noise_floor(read_recording(CASES / "open-03.h5"))
+    assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.05)
+    assert "at rest" in " ".join(floor.remarks)

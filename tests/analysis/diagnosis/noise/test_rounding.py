@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.diagnosis.noise.rounding import rounded_noise, rounding_step
+
+
+@pytest.mark.parametrize("step", [1e-5, 0.25])
+def test_a_rounded_channel_gives_its_step(step):
+    moved = np.cumsum(np.random.default_rng(1).standard_normal(5000)) * step
+    rounded = (step * np.round(moved / step)).astype(np.float32).astype(np.float64)
+    assert rounding_step(rounded) == pytest.approx(step, rel=1e-3)
+
+
+def test_a_channel_that_is_not_rounded_has_no_step():
+    random = np.random.default_rng(2)
+    assert rounding_step(random.standard_normal(5000)) == 0
+    assert rounding_step(random.standard_normal(5000).astype(np.float32).astype(np.float64)) == 0
+    assert rounding_step(np.zeros(100)) == 0
+
+
+@settings(max_examples=20, deadline=None)
+@given(before=st.floats(0.02, 1.2), seed=st.integers(0, 1000))
+def test_what_rounding_hides_between_repeats_is_put_back(before, seed):
+    random = np.random.default_rng(seed)
+    movement = random.uniform(-20, 20, 4000)
+    looks = np.round(movement + before * random.standard_normal((8, 4000)))
+    between = float(np.mean(looks.var(axis=0, ddof=1)))
+    assert rounded_noise(between, 1.0).total == pytest.approx(before**2 + 1 / 12, rel=0.08)
+
+
+def test_without_noise_all_of_the_rounding_repeats():
+    noise = rounded_noise(0.0, 2.0)
+    assert noise.total == pytest.approx(4 / 12, rel=1e-6)
+    assert noise.repeating == pytest.approx(noise.total)
+
+
+def test_without_rounding_nothing_is_put_back():
+    assert rounded_noise(0.3, 0.0).total == 0.3
+    assert rounded_noise(0.3, 0.0).repeating == 0

@@ -1,0 +1,118 @@
+"""A sound device never is its model; what it differs by is learned, and only more than that is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.reference.learn_model_error import NothingLearned, learned_from, learned_sentence, require_alike
+from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.effect import PlacedEffect
+
+BY_NAME = {effect.name: effect for effect in CATALOGUE}
+AMONG = ("coulomb_friction", "viscous_damping", "amplifier_lag", "force_gain")
+LAG = PlacedEffect(BY_NAME["amplifier_lag"], (0,), {"time_constant": 0.0008})
+RUBBING = PlacedEffect(BY_NAME["coulomb_friction"], (0,), {"level": 0.05})
+
+
+def quiet(what, share):
+    pass
+
+
+@pytest.fixture(scope="module")
+def clean(diagnosed):
+    """Of a device with a lag that its model does not know."""
+    return tuple(diagnosed.recorded(1, (LAG,), seed=seed) for seed in (11, 12))
+
+
+@pytest.fixture(scope="module")
+def found_in(diagnosed):
+    def found(recording, clean=()):
+        without = tuple(name for name in BY_NAME if name not in AMONG)
+        return diagnose([recording], diagnosed.device(1), DiagnosisSettings(without, clean=clean), map, quiet)
+
+    return found
+
+
+def named(found):
+    return [effect.effect for effect in found.diagnosis.effects]
+
+
+def test_what_a_sound_device_differs_by_is_named_only_where_nobody_knows_that_it_is_sound(diagnosed, clean, found_in):
+    same = diagnosed.recorded(1, (LAG,), seed=4)
+    assert named(found_in(same)) == ["amplifier_lag"]
+    known = found_in(same, clean)
+    assert (named(known), known.diagnosis.verdict) == ([], "no_mismatch")
+    assert not any(cell.significant for cell in known.maps["before"])
+    assert known.remarks[0].startswith(
+        "What a sound device differs by from its re-tuned model was learned from 2 clean"
+    )
+
+
+def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in):
+    found = found_in(diagnosed.recorded(1, (LAG, RUBBING), seed=5), clean)
+    assert (named(found), found.diagnosis.verdict) == (["coulomb_friction"], "explained")
+    (effect,) = found.diagnosis.effects
+    assert effect.parameters["level"].value == pytest.approx(0.05, rel=0.05)
+    assert any(cell.significant for cell in found.maps["before"])
+    assert not any(cell.significant for cell in found.maps["after"])
+
+
+def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
+    """At a frequency where it differs by little; the same without a hum is no mismatch."""
+    without = tuple(name for name in BY_NAME if name not in (*AMONG, "mains_hum"))
+    for seed in (6, 7):
+        sound = diagnosed.recorded(1, (LAG,), seed=seed)
+        left = learned_from(clean, diagnosed.device(1), (sound,), map, quiet).floor.channels[0]
+        tone = 0.4 * left * sound.response.samples.std() * np.sqrt(2)
+        hum = PlacedEffect(BY_NAME["mains_hum"], (0,), {"amplitude": tone, "frequency": 50.02, "phase": 0.3})
+        humming = diagnosed.recorded(1, (LAG, hum), seed=seed)
+        settings = DiagnosisSettings(without, clean=clean)
+        found, nothing = (diagnose([one], diagnosed.device(1), settings, map, quiet) for one in (humming, sound))
+        assert (named(found), named(nothing)) == (["mains_hum"], [])
+        assert found.diagnosis.effects[0].parameters["amplitude"].value == pytest.approx(tone, rel=0.3)
+
+
+def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean):
+    learned = learned_from(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
+    lag, rubbing = (claimed(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING))
+    assert learned.sound.gained(lag).mean() > 0.2
+    assert learned.sound.gained(rubbing).mean() < 0.01
+    assert not learned.sound.gained(NOTHING).any()
+
+
+def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):
+    sound, other = (diagnosed.recorded(1, (), seed=seed) for seed in (11, 12))
+    floor = learned_from((sound,), diagnosed.device(1), (other,), map, quiet).floor
+    assert max(floor.channels) < 0.01
+    assert (floor.error, floor.recordings, floor.beyond) == ("free simulation", 1, 2.0)
+
+
+def test_the_shares_of_a_channel_are_those_of_the_mismatch(diagnosed):
+    """A response that is three per cent too large at every third sample, which no number of the model can be."""
+    sound = diagnosed.recorded(1, (), seed=11)
+    samples = sound.response.samples.copy()
+    samples[::3] *= 1.03
+    odd = replace(sound, response=replace(sound.response, samples=samples))
+    learned = learned_from((odd,), diagnosed.device(1), (sound,), map, quiet)
+    # A third of the samples; the model takes the mean of it, a hundredth, on itself.
+    assert learned.floor.channels[0] == pytest.approx(0.03 * np.sqrt(1 / 3 * 2 / 3), rel=0.35)
+
+
+def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
+    require_alike("windows of 1 s", "windows of 1 s")
+    said = r"can only be compared by free simulation, those to diagnose by predicted force, so that one says nothing"
+    with pytest.raises(NothingLearned, match=said):
+        require_alike("free simulation", "predicted force")
+
+
+def test_what_was_learned_is_said_and_where_it_is_much_that_too():
+    assert learned_sentence(CleanFloor(), ("ax",)) == ""
+    little = learned_sentence(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
+    assert "from 2 clean recordings: ax 10 % and x 0.4 % of the channel's signal" in little
+    assert "times 1.5" in little
+    assert "That is much" not in little
+    assert "That is much" in learned_sentence(CleanFloor(channels=(0.4,), recordings=1), ("ax",))

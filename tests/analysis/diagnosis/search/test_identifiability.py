@@ -1,0 +1,93 @@
+"""An effect is named only where the recordings fix its number."""
+
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.errors.hypothesis import Claim, claimed, together
+from analysis.diagnosis.errors.output_error import evaluated
+from analysis.diagnosis.search.explain import Explanation, retuned_alone
+from analysis.diagnosis.search.identifiability import identified
+from analysis.diagnosis.search.search import searched
+from analysis.diagnosis.search.time_budget import always
+from analysis.diagnosis.settings import UNDETERMINED_REACH
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+FRICTION_N = 0.15
+
+
+def claim(name, **values):
+    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+def candidate(context, base, *claims):
+    whole = claims[0] if len(claims) == 1 else together(*claims)
+    return context.candidate(evaluated(context.measure, context.tuning, base.fitted.deviations, whole))
+
+
+def explained_by(context, *rivals):
+    """rivals: of the one round, the named one first; all as good as it."""
+    base = context.candidate(retuned_alone(context))
+    found = [candidate(context, base, one) for one in rivals]
+    found = [replace(one, score=found[0].score) for one in found]
+    return Explanation(
+        context.confirmed(base), context.confirmed(base), context.confirmed(found[0]), (tuple(found),), (found[0],)
+    )
+
+
+def names(found):
+    return [one.effect.name for one in found.after.fitted.hypothesis.claims]
+
+
+@pytest.fixture(scope="module")
+def rubbing(arena_of):
+    return arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),))
+
+
+FRICTION, OPEN = claim("coulomb_friction", level=FRICTION_N), claim("viscous_damping", damping=1e-3)
+
+
+def test_a_number_that_is_fixed_is_named(rubbing):
+    found = explained_by(rubbing, FRICTION, OPEN)
+    assert identified(rubbing, found, always).steps is found.steps
+
+
+def test_in_place_of_one_that_is_open_stands_what_is_as_good_and_fixed(rubbing):
+    assert names(identified(rubbing, explained_by(rubbing, OPEN, FRICTION), always)) == ["coulomb_friction"]
+
+
+def test_with_nothing_as_good_nothing_is_named_and_what_was_left_out_is_known(rubbing):
+    left = identified(rubbing, explained_by(rubbing, OPEN), always)
+    assert left.after is left.retuned
+    assert (left.steps, left.undetermined) == ((), ("viscous_damping",))
+
+
+@pytest.mark.parametrize("order", [(FRICTION, OPEN), (OPEN, FRICTION)])
+def test_of_two_the_one_that_is_open_goes_whichever_came_first(rubbing, order):
+    base = rubbing.candidate(retuned_alone(rubbing))
+    one, both = candidate(rubbing, base, order[0]), candidate(rubbing, base, *order)
+    ends = [rubbing.confirmed(each) for each in (base, base, both)]
+    left = identified(rubbing, Explanation(*ends, ((one,), (both,)), (one, both)), always)
+    assert (names(left), left.undetermined) == (["coulomb_friction"], ("viscous_damping",))
+    assert [one.fitted.hypothesis.key for one in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
+
+
+def test_one_number_that_is_fixed_is_enough(rubbing):
+    """Rubbing in one direction alone: the other's number is open, and the effect is there."""
+    found = explained_by(rubbing, claim("asymmetric_friction", level_positive=FRICTION_N, level_negative=1e-9))
+    assert identified(rubbing, found, always).steps is found.steps
+
+
+def test_what_has_no_number_that_could_be_none_is_not_judged(rubbing):
+    found = explained_by(rubbing, claim("force_saturation", limit=1e3))
+    assert identified(rubbing, found, always).steps is found.steps
+
+
+def test_it_is_said_that_numbers_were_left_open(rubbing, monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.search.identifiability.UNDETERMINED_REACH", UNDETERMINED_REACH * 1e-6)
+    seen = searched(rubbing, [EFFECTS["coulomb_friction"]], lambda what, share: None)
+    assert (seen.judged.verdict, seen.judged.named) == ("unexplained", False)
+    assert seen.remarks == (
+        "An explanation by dry friction is not named: these recordings leave its numbers as good as open.",
+    )

@@ -1,0 +1,129 @@
+"""One settled period of each segment tells of a law what the whole recording does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.errors.choose_measure import measure_by_force
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, claimed
+from analysis.diagnosis.errors.output_error import evaluated, sensitivity
+from analysis.diagnosis.search import short_recordings
+from analysis.diagnosis.search.short_recordings import short_recordings_of
+from equalizer.effects.catalogue import EFFECTS
+from equalizer.effects.effect import PlacedEffect
+
+LAG = {"time_constant": 0.002}
+
+
+def claim(name, **values):
+    return claimed(Claim(EFFECTS[name], "one", (0,)), [values])
+
+
+@pytest.fixture(scope="module")
+def lagging(arena_of):
+    return arena_of((PlacedEffect(EFFECTS["amplifier_lag"], (0,), LAG),))
+
+
+def error(context, hypothesis):
+    return evaluated(context.measure, context.tuning, np.zeros(len(context.tuning.names)), hypothesis).cost
+
+
+def test_it_holds_one_period_of_each_segment_and_a_run_in(lagging):
+    short = short_recordings_of(lagging, NOTHING)
+    (record,), (long,) = short.context.measure.records, lagging.measure.records
+    assert record.fit.sum() == 2 * 1000  # of three levels one is kept to choose by
+    assert len(record.command) < 0.7 * len(long.command)
+    assert np.array_equal(record.measured, long.measured[short.kept[0]])
+
+
+def test_the_true_law_leaves_noise_alone_on_it_and_no_law_leaves_what_it_leaves_on_the_whole(lagging):
+    short = short_recordings_of(lagging, NOTHING).context
+    assert error(short, claim("amplifier_lag", **LAG)) == pytest.approx(
+        error(lagging, claim("amplifier_lag", **LAG)), rel=0.05
+    )
+    assert error(short, NOTHING) == pytest.approx(error(lagging, NOTHING), rel=0.05)
+
+
+def test_without_a_run_in_the_true_law_would_leave_more_than_noise(lagging, monkeypatch):
+    monkeypatch.setattr(short_recordings, "RUN_IN_CONSTANTS", 0.0)
+    short = short_recordings_of(lagging, NOTHING).context
+    assert error(short, claim("amplifier_lag", **LAG)) > 1.5 * error(lagging, claim("amplifier_lag", **LAG))
+
+
+def test_evidence_is_cut_like_the_samples(lagging):
+    short = short_recordings_of(lagging, NOTHING)
+    base = evaluated(lagging.measure, lagging.tuning, np.zeros(len(lagging.tuning.names)), NOTHING)
+    (whole,) = lagging.measure.evidence(lagging.tuning.model, (), base.residuals)
+    cut = short.of(whole)
+    assert np.array_equal(cut.axis_force, whole.axis_force[short.kept[0]])
+    assert cut.used.sum() == short.context.measure.records[0].fit.sum()
+    assert cut.noise is whole.noise
+
+
+def test_there_is_none_where_what_is_held_hangs_on_the_time(lagging):
+    assert short_recordings_of(lagging, claim("sensor_drift", total=1.0, bend=0.0, start=0.0)) is None
+
+
+def test_the_sensitivities_of_one_period_stand_for_those_of_all(lagging):
+    short, at = short_recordings_of(lagging, NOTHING), np.zeros(len(lagging.tuning.names))
+    (record,) = lagging.measure.records
+    whole = sensitivity(lagging.measure, lagging.tuning, at, NOTHING)
+    found = short.repeated(sensitivity(short.context.measure, short.context.tuning, at, NOTHING))
+    later = np.ones(len(record.fit), dtype=bool)
+    for segment in record.recording.segments:
+        later[segment.start : segment.start + segment.period] = False  # in which the motion settles
+    told = np.repeat(later[record.fit], record.measured.shape[1])
+    errors = whole.columns * told
+    wanted, scale = whole.columns @ errors.T, np.linalg.norm(whole.columns, axis=1)
+    off = np.abs(found.on(errors) - wanted) / np.outer(scale, scale)
+    assert off.max() < 0.02
+    assert found.on(errors[0]) == pytest.approx(found.on(errors)[:, 0])
+    assert (np.linalg.norm((found.whole - whole.columns) * told, axis=1) < 0.02 * scale).all()
+    assert found.squares == pytest.approx(found.whole @ found.whole.T)
+    assert found.on(errors) == pytest.approx(found.whole @ errors.T)
+    turned = np.roll(errors, 100 * record.measured.shape[1], axis=1)
+    assert (np.abs(found.on(turned) - wanted) / np.outer(scale, scale)).max() > 0.2
+
+
+@pytest.fixture(scope="module")
+def by_force(lagging):
+    recordings = [record.recording for record in lagging.whole.records]
+    measure = measure_by_force(recordings, lagging.tuning.model, None).measure
+    return replace(lagging, measure=measure.shortened(), whole=measure)
+
+
+def apart_by_force(context):
+    """(samples,): force that is missing in pieces, less that in the whole, over the latter's rms."""
+    short, measure = short_recordings_of(context, NOTHING), context.measure
+    pieces = short.context.measure.residuals(context.tuning.model, ())
+    (whole,), places = measure.residuals(context.tuning.model, ()), np.split(short.kept[0], np.cumsum(lengths(short)))
+    fits = [record.fit for record in short.context.measure.records]
+    off = [piece[fit] - whole[at][fit] for piece, at, fit in zip(pieces, places, fits, strict=False)]
+    return np.concatenate(off).ravel() / whole[measure.records[0].fit].std()
+
+
+def lengths(short):
+    return [len(record.command) for record in short.context.measure.records][:-1]
+
+
+def test_forces_are_compared_stretch_by_stretch(by_force):
+    short = short_recordings_of(by_force, NOTHING)
+    assert len(short.context.measure.records) == 2
+    assert len(short.kept[0]) < 0.7 * len(by_force.measure.records[0].command)
+    assert np.abs(apart_by_force(by_force)).max() < 0.01
+
+
+def test_without_what_lies_around_stretches_forces_would_differ(by_force, monkeypatch):
+    monkeypatch.setattr(short_recordings, "RUN_IN_CONSTANTS", 0.0)
+    assert np.abs(apart_by_force(by_force)).max() > 0.05
+
+
+def test_a_period_that_the_record_ends_in_stands_for_none(lagging):
+    (record,) = lagging.measure.records
+    ends = record.recording.segments[0].stop - 300
+    cut = [getattr(record, name)[:ends] for name in ("command", "measured", "fit", "choose", "test")]
+    context = replace(lagging, measure=lagging.measure.with_records((Observed(record.recording, *cut),)))
+    short = short_recordings_of(context, NOTHING)
+    assert short is None or short.stands_in.max() < sum(one.fit.sum() for one in short.context.measure.records)
