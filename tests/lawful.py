@@ -7,7 +7,7 @@ from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.explain import Explanation, retuned_alone
-from analysis.diagnosis.search.search_context import Arena
+from analysis.diagnosis.search.search_context import SearchContext
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -64,12 +64,12 @@ def _sweep() -> FloatArray:
     return np.asarray(rise * rise[::-1] * np.sin(2 * np.pi * (1.0 * t + 5.0 * t**2)))
 
 
-def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tuple[Arena, Explanation]:
+def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tuple[SearchContext, Explanation]:
     """And what re-tuning alone leaves."""
     given = model or device(1)
     measure = measure_of([recording], given).measure
     tuning = tuning_of(given, recording.command.channels)
-    arena = Arena(measure.shortened(), measure, tuning, map)
-    before = evaluated(arena.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
-    given_, retuned = (arena.confirmed(arena.contender(fitted)) for fitted in (before, retuned_alone(arena)))
-    return arena, Explanation(given_, retuned, retuned, (), ())
+    context = SearchContext(measure.shortened(), measure, tuning, map)
+    before = evaluated(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
+    given_, retuned = (context.confirmed(context.contender(fitted)) for fitted in (before, retuned_alone(context)))
+    return context, Explanation(given_, retuned, retuned, (), ())

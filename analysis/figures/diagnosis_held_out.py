@@ -54,11 +54,11 @@ def held_out_picture(courses: Sequence[Course], noise_rms: Mapping[str, float], 
 def telling_excerpt(courses: Sequence[Course], noise_rms: Mapping[str, float]) -> Excerpt | None:
     """The held-out stretch and channel where re-tuned and final prediction differ most, in units of the noise; where
     they never do, where as given and final do."""
-    for one in ("retuned", "before"):
+    for each in ("retuned", "before"):
         best: tuple[float, Excerpt] | None = None
         for course in courses:
             noise = np.array([noise_rms.get(name, np.nan) for name in course.channels])
-            change = np.nan_to_num((getattr(course, one) - course.after) / noise)
+            change = np.nan_to_num((getattr(course, each) - course.after) / noise)
             for start, stop in course.tested:
                 found = _strongest(course, change[start:stop], start)
                 if found is not None and (best is None or found[0] > best[0]):
@@ -117,7 +117,7 @@ def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping
     shown = scale_of(unit, float(np.max(np.abs(measured))))
     left = [(stage, measured - getattr(course, stage.name)[part, k]) for stage in STAGES]
     # The given model may be so far off that it would flatten the others.
-    largest = max(float(np.max(np.abs(one))) for stage, one in left if stage is not BEFORE)
+    largest = max(float(np.max(np.abs(each))) for stage, each in left if stage is not BEFORE)
     small = scale_of(unit, largest)
     above.plot(seconds, shown.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
     for stage, residual in left:

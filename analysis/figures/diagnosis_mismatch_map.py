@@ -52,7 +52,7 @@ class _Layout:
 def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
     """unit: of the command. One per driving input, the one with most mismatch first and the others folded."""
     inputs = sorted(
-        {cell.input for cells in maps.values() for cell in cells}, key=lambda one: (-_worst(maps, one), one)
+        {cell.input for cells in maps.values() for cell in cells}, key=lambda each: (-_worst(maps, each), each)
     )
     return tuple(
         Picture(
@@ -120,7 +120,7 @@ def _placed_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
     """The map and the bar of its colours. What stands around them is known, and need not be measured."""
     figure.set_layout_engine("none")
     width, height = figure.get_size_inches()
-    longest = max(len(_row_label(one, level, layout)) for one in layout.channels for level in layout.levels)
+    longest = max(len(_row_label(channel, level, layout)) for channel in layout.channels for level in layout.levels)
     left = (0.33 if any(layout.levels) and _upright(layout) else 0.1) + _LETTER_IN * longest
     bottom, top, right = 0.5 / height, 1 - 0.26 / height, 1 - 1.0 / width
     axes = figure.add_axes((left / width, bottom, right - left / width, top - bottom))
@@ -137,7 +137,7 @@ def _filled(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, list[
     table = np.full([round(_FINE * cells) for cells in size], np.nan)
     frames: list[FloatArray] = []
     for column, stage in enumerate(layout.stages):
-        for cell in (one for one in maps[stage.name] if one.input == input_):
+        for cell in (each for each in maps[stage.name] if each.input == input_):
             corner = layout.corner(_level(layout, cell), column)
             within = layout.bands.index(cell.band_hz), layout.channels.index((cell.output, cell.quantity))
             x, y = (round(_FINE * at) for at in corner + within)
@@ -163,7 +163,7 @@ def _label(axes: Axes, layout: _Layout, unit: str) -> None:
     xs = [layout.corner(0, column)[0] + band for column in stages for band in range(len(layout.bands))]
     ys = [layout.corner(row, 0)[1] + channel for row in levels for channel in range(len(layout.channels))]
     axes.set_xticks(xs, [f"{low:g}" for low, _ in layout.bands] * len(stages), fontsize=7.5)
-    rows = [_row_label(one, level, layout) for level in layout.levels for one in layout.channels]
+    rows = [_row_label(channel, level, layout) for level in layout.levels for channel in layout.channels]
     axes.set_yticks(ys, rows, fontsize=8.5)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
@@ -181,14 +181,14 @@ def _label(axes: Axes, layout: _Layout, unit: str) -> None:
 
 
 def _layout(maps: Maps, input_: str) -> _Layout:
-    cells = [one for each in maps.values() for one in each if one.input == input_]
-    levels = sorted({one.amplitude for one in cells})
+    cells = [item for each in maps.values() for item in each if item.input == input_]
+    levels = sorted({cell.amplitude for cell in cells})
     groups = [part for part in np.array_split(levels, min(_MOST_LEVELS, len(levels))) if len(part)] if levels else []
     return _Layout(
         tuple(stage for stage in STAGES if maps.get(stage.name)),
         tuple(float(part[-1]) for part in groups),
-        tuple(sorted({one.band_hz for one in cells})),
-        tuple(dict.fromkeys((one.output, one.quantity) for one in cells)),
+        tuple(sorted({cell.band_hz for cell in cells})),
+        tuple(dict.fromkeys((cell.output, cell.quantity) for cell in cells)),
     )
 
 
@@ -199,7 +199,7 @@ def _level(layout: _Layout, cell: MismatchCell) -> int:
 
 def _channel(channel: tuple[str, str], layout: _Layout) -> str:
     name, quantity = channel
-    return f"{name} ({quantity})" if [one for one, _ in layout.channels].count(name) > 1 else name
+    return f"{name} ({quantity})" if [each for each, _ in layout.channels].count(name) > 1 else name
 
 
 def _short(value: float) -> str:
@@ -209,16 +209,16 @@ def _short(value: float) -> str:
 
 
 def _worst(maps: Maps, input_: str) -> float:
-    return max((one.in_noise for cells in maps.values() for one in cells if one.input == input_), default=0.0)
+    return max((cell.in_noise for cells in maps.values() for cell in cells if cell.input == input_), default=0.0)
 
 
 def _level_words(maps: Maps, input_: str, unit: str) -> str:
-    levels = {one.amplitude for cells in maps.values() for one in cells if one.input == input_}
+    levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     return f", at levels of the excitation{f' in {unit}' if unit else ''}" if any(levels) else ""
 
 
 def _grouped_words(maps: Maps, input_: str) -> str:
-    levels = {one.amplitude for cells in maps.values() for one in cells if one.input == input_}
+    levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     if len(levels) <= _MOST_LEVELS:
         return ""
     return (
@@ -229,11 +229,11 @@ def _grouped_words(maps: Maps, input_: str) -> str:
 def _in_words(maps: Maps, input_: str) -> str:
     sentences = []
     for stage in STAGES:
-        cells = [one for one in maps.get(stage.name, ()) if one.input == input_]
+        cells = [each for each in maps.get(stage.name, ()) if each.input == input_]
         if not cells:
             continue
-        worst = max(cells, key=lambda one: one.in_noise)
-        count = sum(one.significant for one in cells)
+        worst = max(cells, key=lambda cell: cell.in_noise)
+        count = sum(cell.significant for cell in cells)
         sentences.append(
             f"{stage.words.capitalize()}: {count} of {len(cells)} cells differ significantly; the worst is "
             f"{worst.output} at {worst.band_hz[0]:g} to {worst.band_hz[1]:g} Hz and {worst.amplitude:g}, with "

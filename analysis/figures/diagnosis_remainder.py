@@ -26,7 +26,7 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
         caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, all but noise "
         "is explained; where it lies above, something is not.",
         figure=draw_remainder(spectra),
-        alternative=" ".join(_in_words(one) for one in spectra),
+        alternative=" ".join(_in_words(each) for each in spectra),
     )
 
 
@@ -39,22 +39,22 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axes in grid.ravel()[len(spectra) :]:
         axes.set_visible(False)
-    for axes, one in zip(grid.ravel(), spectra, strict=False):
-        _draw_panel(axes, one)
+    for axes, each in zip(grid.ravel(), spectra, strict=False):
+        _draw_panel(axes, each)
     figure.supxlabel("Frequency (Hz)", fontsize=9.5)
     handles = [_SIGNAL, RETUNED.handle, AFTER.handle, _NOISE]
     figure.legend(handles=handles, loc="outside upper center", ncols=4, fontsize=9, frameon=False)
     return figure
 
 
-def _draw_panel(axes: Axes, one: RemainderSpectrum) -> None:
+def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     plain_axes(axes)
-    axes.loglog(one.frequency_hz, one.measured, color=GREY, linewidth=0.9)
-    if np.isfinite(one.noise).any():
-        axes.loglog(one.frequency_hz, one.noise, color=GREY, linewidth=4, alpha=0.4)
-    for stage, values in ((RETUNED, one.retuned), (AFTER, one.after)):
-        axes.loglog(one.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    axes.set_title(f"{one.channel} ({written(one.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
+    axes.loglog(spectrum.frequency_hz, spectrum.measured, color=GREY, linewidth=0.9)
+    if np.isfinite(spectrum.noise).any():
+        axes.loglog(spectrum.frequency_hz, spectrum.noise, color=GREY, linewidth=4, alpha=0.4)
+    for stage, values in ((RETUNED, spectrum.retuned), (AFTER, spectrum.after)):
+        axes.loglog(spectrum.frequency_hz, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    axes.set_title(f"{spectrum.channel} ({written(spectrum.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
@@ -64,9 +64,9 @@ def _draw_panel(axes: Axes, one: RemainderSpectrum) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _in_words(one: RemainderSpectrum) -> str:
-    over = one.after / one.noise
+def _in_words(spectrum: RemainderSpectrum) -> str:
+    over = spectrum.after / spectrum.noise
     if not np.isfinite(over).any():
-        return f"{one.channel}: the noise is not known."
+        return f"{spectrum.channel}: the noise is not known."
     worst = int(np.nanargmax(over))
-    return f"{one.channel}: at most {over[worst]:.2g} times the noise, at {one.frequency_hz[worst]:.3g} Hz."
+    return f"{spectrum.channel}: at most {over[worst]:.2g} times the noise, at {spectrum.frequency_hz[worst]:.3g} Hz."

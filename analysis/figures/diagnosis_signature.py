@@ -21,14 +21,14 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
     return tuple(
         Picture(
             name=f"signature-{number}",
-            title=f"What shows {noun_of(one.effect)}{f' ({one.axis})' if one.axis else ''}",
+            title=f"What shows {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
             caption="Dots: what the model, with all else that was found, fails to explain without this effect, mean "
             "per bin; bars: two standard errors. Line: the fitted law, simulated and averaged alike."
-            + (_ROUNDED if one.of.startswith("missing") else ""),
-            figure=draw_signature(one),
-            alternative=_in_words(one),
+            + (_ROUNDED if signature.of.startswith("missing") else ""),
+            figure=draw_signature(signature),
+            alternative=_in_words(signature),
         )
-        for number, one in enumerate(signatures, start=1)
+        for number, signature in enumerate(signatures, start=1)
     )
 
 

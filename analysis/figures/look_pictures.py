@@ -131,11 +131,17 @@ def _coherence(found: Overview, name: str) -> Picture:
     panel = figure.subplots()
     plain_axes(panel)
     _shade_bands(panel, found)
-    for k, one in enumerate(found.coherences):
+    for k, coherence in enumerate(found.coherences):
         colour = COLOURS[k % len(COLOURS)]
-        panel.plot(found.spectra.frequency_hz, one.multiple, color=colour, lw=0.7, alpha=0.3)
+        panel.plot(found.spectra.frequency_hz, coherence.multiple, color=colour, lw=0.7, alpha=0.3)
         inside = _in_band(found)
-        panel.plot(found.spectra.frequency_hz[inside], one.multiple[inside], color=colour, lw=1.3, label=one.response)
+        panel.plot(
+            found.spectra.frequency_hz[inside],
+            coherence.multiple[inside],
+            color=colour,
+            lw=1.3,
+            label=coherence.response,
+        )
     panel.set_xscale("log")
     panel.set_xlim(float(found.spectra.frequency_hz[0]), float(found.spectra.frequency_hz[-1]))
     panel.set_ylim(0, 1.02)

@@ -18,7 +18,7 @@ NOTHING_SAID = "no name"
 
 
 def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
-    singles = [one for one in outcomes if one.kind == "single"]
+    singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:
         pictures += [_strips(detection_strips(singles)), _by_size(singles), _confusion(singles)]
@@ -80,14 +80,14 @@ def _by_size(singles: Sequence[Outcome]) -> Picture:
 
 
 def _confusion(singles: Sequence[Outcome]) -> Picture:
-    seen = [one for one in singles if one.detectable]
-    said = [one.named_names[0] if one.named else NOTHING_SAID for one in seen]
-    wrong = {name for one, name in zip(seen, said, strict=True) if name not in (NOTHING_SAID, one.names[0])}
-    names = sorted({one.names[0] for one in seen} | wrong)
+    seen = [single for single in singles if single.detectable]
+    said = [item.named_names[0] if item.named else NOTHING_SAID for item in seen]
+    wrong = {name for item, name in zip(seen, said, strict=True) if name not in (NOTHING_SAID, item.names[0])}
+    names = sorted({item.names[0] for item in seen} | wrong)
     columns = [*names, NOTHING_SAID]
     counts = np.zeros((len(names), len(columns)))
-    for one, name in zip(seen, said, strict=True):
-        counts[names.index(one.names[0]), columns.index(name)] += 1
+    for each, name in zip(seen, said, strict=True):
+        counts[names.index(each.names[0]), columns.index(name)] += 1
     figure = new_figure(9.6, 2.2 + 0.23 * len(names))
     axes = figure.add_subplot()
     _draw_counts(axes, counts)
@@ -98,7 +98,7 @@ def _confusion(singles: Sequence[Outcome]) -> Picture:
     return Picture(
         "confusion", "What was taken for what",
         "Devices with one concealed effect that shows; blue is right, red is not.", figure,
-        alternative=" ".join(f"{one.names[0]} named {name}." for one, name in zip(seen, said, strict=True)),
+        alternative=" ".join(f"{item.names[0]} named {name}." for item, name in zip(seen, said, strict=True)),
     )  # fmt: skip
 
 

@@ -63,18 +63,18 @@ def copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
 
 def _copies(channels: Sequence[Channel]) -> Iterator[Check]:
     moving = [channel for channel in channels if channel.known.size and np.ptp(channel.known) > 0]
-    for one, other in combinations(moving, 2):
-        if {one.role, other.role} == {"command", "excitation"}:
+    for each, other in combinations(moving, 2):
+        if {each.role, other.role} == {"command", "excitation"}:
             continue
-        factor = _factor(one.samples, other.samples)
+        factor = _factor(each.samples, other.samples)
         if factor is None:
             continue
         scaled = "" if abs(factor - 1) < _SAME_STORED else f" times {factor:.6g}, up to an offset"
-        independent = {one.role, other.role} <= {"command", "response"}
+        independent = {each.role, other.role} <= {"command", "response"}
         yield Check(
             COPIES,
             "wrong" if independent else "notice",
-            f"{other.label} is {one.label}{scaled}, sample by sample.",
+            f"{other.label} is {each.label}{scaled}, sample by sample.",
             "Check the map: two sensors never agree to the last digit; leave one of them out.",
         )
 

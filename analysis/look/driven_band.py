@@ -142,19 +142,19 @@ def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recordi
     """Of single steps, slow courses and controllers, windows say little: no more than a notice."""
     kinds = {segment.kind for segment in recording.segments}
     broad = bool(kinds) and kinds <= _BROAD and recording.excitation is None
-    return tuple(_coherence_check(one, broad) for one in coherences)
+    return tuple(_coherence_check(coherence, broad) for coherence in coherences)
 
 
-def _coherence_check(one: ResponseCoherence, broad: bool) -> Check:
+def _coherence_check(coherence: ResponseCoherence, broad: bool) -> Check:
     seen = (
-        f"Of the power of response '{one.response}' in the driven band, {one.share:.1%} is linear in the commands, "
-        f"least around {one.lowest_hz:.3g} Hz ({one.lowest:.0%})."
+        f"Of the power of response '{coherence.response}' in the driven band, {coherence.share:.1%} is linear in the "
+        f"commands, least around {coherence.lowest_hz:.3g} Hz ({coherence.lowest:.0%})."
     )
-    if one.share < POOR and broad:
+    if coherence.share < POOR and broad:
         return Check(
             COHERENCE, "wrong", seen, "Look for a wrong channel, a large time shift, or an input that was not recorded."
         )
-    if one.share < LOW:
+    if coherence.share < LOW:
         return Check(
             COHERENCE,
             "notice",

@@ -137,11 +137,11 @@ def lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: floa
 
 
 def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> Iterator[Check]:
-    for one, other in combinations(range(len(channels)), 2):
-        first, second = channels[one], channels[other]
+    for each, other in combinations(range(len(channels)), 2):
+        first, second = channels[each], channels[other]
         if first.unit != second.unit or {first.role, second.role} == {"command", "excitation"}:
             continue
-        agreed = agreement(spectra, one, other)
+        agreed = agreement(spectra, each, other)
         if agreed is None or agreed.share < SAME_SHARE or agreed.spread > SAME_SPREAD:
             continue
         late = _lag_words(agreed.lag_samples, rate_hz)

@@ -89,10 +89,10 @@ def repeat_checks(recording: Recording, seen: Repeats) -> tuple[Check, ...]:
 
 def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:
     channels = recording.response.channels
-    shares = np.array([one.share for one in noise])
+    shares = np.array([each.share for each in noise])
     said = listed([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
     loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
-    text = f"Between repeats (up to {max(one.looks for one in noise)}) remain at least {said}, rms."
+    text = f"Between repeats (up to {max(each.looks for each in noise)}) remain at least {said}, rms."
     do = f"{listed(loud)} hardly repeat: average more periods, or drive more." if loud else ""
     return (Check(REPEATS, "notice" if loud else "fine", text, do),)
 

@@ -55,18 +55,18 @@ def _said(cells: Sequence[Distortion]) -> tuple[str, ...]:
         return ("No distortion stands out of the noise: from repeats and silent lines the device looks linear.",)
     return tuple(
         f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_COURSES[course]}: "
-        f"{listed([f'{one.output} driven by {one.input}' for one in trends])}."
+        f"{listed([f'{each.output} driven by {each.input}' for each in trends])}."
         for (kind, course), trends in groups.items()
     )
 
 
 def _table(found: Findings) -> Table | None:
-    cells = [one for one in found.local.distortions.cells if one.whole_band]
-    heard = [one for one in cells if _is_heard(one, cells)]
-    kinds = [kind for kind in _KINDS if any(one.kind == kind for one in heard)]
+    cells = [cell for cell in found.local.distortions.cells if cell.whole_band]
+    heard = [cell for cell in cells if _is_heard(cell, cells)]
+    kinds = [kind for kind in _KINDS if any(item.kind == kind for item in heard)]
     rows: dict[tuple[str, str, str, float], dict[Kind, Distortion]] = {}
-    for one in heard:
-        rows.setdefault((one.output, one.quantity, one.input, one.amplitude), {})[one.kind] = one
+    for each in heard:
+        rows.setdefault((each.output, each.quantity, each.input, each.amplitude), {})[each.kind] = each
     if not rows:
         return None
     noise = _noise(found)
@@ -93,9 +93,9 @@ def _table(found: Findings) -> Table | None:
 
 def _is_heard(cell: Distortion, cells: Sequence[Distortion]) -> bool:
     beside = [
-        one.signal_rms
-        for one in cells
-        if (one.quantity, one.input, one.amplitude, one.whole_band)
+        each.signal_rms
+        for each in cells
+        if (each.quantity, each.input, each.amplitude, each.whole_band)
         == (cell.quantity, cell.input, cell.amplitude, cell.whole_band)
     ]
     return cell.signal_rms > _HEARD * max(beside)
@@ -106,7 +106,7 @@ def _noise(found: Findings) -> dict[tuple[str, str], float]:
     if found.floor is None or not found.courses:
         return {}
     rms = [*found.floor.response_rms, *(() if found.floor.position_rms is None else found.floor.position_rms)]
-    keys = dict.fromkeys((one.output, one.quantity) for one in found.local.distortions.cells)
+    keys = dict.fromkeys((cell.output, cell.quantity) for cell in found.local.distortions.cells)
     return {key: float(value) for key, value in zip(keys, rms, strict=False)}
 
 

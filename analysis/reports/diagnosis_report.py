@@ -85,7 +85,7 @@ def _answer(found: Findings) -> list[Section]:
     if not effects:
         return []
     points = [
-        " ".join(filter(None, (_said(found, one, signatures), inseparable_sentence(one)))) for one in effects
+        " ".join(filter(None, (_said(found, effect, signatures), inseparable_sentence(effect)))) for effect in effects
     ]  # fmt: skip
     after = [remainder_sentence(found.diagnosis, device_of(found)), next_experiment_sentence(found.diagnosis)]
     return [Section("What the model lacks", points=(*points, *filter(None, after)))]
@@ -118,7 +118,7 @@ def _where(found: Findings, pictures: Sequence[Picture]) -> Section:
 
 def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Section:
     effect = found.diagnosis.effects[number]
-    placed = next((one.effect for one in found.named if one.effect.name == effect.effect), None)
+    placed = next((each.effect for each in found.named if each.effect.name == effect.effect), None)
     paragraphs = [share_sentence(effect)]
     if placed is not None:
         paragraphs += [f"Equation: {placed.equation}.", f"Source: {placed.source}."]
@@ -135,7 +135,7 @@ def _effect(found: Findings, number: int, pictures: Sequence[Picture]) -> Sectio
 
 def _signature(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     """Of the effect at its own axis, where it stands at several."""
-    mine = [number for number, one in enumerate(found.signatures, start=1) if one.effect == effect.effect]
+    mine = [number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect]
     there = [number for number in mine if found.signatures[number - 1].axis == effect.axis]
     names = {f"signature-{number}" for number in (there or mine)}
     return tuple(picture for picture in pictures if picture.name in names)

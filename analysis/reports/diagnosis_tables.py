@@ -24,8 +24,8 @@ _PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "hel
 
 def parameter_table(effect: NamedEffect) -> Table:
     rows = tuple(
-        (name.replace("_", " "), estimate_text(one).partition(" [")[0], _interval(one))
-        for name, one in effect.parameters.items()
+        (name.replace("_", " "), estimate_text(parameter).partition(" [")[0], _interval(parameter))
+        for name, parameter in effect.parameters.items()
     )
     return Table("Its numbers", ("Number", "Value", "95 % interval"), rows)
 
@@ -39,7 +39,7 @@ def rival_table(effect: NamedEffect) -> Table:
             "cannot be told apart" if rival.inseparable else "passed over",
             ended(rival.why_not),
         )
-        for rival in sorted(effect.rivals, key=lambda one: (not one.inseparable, -one.probability))
+        for rival in sorted(effect.rivals, key=lambda rival: (not rival.inseparable, -rival.probability))
     ]
     return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rows))
 
@@ -49,13 +49,13 @@ def candidate_table(found: Findings) -> Table | None:
     device = device_of(found)
     rows = tuple(
         (
-            f"{capital(noun_of(one.effect))} {place_words(one.place, one.axis, device.single)}",
-            candidate_numbers(one, device) or NONE,
-            share_text(one.held_out_gain),
-            share_text(one.share_of_black_box),
-            ended(capital(one.why_not)),
+            f"{capital(noun_of(candidate.effect))} {place_words(candidate.place, candidate.axis, device.single)}",
+            candidate_numbers(candidate, device) or NONE,
+            share_text(candidate.held_out_gain),
+            share_text(candidate.share_of_black_box),
+            ended(capital(candidate.why_not)),
         )
-        for one in found.diagnosis.candidates
+        for candidate in found.diagnosis.candidates
     )
     if not rows:
         return None
@@ -107,15 +107,15 @@ def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
     worst = places[:_MOST_PLACES]
     rows = tuple(
         (
-            one.output,
-            one.input,
-            f"{one.band_hz[0]:g} to {one.band_hz[1]:g} Hz",
-            NONE if one.amplitude is None else f"{one.amplitude:g}",
-            one.state or NONE,
-            share_text(one.share),
-            p_value(one.p_value),
+            each.output,
+            each.input,
+            f"{each.band_hz[0]:g} to {each.band_hz[1]:g} Hz",
+            NONE if each.amplitude is None else f"{each.amplitude:g}",
+            each.state or NONE,
+            share_text(each.share),
+            p_value(each.p_value),
         )
-        for one in worst
+        for each in worst
     )
     more = len(places) - len(worst)
     notes: tuple[str, ...] = (f"And {more} smaller {'place' if more == 1 else 'places'}.",) if more > 0 else ()

@@ -81,13 +81,13 @@ def render_identification_report(
 def _resonance_table(resonances: Sequence[Resonance]) -> Table:
     rows = tuple(
         (
-            f"{one.frequency_hz:.2f} Hz",
-            f"{one.frequency_interval_hz[0]:.2f} to {one.frequency_interval_hz[1]:.2f} Hz",
-            f"{one.damping_ratio:.3f}",
-            f"{one.damping_interval[0]:.3f} to {one.damping_interval[1]:.3f}",
-            ", ".join(one.seen_in),
+            f"{resonance.frequency_hz:.2f} Hz",
+            f"{resonance.frequency_interval_hz[0]:.2f} to {resonance.frequency_interval_hz[1]:.2f} Hz",
+            f"{resonance.damping_ratio:.3f}",
+            f"{resonance.damping_interval[0]:.3f} to {resonance.damping_interval[1]:.3f}",
+            ", ".join(resonance.seen_in),
         )
-        for one in resonances
+        for resonance in resonances
     )
     return Table("Resonances", ("Frequency", "95 % interval", "Damping ratio", "95 % interval", "Seen in"), rows)
 

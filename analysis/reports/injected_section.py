@@ -11,17 +11,19 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     rates = Table(
         "How often it was right",
         ("what", "rate, 95 % interval"),
-        tuple((one.name, figure_text(one)) for one in injected_figures(outcomes)),
+        tuple((injected_figure.name, figure_text(injected_figure)) for injected_figure in injected_figures(outcomes)),
     )
     kinds = _table("Detectable faults by kind", "injected", tallies(outcomes, kind_of))
-    where = _table("Detectable faults by recording", "recording", tallies(outcomes, lambda one: one.recording))
-    missed = [one for one in outcomes if not one.right and (one.detectable or one.judged == "wrong")]
+    where = _table("Detectable faults by recording", "recording", tallies(outcomes, lambda outcome: outcome.recording))
+    missed = [
+        outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.judged == "wrong")
+    ]
     listed = Table(
         "Every miss, and every wrong story",
         ("recording", "injected", "error changes by", "judged", "named"),
         tuple(
-            (one.recording, one.injected or "nothing", _times(one.change), one.judged, ", ".join(one.named) or "-")
-            for one in missed
+            (each.recording, each.injected or "nothing", _times(each.change), each.judged, ", ".join(each.named) or "-")
+            for each in missed
         ),
     )
     return Section(
@@ -37,8 +39,8 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     )
 
 
-def kind_of(one: InjectedOutcome) -> str:
-    return "two at once" if len(one.effects) > 1 else one.injected
+def kind_of(injected_outcome: InjectedOutcome) -> str:
+    return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 
 def _table(title: str, what: str, rows: Sequence[Tally]) -> Table:

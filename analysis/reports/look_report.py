@@ -14,13 +14,15 @@ def render_look_report(
     found: Sequence[Overview], pictures: Sequence[tuple[Picture, ...]], provenance: Mapping[str, str], generated: str
 ) -> str:
     """pictures: of each recording, as `pictures_of` gives them."""
-    wrong = [(one.name, check) for one in found for check in one.checks if check.level == "wrong"]
-    sections = [section for one, drawn in zip(found, pictures, strict=True) for section in _sections(one, drawn, found)]
+    wrong = [(each.name, check) for each in found for check in each.checks if check.level == "wrong"]
+    sections = [
+        section for each, drawn in zip(found, pictures, strict=True) for section in _sections(each, drawn, found)
+    ]
     return render_page(
         Page(
-            title="A look at " + ", ".join(dict.fromkeys(one.recording.device for one in found)),
+            title="A look at " + ", ".join(dict.fromkeys(each.recording.device for each in found)),
             summary=f"{len(found)} recording{'s' if len(found) > 1 else ''}, before any model. "
-            + " ".join(brief(one) for one in found[:3]),
+            + " ".join(brief(each) for each in found[:3]),
             banner=f"{len(wrong)} thing{'s' if len(wrong) > 1 else ''} would mislead an analysis: {wrong[0][1].seen}"
             if wrong
             else "",
@@ -32,7 +34,7 @@ def render_look_report(
 
 
 def pictures_of(found: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
-    return tuple(look_pictures(one, place) for place, one in enumerate(found, start=1))
+    return tuple(look_pictures(each, place) for place, each in enumerate(found, start=1))
 
 
 def brief(found: Overview) -> str:
@@ -46,12 +48,12 @@ def brief(found: Overview) -> str:
     )
 
 
-def _sections(one: Overview, pictures: Sequence[Picture], found: Sequence[Overview]) -> tuple[Section, ...]:
-    of = f" of {one.name}" if len(found) > 1 else ""
+def _sections(overview: Overview, pictures: Sequence[Picture], found: Sequence[Overview]) -> tuple[Section, ...]:
+    of = f" of {overview.name}" if len(found) > 1 else ""
     return (
-        Section(f"Checks{of}", tables=(_checks(one.checks),)),
-        Section(f"Channels{of}", tables=(_channels(one),)),
-        Section(f"Pictures{of}", pictures=tuple(pictures), tables=(_segments(one),)),
+        Section(f"Checks{of}", tables=(_checks(overview.checks),)),
+        Section(f"Channels{of}", tables=(_channels(overview),)),
+        Section(f"Pictures{of}", pictures=tuple(pictures), tables=(_segments(overview),)),
     )
 
 
@@ -60,7 +62,7 @@ def _checks(checks: Sequence[Check]) -> Table:
     return Table("What was checked", ("Check", "", "Seen", "What to do"), rows)
 
 
-def _channels(one: Overview) -> Table:
+def _channels(overview: Overview) -> Table:
     header = ("Channel", "Quantity", "Unit", "Lowest", "Highest", "Mean", "Rms about it", "Missing")
     rows = tuple(
         (
@@ -70,19 +72,19 @@ def _channels(one: Overview) -> Table:
             *(typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)),
             str(summary.missing),
         )
-        for summary in one.summaries
+        for summary in overview.summaries
     )
     return Table("Channels", header, rows)
 
 
-def _segments(one: Overview) -> Table:
+def _segments(overview: Overview) -> Table:
     header = (
         "Segment",
         "Role",
         "Start (s)",
         "Length (s)",
         "Period",
-        *(f"Rms of {c.role} {c.name}" for c in one.channels),
+        *(f"Rms of {c.role} {c.name}" for c in overview.channels),
     )
     rows = tuple(
         (
@@ -93,6 +95,6 @@ def _segments(one: Overview) -> Table:
             str(level.period) if level.period else "",
             *(f"{value:.4g}" for value in level.rms),
         )
-        for level in one.levels
+        for level in overview.levels
     )
     return Table("Segments", header, rows, folded=len(rows) > 12)

@@ -68,7 +68,10 @@ def render_proof_report(
 def _controls(controls: Sequence[Controlled]) -> tuple[Section, ...]:
     if not controls:
         return ()
-    rows = tuple((one.name, one.claim, "held" if one.held else "did not hold", "; ".join(one.said)) for one in controls)
+    rows = tuple(
+        (control.name, control.claim, "held" if control.held else "did not hold", "; ".join(control.said))
+        for control in controls
+    )
     table = Table("What is changed, and what must come of it", ("control", "claim", "outcome", "said"), rows)
     return (Section("Controls", tables=(table,)),)
 
@@ -78,10 +81,10 @@ def _followed(found: Sequence[FollowUp]) -> tuple[Section, ...]:
         return ()
     rows = tuple(
         (
-            str(one.number), one.effect, ", ".join(one.returned), one.proposed or "nothing would tell",
-            _said(one.proposed, one.after_proposed), one.drawn or "-", _said(one.drawn, one.after_drawn),
+            str(each.number), each.effect, ", ".join(each.returned), each.proposed or "nothing would tell",
+            _said(each.proposed, each.after_proposed), each.drawn or "-", _said(each.drawn, each.after_drawn),
         )
-        for one in found
+        for each in found
     )  # fmt: skip
     header = ("number", "concealed", "left at first", "proposed", "left then", "drawn at random", "left then")
     notes = ("A random recording comes from the same menu, and may be the proposed one.",)
@@ -105,10 +108,10 @@ def _points(facts: ProofFacts) -> tuple[str, ...]:
 def _misses(misses: Sequence[Outcome]) -> Table:
     rows = tuple(
         (
-            str(one.number), f"{one.kind}, {one.bank}", concealed_text(one), strength_text(one) or "-",
-            said_text(one), f"{one.left('retuned'):.2f}", f"{one.left('after'):.2f}",
+            str(miss.number), f"{miss.kind}, {miss.bank}", concealed_text(miss), strength_text(miss) or "-",
+            said_text(miss), f"{miss.left('retuned'):.2f}", f"{miss.left('after'):.2f}",
         )
-        for one in misses
+        for miss in misses
     )  # fmt: skip
     header = ("number", "kind, bank", "concealed", "strength", "said", "re-tuned / noise", "after / noise")
     return Table("Every answer that is not as it should be", header, rows)

@@ -41,11 +41,13 @@ def render_real_report(
     """HTML. pictures: by folder and recording."""
     sections = [Section("All recordings", tables=(overview_table(answers),))]
     if troubles:
-        sections.append(Section("What could not be used", points=tuple(f"{one.where}: {one.why}" for one in troubles)))
-    sections += [_section(one, pictures.get((one.folder, one.recording))) for one in answers]
+        sections.append(
+            Section("What could not be used", points=tuple(f"{trouble.where}: {trouble.why}" for trouble in troubles))
+        )
+    sections += [_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
     if injected:
         sections.append(injected_section(injected))
-    named = sum(bool(one.effects) for one in answers)
+    named = sum(bool(answer.effects) for answer in answers)
     return render_page(
         Page(
             title="Diagnosis of real recordings",
@@ -61,26 +63,30 @@ def render_real_report(
 
 def overview_table(answers: Sequence[RealAnswer]) -> Table:
     header = ("recording", "verdict", "named", "as given", "re-tuned", "with what was found", "black box", "noise", "s")
-    return Table("Errors on held-out data, shares of the signal", header, tuple(_row(one) for one in answers))
+    return Table("Errors on held-out data, shares of the signal", header, tuple(_row(answer) for answer in answers))
 
 
-def _row(one: RealAnswer) -> tuple[str, ...]:
-    errors = one.held_out
+def _row(real_answer: RealAnswer) -> tuple[str, ...]:
+    errors = real_answer.held_out
     shown = (
         ("", "", "", "") if errors is None else tuple(map(error_text, (errors.before, errors.retuned, errors.noise)))
     )
     before, retuned, noise = shown[:3]
-    after = error_text(errors.after) if errors is not None and one.effects else "-"
-    named = ", ".join(one.effects) or _first_candidate(one) or "-"
-    box = "-" if one.black_box is None else error_text(one.black_box)
+    after = error_text(errors.after) if errors is not None and real_answer.effects else "-"
+    named = ", ".join(real_answer.effects) or _first_candidate(real_answer) or "-"
+    box = "-" if real_answer.black_box is None else error_text(real_answer.black_box)
     return (
-        _title(one), VERDICT_WORDS[one.verdict], named,
-        before, retuned, after, box, noise, f"{one.seconds:.0f}",
+        _title(real_answer), VERDICT_WORDS[real_answer.verdict], named,
+        before, retuned, after, box, noise, f"{real_answer.seconds:.0f}",
     )  # fmt: skip
 
 
-def _first_candidate(one: RealAnswer) -> str:
-    return f"not confirmed: {one.candidates[0].effect}" if one.candidates and one.verdict == "unexplained" else ""
+def _first_candidate(real_answer: RealAnswer) -> str:
+    return (
+        f"not confirmed: {real_answer.candidates[0].effect}"
+        if real_answer.candidates and real_answer.verdict == "unexplained"
+        else ""
+    )
 
 
 def _banner(troubles: Sequence[Trouble]) -> str:
@@ -89,28 +95,33 @@ def _banner(troubles: Sequence[Trouble]) -> str:
     return f"{len(troubles)} folders or files could not be used; they are named below."
 
 
-def _section(one: RealAnswer, picture: Picture | None) -> Section:
-    points = (*one.where, *one.named, *(number_sentence(number) for number in one.numbers), *_pair_points(one.pair))
-    further = tuple(_further_sentence(*test) for test in _further(one))
-    objections = tuple(f"An expert would object: {said}" for said in one.objections)
+def _section(real_answer: RealAnswer, picture: Picture | None) -> Section:
+    points = (
+        *real_answer.where,
+        *real_answer.named,
+        *(number_sentence(number) for number in real_answer.numbers),
+        *_pair_points(real_answer.pair),
+    )
+    further = tuple(_further_sentence(*test) for test in _further(real_answer))
+    objections = tuple(f"An expert would object: {said}" for said in real_answer.objections)
     paragraphs = (
-        *((one.title,) if one.title else ()),
-        one.answer,
-        *((f"The simple model: {one.model}",) if one.model else ()),
-        *((f"Errors are measured by {one.error}.",) if one.error else ()),
-        *((one.left,) if one.left else ()),
+        *((real_answer.title,) if real_answer.title else ()),
+        real_answer.answer,
+        *((f"The simple model: {real_answer.model}",) if real_answer.model else ()),
+        *((f"Errors are measured by {real_answer.error}.",) if real_answer.error else ()),
+        *((real_answer.left,) if real_answer.left else ()),
     )
     return Section(
-        _title(one),
+        _title(real_answer),
         paragraphs=paragraphs,
-        points=(*points, *one.not_confirmed, *further, *one.remarks, *objections),
-        pictures=(picture,) if picture is not None and error_rows(one) else (),
-        tables=_tables(one),
+        points=(*points, *real_answer.not_confirmed, *further, *real_answer.remarks, *objections),
+        pictures=(picture,) if picture is not None and error_rows(real_answer) else (),
+        tables=_tables(real_answer),
     )
 
 
-def _tables(one: RealAnswer) -> tuple[Table, ...]:
-    every = (*one.stretches, *(each for test in one.further for each in test.stretches))
+def _tables(real_answer: RealAnswer) -> tuple[Table, ...]:
+    every = (*real_answer.stretches, *(each for test in real_answer.further for each in test.stretches))
     if not every:
         return ()
     rows = tuple(
@@ -151,8 +162,8 @@ def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
     )
 
 
-def _further(one: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
-    return [(each.recording, each.error, each.retuned, each.after, each.problem) for each in one.further]
+def _further(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
+    return [(each.recording, each.error, each.retuned, each.after, each.problem) for each in real_answer.further]
 
 
 def _further_sentence(recording: str, error: str, retuned: float | None, after: float | None, problem: str) -> str:
@@ -164,6 +175,10 @@ def _further_sentence(recording: str, error: str, retuned: float | None, after: 
     )
 
 
-def _title(one: RealAnswer) -> str:
+def _title(real_answer: RealAnswer) -> str:
     """A folder's only recording is often called like it."""
-    return one.recording if one.recording == one.folder else f"{one.folder}: {one.recording}"
+    return (
+        real_answer.recording
+        if real_answer.recording == real_answer.folder
+        else f"{real_answer.folder}: {real_answer.recording}"
+    )

@@ -45,7 +45,7 @@ def render_reproduction_report(
 ) -> str:
     """HTML. pictures: by the number of the published figure."""
     sections = [*_models(reproduction), _overview(reproduction)]
-    for figure in sorted(reproduction.figures, key=lambda one: one.figure):
+    for figure in sorted(reproduction.figures, key=lambda each: each.figure):
         played = _played_tables(reproduction) if figure.figure == 5 else ()
         tables = (_findings_table(figure), *played)
         sections.append(_section(figure, pictures.get(figure.figure, ()), tables))
@@ -69,7 +69,7 @@ def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
     """One line per figure, for a terminal."""
     return tuple(
         f"Figure {figure.figure}: {_count(figure)}  {figure.title}"
-        for figure in sorted(reproduction.figures, key=lambda one: one.figure)
+        for figure in sorted(reproduction.figures, key=lambda figure: figure.figure)
     )
 
 
@@ -78,8 +78,8 @@ def _models(reproduction: Reproduction) -> list[Section]:
     if not reproduction.models:
         return []
     rows = tuple(
-        (one.name, _percent(one.held_out_error), _percent(one.held_out_noise), _percent(one.expected_error))
-        for one in reproduction.models
+        (model.name, _percent(model.held_out_error), _percent(model.held_out_noise), _percent(model.expected_error))
+        for model in reproduction.models
     )
     header = ("Model", "Held-out error", "Noise of that record", "Expected error")
     table = Table("Quality of the identified models", header, rows, notes=(_MODEL_NOTE,))
@@ -95,7 +95,7 @@ def _overview(reproduction: Reproduction) -> Section:
     agreeing = sum(finding.as_published is True for finding in compared)
     otherwise = tuple(
         f"Figure {figure.figure}, {finding.what}: published {finding.published}; here {finding.here}."
-        for figure in sorted(reproduction.figures, key=lambda one: one.figure)
+        for figure in sorted(reproduction.figures, key=lambda figure: figure.figure)
         for finding in figure.findings
         if finding.as_published is False
     )
@@ -125,7 +125,7 @@ def _findings_table(figure: FigureFindings) -> Table:
         (finding.what, finding.published or "–", finding.here, _SAYS[finding.as_published])
         for finding in figure.findings
     )
-    rules = tuple(f"{one.what}: as published means {one.rule}." for one in figure.findings if one.rule)
+    rules = tuple(f"{finding.what}: as published means {finding.rule}." for finding in figure.findings if finding.rule)
     return Table(
         f"Figure {figure.figure}: published and here", ("", "Published", "Here", "As published"), rows, notes=rules
     )

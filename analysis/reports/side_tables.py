@@ -51,8 +51,13 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
 def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
     """Of what was wanted, where stimuli were accelerations."""
     rows = tuple(
-        (f"{one.frequency_hz:g} Hz", str(one.trials), *map(_percent, one.along), _percent(one.off_axis))
-        for one in deliveries(analysis.trials)
+        (
+            f"{delivery.frequency_hz:g} Hz",
+            str(delivery.trials),
+            *map(_percent, delivery.along),
+            _percent(delivery.off_axis),
+        )
+        for delivery in deliveries(analysis.trials)
     )
     if not rows:
         return ()

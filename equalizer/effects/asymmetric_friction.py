@@ -34,7 +34,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     measured = {"level_positive": max(positive, 0.05 * mean), "level_negative": max(negative, 0.05 * mean)}
     more, less = 2 * mean * _GUESS / (1 + _GUESS), 2 * mean / (1 + _GUESS)
     guesses = ((more, less), (less, more))
-    return (measured, *({"level_positive": one, "level_negative": other} for one, other in guesses))
+    return (measured, *({"level_positive": each, "level_negative": other} for each, other in guesses))
 
 
 EFFECT = Effect(

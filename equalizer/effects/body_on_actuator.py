@@ -21,10 +21,10 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     seen = missing_mass(evidence, axis)
     natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []
-    for one in hung(seen, axis, natural, RATIOS)[:2]:
-        wave = 2 * np.pi * one.natural_hz
-        damping, stiffness = 2 * one.damping_ratio * one.mass * wave, one.mass * wave**2
-        starts.append({"mass": one.mass, "damping": damping, "stiffness": stiffness})
+    for each in hung(seen, axis, natural, RATIOS)[:2]:
+        wave = 2 * np.pi * each.natural_hz
+        damping, stiffness = 2 * each.damping_ratio * each.mass * wave, each.mass * wave**2
+        starts.append({"mass": each.mass, "damping": damping, "stiffness": stiffness})
     return tuple(starts)
 
 

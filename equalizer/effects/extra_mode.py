@@ -31,19 +31,19 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(STARTS):
         coarse = hung(seen, axis, natural, RATIOS)[:1]
-        for one in coarse:
-            near = hung(seen, axis, (one.natural_hz * FINER).tolist(), (one.damping_ratio * COARSER).tolist())
+        for each in coarse:
+            near = hung(seen, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist())
             starts.append(_values(near[0], axis, evidence.model.inputs))
             # The next is looked for in what this one leaves.
             seen = without(seen, near[0])
     return tuple(starts)
 
 
-def _values(one: Hung, axis: int, m: int) -> Values:
-    tilts = [float(np.clip(one.by_axis[(axis + place) % m], -1, 1)) if place < m else 0.0 for place in (1, 2)]
+def _values(each: Hung, axis: int, m: int) -> Values:
+    tilts = [float(np.clip(each.by_axis[(axis + place) % m], -1, 1)) if place < m else 0.0 for place in (1, 2)]
     # The pull on the own axis is that of the whole mass, less what its tilt takes away.
-    mass = one.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
-    values = {"frequency": one.natural_hz, "mass": mass, "damping_ratio": one.damping_ratio}
+    mass = each.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
+    values = {"frequency": each.natural_hz, "mass": mass, "damping_ratio": each.damping_ratio}
     return values | dict(zip(TILTS, tilts, strict=True))
 
 

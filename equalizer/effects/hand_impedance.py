@@ -31,7 +31,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     found = beside.fit(-of.acceleration, -of.velocity, -of.position).strengths.tolist()
     along, model = driven_axes(evidence.model)[:, axis], evidence.model
     known = [_GUESS * own(matrix, along) for matrix in (model.mass, model.damping, model.stiffness)]
-    values = [one if one > 0 else 0.1 * other for one, other in zip(found, known, strict=True)]
+    values = [each if each > 0 else 0.1 * other for each, other in zip(found, known, strict=True)]
     names = ("mass", "damping", "stiffness")
     return tuple(dict(zip(names, numbers, strict=True)) for numbers in (values, known))
 

@@ -79,7 +79,7 @@ def _starts_at(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, .
         if law.acts_on != "force" or not factors:
             return (law_values(law),)
         used, columns = evidence.used > 0, _columns(evidence)
-        shapes = [evaluate(_only(law, factors, one), columns, evidence.sample_rate_hz)[used] for one in factors]
+        shapes = [evaluate(_only(law, factors, factor), columns, evidence.sample_rate_hz)[used] for factor in factors]
         if not np.isfinite(shapes).all():
             return (law_values(law),)
         strengths = beside_linear(moving(evidence, axis)).fit(*shapes).strengths.tolist()
@@ -89,10 +89,10 @@ def _starts_at(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, .
     return starts
 
 
-def _only(law: Law, factors: Sequence[int], one: int) -> Law:
+def _only(law: Law, factors: Sequence[int], each: int) -> Law:
     """With this factor 1, the others 0."""
     return law.with_numbers(
-        [float(place == one) if place in factors else number for place, number in enumerate(law.numbers)]
+        [float(place == each) if place in factors else number for place, number in enumerate(law.numbers)]
     )
 
 

@@ -36,9 +36,9 @@ def model_effects(
 ) -> tuple[ModelEffect, ...]:
     """As `placed_effects` reads them back: one per site, or one without an axis where all share it."""
     return tuple(
-        _model_effect(one, axis)
-        for one in placed
-        for axis in _axes(one, output_channels if place_of_effect(one.effect) == "sensor" else input_channels)
+        _model_effect(each, axis)
+        for each in placed
+        for axis in _axes(each, output_channels if place_of_effect(each.effect) == "sensor" else input_channels)
     )
 
 

@@ -93,7 +93,7 @@ class _Reader:
             wanted = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
             raise LawError(f"{self._where(node)}: {name} takes {wanted}, not {len(arguments)}")
         parts = tuple(self.read(argument) for argument in arguments)
-        if name in MEMORY[:3] and any(isinstance(one, Variable) and one.name != "pi" for one in _leaves(parts[1])):
+        if name in MEMORY[:3] and any(isinstance(leaf, Variable) and leaf.name != "pi" for leaf in _leaves(parts[1])):
             raise LawError(f"{self._where(arguments[1])}: the second argument of {name} must be a constant")
         return Apply(name, parts)
 

@@ -65,20 +65,20 @@ def _on_grid(samples: Samples, rate_hz: float) -> FloatArray:
     return np.nan_to_num(centred, nan=0.0)
 
 
-def _normalised(one: FloatArray, two: FloatArray) -> FloatArray:
+def _normalised(values: FloatArray, two: FloatArray) -> FloatArray:
     """Cross-correlation over the overlap of each lag, by the energy of both there."""
-    raw = sg.correlate(one, two, mode="full", method="fft")
-    ones, twos = np.ones(len(one)), np.ones(len(two))
-    energy_one = sg.correlate(one**2, twos, mode="full", method="fft")
+    raw = sg.correlate(values, two, mode="full", method="fft")
+    ones, twos = np.ones(len(values)), np.ones(len(two))
+    energy_one = sg.correlate(values**2, twos, mode="full", method="fft")
     energy_two = sg.correlate(ones, two**2, mode="full", method="fft")
-    floor = 1e-9 * float(np.sum(one**2) * np.sum(two**2))
+    floor = 1e-9 * float(np.sum(values**2) * np.sum(two**2))
     both: FloatArray = raw / np.sqrt(np.maximum(energy_one * energy_two, max(floor, np.finfo(float).tiny)))
     return both
 
 
-def _enough_overlap(lags: IntArray, one: int, two: int) -> BoolArray:
-    overlap = np.minimum(one, lags + two) - np.maximum(0, lags)
-    enough: BoolArray = overlap >= 0.25 * min(one, two)
+def _enough_overlap(lags: IntArray, number: int, two: int) -> BoolArray:
+    overlap = np.minimum(number, lags + two) - np.maximum(0, lags)
+    enough: BoolArray = overlap >= 0.25 * min(number, two)
     return enough
 
 

@@ -35,9 +35,9 @@ def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]
         for problem in _problems_of_segment(segment, samples):
             yield f"segment {number} {problem}"
     ordered = sorted(enumerate(segments, start=1), key=lambda numbered: numbered[1].start)
-    for (first, one), (second, other) in pairwise(ordered):
-        if other.start < one.stop:
-            yield f"segments {first} and {second} overlap (one stops at {one.stop}, the other starts at {other.start})"
+    for (first, each), (second, other) in pairwise(ordered):
+        if other.start < each.stop:
+            yield f"segments {first} and {second} overlap (one stops at {each.stop}, the other starts at {other.start})"
 
 
 def _problems_of_segment(segment: Segment, samples: int) -> Iterator[str]:

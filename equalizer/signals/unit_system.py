@@ -42,7 +42,7 @@ class UnitSystem:
         named = [(self.force, force), (self.length, length), (self.time, seconds)]
         known = [(f"({name})" if "/" in name else name, power) for name, power in named if name != "1"]
         over = [
-            _power(name, power) for name, power in sorted(known, key=lambda one: one[0] == self.length) if power > 0
+            _power(name, power) for name, power in sorted(known, key=lambda each: each[0] == self.length) if power > 0
         ]
         under = [_power(name, -power) for name, power in known if power < 0]
         below = f"/({' '.join(under)})" if len(under) > 1 else f"/{under[0]}" if under else ""

@@ -32,9 +32,9 @@ def draw(
 
     labels = draw_labels(out, repeats, seed)
     typer.echo(f"{len(labels)} recordings, {labels[0].recording} to {labels[-1].recording}: {out}")
-    for one in CHANGES:
-        number = f" Write down the number, in {one.unit}, where you know it." if one.unit else ""
-        typer.echo(f"  {one.name}: {one.how}{number}")
+    for change in CHANGES:
+        number = f" Write down the number, in {change.unit}, where you know it." if change.unit else ""
+        typer.echo(f"  {change.name}: {change.how}{number}")
 
 
 @app.command("seal")

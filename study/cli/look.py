@@ -30,8 +30,8 @@ def look(
     if as_json:
         typer.echo(json.dumps(look_document(found), indent=2))
     else:
-        for one in found:
-            say(look_lines(one, everything))
+        for each in found:
+            say(look_lines(each, everything))
     if out is not None:
         typer.echo(f"Report: {write_look(found, out)}", err=True)
 
@@ -70,9 +70,9 @@ def _tables(found: "Overview") -> Iterable[str]:
     from study.tui.text_rows import aligned
 
     rows: list[tuple[str, ...]] = [("channel", "quantity", "unit", "lowest", "highest", "mean", "rms", "missing")]
-    for one in found.summaries:
-        sizes = [typeset(f"{value:.4g}") for value in (one.lowest, one.highest, one.mean, one.rms)]
-        rows.append((f"{one.role} {one.name}", one.quantity, one.unit, *sizes, str(one.missing)))
+    for summary in found.summaries:
+        sizes = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
+        rows.append((f"{summary.role} {summary.name}", summary.quantity, summary.unit, *sizes, str(summary.missing)))
     yield from aligned(tuple(rows), columns())
     segments = found.recording.segments
     if segments:

@@ -47,6 +47,6 @@ def real(
     with steps("Real recordings") as show:
         done = diagnose_folder(RealPlan(folder, out, seconds, inject, seed), show)
     if as_json:
-        typer.echo(json.dumps([real_answer_to_json(one) for one in done.results.answers], indent=2))
+        typer.echo(json.dumps([real_answer_to_json(answer) for answer in done.results.answers], indent=2))
     else:
         typer.echo("\n".join(real_lines(done)))

@@ -43,7 +43,7 @@ class WorkerThreads:
         """As `map`, in the same order. From within a worker it is done there: all others may be waiting for it."""
         if len(self._threads) < 2 or getattr(self._within, "worker", False):
             return list(map(function, *items))
-        jobs: list[_Job[Result]] = [_Job(_bound(function, one)) for one in zip(*items, strict=True)]
+        jobs: list[_Job[Result]] = [_Job(_bound(function, each)) for each in zip(*items, strict=True)]
         for job in jobs:
             self._jobs.put(job)
         try:

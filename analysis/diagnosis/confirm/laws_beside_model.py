@@ -29,7 +29,7 @@ from equalizer.signals.recording import Recording
 AT_LIMIT = 0.97
 """Of the bound of a re-tuned number, from which it presses against it."""
 SHOWN = 3
-"""Contenders of the last round that are told with their gain."""
+"""Fitted candidates of the last round that are told with their gain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -44,7 +44,7 @@ def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> S
             held = [column for term in sum_.terms if (column := column_of(view, term)) is not None]
             order = _order(extended(base, held), columns)
             longer += _refined(base, sum_.terms, kept, order, time_left)[:LAW_BEAM]
-        longer = sorted(longer, key=lambda one: one.crossed)
+        longer = sorted(longer, key=lambda each: each.crossed)
         if not longer or not _worth(best, longer[0]):
             break
         every += longer
@@ -108,4 +108,4 @@ def _refined(
         if len(shapes) == LAW_REFINED:
             break
     found = [fitted_sum(base, (*held, term)) for term in shapes.values() if time_left()]
-    return tuple(sorted((one for one in found if one is not None), key=lambda one: one.crossed))
+    return tuple(sorted((each for each in found if each is not None), key=lambda each: each.crossed))

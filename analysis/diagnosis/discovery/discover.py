@@ -84,26 +84,28 @@ def discover(
 def _next(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round | None:
     views = views_of(context.measure, context.tuning, base)
     searched = [_along(view, time_left) for view in _where(views)]
-    every = sorted((one for found in searched for one in found.sums), key=lambda one: _taken(views, one), reverse=True)
+    every = sorted(
+        (item for found in searched for item in found.sums), key=lambda item: _taken(views, item), reverse=True
+    )
     sums = _near(_different(every))[:LAW_FITTED]
     if not sums:
         return None
     known = sensitivity_at(context, base.deviations, base.hypothesis)
     fits: list[tuple[Fitted, Sum]] = []
-    for one in sums:
-        start = _started(context, base, one)
+    for each in sums:
+        start = _started(context, base, each)
         if start is not None:
-            fits.append((fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), one))
+            fits.append((fit(context.measure, context.tuning, start, known, FIRST_ROUNDS), each))
     fits.sort(key=lambda pair: pair[0].cost)
     if not fits or not np.isfinite(fits[0][0].cost):
         return None
     refined = [(context.candidate(refine(context, fits[0][0])), fits[0][1])]
-    rest = [(context.candidate(fitted), one) for fitted, one in fits[1:]]
+    rest = [(context.candidate(fitted), item) for fitted, item in fits[1:]]
     close = [pair for pair in rest if _price(pair[1]) < _price(fits[0][1]) and inseparable(refined[0][0], pair[0])]
-    refined += [(context.candidate(refine(context, candidate.fitted)), one) for candidate, one in close]
+    refined += [(context.candidate(refine(context, candidate.fitted)), item) for candidate, item in close]
     ranked = _plainest_first([*refined, *(pair for pair in rest if pair not in close)])
     placebo = max((found.placebo for found in searched), default=0.0)
-    return Round(tuple(one for one, _ in ranked), tuple(one for _, one in ranked), placebo)
+    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo)
 
 
 def _plainest_first(pairs: Sequence[tuple[FittedCandidate, Sum]]) -> list[tuple[FittedCandidate, Sum]]:
@@ -123,11 +125,11 @@ def _price(of: Sum) -> int:
     return told
 
 
-def _started(context: SearchContext, base: Fitted, one: Sum) -> Fitted | None:
+def _started(context: SearchContext, base: Fitted, each: Sum) -> Fitted | None:
     """With the model's own numbers as they were, or as the sum wants them."""
-    law = hypothesis_of(law_of_sum(one), one.axis, context.measure.records[0].recording)
+    law = hypothesis_of(law_of_sum(each), each.axis, context.measure.records[0].recording)
     found: list[Fitted] = []
-    for deviations in (base.deviations, np.clip(base.deviations + one.moved, -RETUNING_BOUND, RETUNING_BOUND)):
+    for deviations in (base.deviations, np.clip(base.deviations + each.moved, -RETUNING_BOUND, RETUNING_BOUND)):
         try:
             found.append(evaluated(context.measure, context.tuning, deviations, together(base.hypothesis, law)))
         except (MechanicalModelError, np.linalg.LinAlgError):
@@ -158,21 +160,21 @@ def _along(view: View, time_left: TimeBudget) -> Searched:
     return best_sums(products_of(view), (*terms, *lines), time_left)
 
 
-def _taken(views: Sequence[View], one: Sum) -> float:
-    view = views[one.axis]
-    return (one.without - one.crossed) * view.noise * len(view.residual)
+def _taken(views: Sequence[View], each: Sum) -> float:
+    view = views[each.axis]
+    return (each.without - each.crossed) * view.noise * len(view.residual)
 
 
 def _near(sums: Sequence[Sum]) -> list[Sum]:
     """Those that leave not much more than the best one."""
     return [
-        one for one in sums if one.crossed - 1 <= LAW_FITTED_WITHIN * max(sums[0].crossed - 1, LAW_ALMOST_NOISE - 1)
+        each for each in sums if each.crossed - 1 <= LAW_FITTED_WITHIN * max(sums[0].crossed - 1, LAW_ALMOST_NOISE - 1)
     ]
 
 
 def _different(sums: Sequence[Sum]) -> list[Sum]:
     """The best of each structure."""
     found: dict[tuple[int, frozenset[str]], Sum] = {}
-    for one in sums:
-        found.setdefault((one.axis, frozenset(term.shape for term in one.terms)), one)
+    for each in sums:
+        found.setdefault((each.axis, frozenset(term.shape for term in each.terms)), each)
     return list(found.values())

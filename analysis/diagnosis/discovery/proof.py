@@ -48,9 +48,9 @@ def _failed(of: Discovered, records: Sequence[Observed]) -> Iterator[str]:
 def _alike(found: Round) -> Iterator[tuple[str, ...]]:
     """Variables of laws that leave hardly more, and are not those of the first."""
     best = found.fitted_candidates[0]
-    for candidate, one in zip(found.fitted_candidates[1:], found.sums[1:], strict=True):
-        if inseparable(best, candidate) and _variables(one) != _variables(found.sums[0]):
-            yield _variables(one)
+    for candidate, each in zip(found.fitted_candidates[1:], found.sums[1:], strict=True):
+        if inseparable(best, candidate) and _variables(each) != _variables(found.sums[0]):
+            yield _variables(each)
 
 
 def _variables(of: Sum) -> tuple[str, ...]:

@@ -98,13 +98,13 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
     model, placed = tuning.tuned(fitted.deviations), fitted.hypothesis.placed()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_seen(measure, record, told) for record, told in zip(measure.records, evidence, strict=True))
-    residual = np.concatenate([one.matched(_known(left)) for one, left in zip(seen, fitted.residuals, strict=True)])
+    residual = np.concatenate([each.matched(_known(left)) for each, left in zip(seen, fitted.residuals, strict=True)])
     columns = np.array([_moved(measure, tuning, fitted, seen, number) for number in range(len(fitted.deviations))])
     edges = _edges(seen)
     pull = np.append(-fitted.deviations, 0.0)
     views = []
     for axis in range(model.inputs):
-        constant = np.concatenate([one.column(np.ones(len(one.left)), axis) for one in seen])
+        constant = np.concatenate([each.column(np.ones(len(each.left)), axis) for each in seen])
         tuned = np.vstack([columns[:, :, axis].reshape(-1, len(residual)), constant])
         noise = _noise(measure, seen, axis)
         views.append(View(axis, seen, residual[:, axis], tuned, pull, edges, noise))
@@ -121,7 +121,7 @@ def _moved(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):
-        return np.concatenate([one.forced(_resisting(one, tuning, pairs, number)) for one in seen])
+        return np.concatenate([each.forced(_resisting(each, tuning, pairs, number)) for each in seen])
     base = measure.residuals(tuning.tuned(fitted.deviations), ())
     for move in (MOVED, -MOVED):
         there = fitted.deviations.copy()
@@ -131,10 +131,10 @@ def _moved(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
         change = [
-            one.matched(_known((before - after) / move)) for one, before, after in zip(seen, base, moved, strict=True)
+            each.matched(_known((before - after) / move)) for each, before, after in zip(seen, base, moved, strict=True)
         ]
         return np.concatenate(change)
-    return np.zeros((sum(part.stop - part.start for one in seen for part in one.kept), m))
+    return np.zeros((sum(part.stop - part.start for each in seen for part in each.kept), m))
 
 
 def _resisting(one: Seen, tuning: Tuning, pairs: Sequence[tuple[int, int]], number: int) -> FloatArray:
@@ -209,14 +209,14 @@ def _blocks(record: Observed) -> list[tuple[int, int]]:
 
 
 def _edges(seen: Sequence[Seen]) -> tuple[int, ...]:
-    sizes = [part.stop - part.start for one in seen for part in one.kept]
+    sizes = [part.stop - part.start for each in seen for part in each.kept]
     return tuple(np.cumsum([0, *sizes]).tolist())
 
 
 def _noise(measure: ErrorMeasure, seen: Sequence[Seen], axis: int) -> float:
     left = (measure.noise / measure.unit) ** 2
     shares = [
-        np.sum(np.abs(one.through[:, :, axis]) ** 2 * left[None, :], axis=1) / one.strength[:, axis] ** 2
-        for one in seen
+        np.sum(np.abs(each.through[:, :, axis]) ** 2 * left[None, :], axis=1) / each.strength[:, axis] ** 2
+        for each in seen
     ]
     return float(np.mean(np.concatenate(shares)))

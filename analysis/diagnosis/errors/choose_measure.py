@@ -106,7 +106,7 @@ def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, ba
     `has_motion`."""
     records = observed_parts(recordings, model.outputs)
     known = placed_effects(model, recordings[0].command.channels, recordings[0].response.channels)
-    floors = [noise_floor(one.recording) for one in records]
+    floors = [noise_floor(record.recording) for record in records]
     return _by_force(records, model, floors, (BY_FORCE, *_of_known(known)), band_hz)
 
 

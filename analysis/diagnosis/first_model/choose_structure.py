@@ -67,7 +67,7 @@ def first_structure(
         return Choice(fit, (Tried(fit.kind, fit.error, ""),), "It was asked for.", remains(given, fit))
     fits, tried = _all(given, recordings, on_progress)
     if not fits:
-        raise StructureRefused("; ".join(f"{one.kind}: {one.why_not}" for one in tried))
+        raise StructureRefused("; ".join(f"{item.kind}: {item.why_not}" for item in tried))
     if given is None:
         ordered = sorted(fits, key=lambda each: each.model.coordinates)
         best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
@@ -125,7 +125,7 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
     """The same, or two-mode where a free simulation of held-out samples speaks for it."""
     if plain.fit.kind != "mass-spring":
         return plain
-    if any(in_closed_loop(one) or one.meta.get("imposed") for one in recordings):
+    if any(in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
         why = "it is fitted to spectra, which a controller or an imposed motion bends"
         return _tried(plain, Tried("two-mode", None, why))
     try:
@@ -134,7 +134,7 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
         return _tried(plain, Tried("two-mode", None, str(refusal)))
     fit, test = roles(recordings)
     lines = [found for part in test or fit if (found := segment_lines(*part)) is not None]
-    ends = [float(bound(one.frequency_hz[one.excited])) for one in lines for bound in (np.min, np.max)]
+    ends = [float(bound(line.frequency_hz[line.excited])) for line in lines for bound in (np.min, np.max)]
     errors = [
         float(simulation_errors(model, lines, (min(ends), max(ends)))[0][-1])
         for model in (plain.fit.model, other.model)

@@ -93,7 +93,7 @@ def balanced(recordings: Sequence[Recording]) -> Balanced:
         raise NoMotionError("only accelerations were measured")
     if len(motions[0].channels) != count or len(first.response.channels) != count:
         raise NoMotionError("not every command has one measured motion of its own")
-    if not any(one.kept(one.fit).any() for one in motions):
+    if not any(motion.kept(motion.fit).any() for motion in motions):
         raise NoMotionError("too little of the motion is to be fitted to")
     rotational = any(unit.startswith(("rad", "N m")) for unit in (*first.response.units, *first.command.units))
     turns = any(scales_of(motions, axis, rotational).turns for axis in range(count))
@@ -137,7 +137,7 @@ def modal(recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[fl
         raise StructureRefused(str(problem)) from problem
     if kind == "two-mode" and fit.model.coordinates == axes:
         raise StructureRefused("a mode on an axis does not lower the error on lines that were left out")
-    errors = tuple(one.fit if one.held_out is None else one.held_out for one in fit.errors)
+    errors = tuple(each.fit if each.held_out is None else each.held_out for each in fit.errors)
     remarks = (*(f"{text[:1].upper()}{text[1:].rstrip('.')}." for text in fit.remarks),)
     channels = recordings[0].response.channels
     first = recordings[0]
@@ -157,7 +157,7 @@ def modal(recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[fl
 def plainest(fits: Sequence[StructureFit]) -> StructureFit:
     """Of balanced fits, the one with fewest numbers from which no richer one takes a noticed part off, fold by fold; a
     part below which no model goes is not noticed."""
-    ordered = sorted(fits, key=lambda one: (len(one.numbers), one.error))
+    ordered = sorted(fits, key=lambda fit: (len(fit.numbers), fit.error))
     best = ordered[0]
     for other in ordered[1:]:
         assert best.joint is not None and other.joint is not None
@@ -212,8 +212,8 @@ def _model(given: Balanced, fit: JointFit, kind: Kind) -> MechanicalModel:
 
 def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """(d,): no simulation goes without one."""
-    force = np.vstack([one.force for one in motions]).std(axis=0)
-    moved = np.vstack([np.gradient(one.velocity, 1 / one.rate_hz, axis=0) for one in motions]).std(axis=0)
+    force = np.vstack([motion.force for motion in motions]).std(axis=0)
+    moved = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
 
 
@@ -231,10 +231,10 @@ def _modal_numbers(model: MechanicalModel, recording: Recording) -> tuple[Number
     along, found = driven_axes(model), []
     own = model.tolerance or Tolerance()
     spread = (own.mass_kg, own.damping_n_s_per_m, own.stiffness_n_per_m)
-    for part, matrix, one in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
+    for part, matrix, each in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
         values = np.einsum("ni,nk,ki->i", along, matrix, along)
         for name, value in zip(recording.command.channels, values.tolist(), strict=True):
-            found.append(Number(f"{part} {name}", matrix_unit(part, model.system), value, one and 1.96 * one))
+            found.append(Number(f"{part} {name}", matrix_unit(part, model.system), value, each and 1.96 * each))
     inner = model.coordinates - model.inputs
     if inner > 0:
         squares = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real

@@ -142,9 +142,9 @@ def _with_axes(recording: Recording, kept: list[int], paired: bool) -> Recording
     )
 
 
-def _verb(names: Sequence[str], one: str) -> str:
+def _verb(names: Sequence[str], name: str) -> str:
     plural = {"changes": "change", "was": "were", "drives": "drive"}
-    return one if len(names) == 1 else plural[one]
+    return name if len(names) == 1 else plural[name]
 
 
 def _summed(recordings: Recordings) -> tuple[Recordings, str]:

@@ -110,7 +110,7 @@ class PredictedForce:
     def _entered(self, model: MechanicalModel, effects: Sequence[PlacedEffect], number: int) -> "_Entered":
         record = self.records[number]
         rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
-        changed = [one for one in effects if isinstance(one.effect.acts, OnCommand)]
+        changed = [effect for effect in effects if isinstance(effect.effect.acts, OnCommand)]
 
         def found() -> _Entered:
             force = entered_force(model, record.command, rate_hz, changed, hold)
@@ -122,7 +122,7 @@ class PredictedForce:
     def _same(self, what: str, number: int, of: tuple[object, ...], find: Callable[[], _Found]) -> _Found:
         """As it was found last where it was of the very same."""
         known = self.remembered.get((what, number))
-        if known is None or any(one is not other for one, other in zip(known[0], of, strict=True)):
+        if known is None or any(each is not other for each, other in zip(known[0], of, strict=True)):
             known = of, find()
             self.remembered[what, number] = known
         return cast(_Found, known[1])

@@ -101,7 +101,11 @@ def with_balances(
     named = {
         (name, effect.axis)
         for effect in effects
-        for name in (effect.effect, *effect.class_, *(one.effect for one in effect.rivals if one.why_not == REFINED))
+        for name in (
+            effect.effect,
+            *effect.class_,
+            *(rival.effect for rival in effect.rivals if rival.why_not == REFINED),
+        )
     }
     found = [
         (_rank(law), _candidate(law, axis_letter(channels[axis], channels)))

@@ -30,23 +30,23 @@ def black_box_beats(box: BlackBox) -> bool:
 
 def ceiling_sentences(reached: Sequence[Reached]) -> tuple[str, ...]:
     """One per axis whose force balance was weighed."""
-    return tuple(_ceiling(one, len(reached) == 1) for one in reached)
+    return tuple(_ceiling(each, len(reached) == 1) for each in reached)
 
 
-def _ceiling(one: Reached, single: bool) -> str:
-    along = "" if single else f" along {one.axis}"
-    if not one.tested:
+def _ceiling(reached: Reached, single: bool) -> str:
+    along = "" if single else f" along {reached.axis}"
+    if not reached.tested:
         return (
             f"In the force balance{along}, no law could be tested: the device moves once, and next to nothing moves in "
             "what was held back. Record several moves, or hold one of them back."
         )
-    model = "the re-tuned model leaves" if one.given else "mass, damping and stiffness alone leave"
-    alone = f"In the force balance{along}, on held-out data, {model} {error_text(one.linear)} of the force"
-    named = f"what is named leaves {error_text(one.named)}" if one.any_named else "no law is named"
-    if one.any_named and one.named <= one.ceiling * (1 + SAME):
+    model = "the re-tuned model leaves" if reached.given else "mass, damping and stiffness alone leave"
+    alone = f"In the force balance{along}, on held-out data, {model} {error_text(reached.linear)} of the force"
+    named = f"what is named leaves {error_text(reached.named)}" if reached.any_named else "no law is named"
+    if reached.any_named and reached.named <= reached.ceiling * (1 + SAME):
         return f"{alone}, {named}, and all laws together leave no less."
-    share = f"; that is {share_text(one.share)} of the way" if one.named < one.linear else ""
+    share = f"; that is {share_text(reached.share)} of the way" if reached.named < reached.linear else ""
     return (
-        f"{alone}, and all laws together {error_text(one.ceiling)}, which no sum of a few laws should be expected to "
-        f"beat: {named}{share}."
+        f"{alone}, and all laws together {error_text(reached.ceiling)}, which no sum of a few laws should be expected "
+        f"to beat: {named}{share}."
     )

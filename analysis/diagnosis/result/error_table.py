@@ -28,13 +28,13 @@ def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, M
 def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
     """Root mean square over the channels of the logarithm that a prediction is off by."""
 
-    def one(candidate: FittedCandidate) -> float | None:
+    def error(candidate: FittedCandidate) -> float | None:
         off = np.array([getattr(candidate.score, part) for part in parts]) * statistic.chance
         whole = float(np.sqrt(np.mean(off**2)))
         return whole if np.isfinite(whole) else None
 
     chance = float(np.sqrt(np.mean(statistic.chance**2)))
-    return Errors(one(found.before), one(found.retuned), one(found.after), chance)
+    return Errors(error(found.before), error(found.retuned), error(found.after), chance)
 
 
 def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -> Errors:
@@ -44,10 +44,10 @@ def _errors(measure: ErrorMeasure, found: Explanation, parts: tuple[str, ...]) -
     signals = tuple(record.measured - np.nanmean(record.measured, axis=0) for record in measure.records)
     size = np.maximum(rms_over(measure.records, signals, masks), np.finfo(float).tiny)
 
-    def one(candidate: FittedCandidate) -> float | None:
+    def error(candidate: FittedCandidate) -> float | None:
         rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit / size
         whole = float(np.sqrt(np.mean(rms**2)))
         return whole if np.isfinite(whole) else None
 
     noise = float(np.sqrt(np.mean((measure.noise / size) ** 2)))
-    return Errors(one(found.before), one(found.retuned), one(found.after), noise)
+    return Errors(error(found.before), error(found.retuned), error(found.after), noise)

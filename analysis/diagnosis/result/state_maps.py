@@ -112,26 +112,26 @@ def state_maps(
             said = (letter, units[axis], model, completed)
             found.append(_maps(course, said, length))
     first = diagnosis.effects[0].axis if diagnosis.effects else None
-    return tuple(sorted(found, key=lambda one: (one.axis != first, -one.share)))
+    return tuple(sorted(found, key=lambda each: (each.axis != first, -each.share)))
 
 
 def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_Course | None, str]:
     regression = balance.searched.regression
-    names = {one.effect for one in diagnosis.effects if one.axis in (letter, None, "")}
-    named = [one.place for one in balance.laws if one.law.effect in names]
-    laws = named or [one.place for one in balance.laws]
+    names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
+    named = [law.place for law in balance.laws if law.law.effect in names]
+    laws = named or [law.place for law in balance.laws]
     linear, whole = (regression.remainder(regression.chosen(each)) for each in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions
     course = _Course(
         motions[0].rate_hz / motions[0].step,
         _seconds(motions),
-        np.concatenate([one.position[:: one.step, axis] for one in motions]),
-        np.concatenate([one.velocity[:: one.step, axis] for one in motions]),
+        np.concatenate([motion.position[:: motion.step, axis] for motion in motions]),
+        np.concatenate([motion.velocity[:: motion.step, axis] for motion in motions]),
         np.concatenate(regression.force),
         np.concatenate(_less(regression, linear)),
         np.concatenate(_less(regression, whole)) if laws else None,
-        np.concatenate([one.kept(one.fit | one.test) for one in motions]),
+        np.concatenate([motion.kept(motion.fit | motion.test) for motion in motions]),
         _slices([len(force) for force in regression.force]),
     )
     return (course if course.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
@@ -142,7 +142,7 @@ def _less(regression: Regression, remainder: Sequence[FloatArray]) -> list[Float
 
 
 def _seconds(motions: Sequence[Motion]) -> FloatArray:
-    count = sum(len(one.force[:: one.step]) for one in motions)
+    count = sum(len(motion.force[:: motion.step]) for motion in motions)
     return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
 
 
@@ -153,19 +153,19 @@ def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
 
 def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _Course | None:
     """None where no motion along it is known."""
-    if not evidence or any(axis >= one.axis_force.shape[1] for one in evidence):
+    if not evidence or any(axis >= each.axis_force.shape[1] for each in evidence):
         return None
     position, velocity, force, missing = (
-        np.concatenate([getattr(one, name)[:, axis] for one in evidence])
+        np.concatenate([getattr(each, name)[:, axis] for each in evidence])
         for name in ("axis_position", "axis_velocity", "command", "axis_force")
     )
     known = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(force) & np.isfinite(missing)
-    used = known & np.concatenate([one.used > 0 for one in evidence])
+    used = known & np.concatenate([each.used > 0 for each in evidence])
     rate_hz = evidence[0].sample_rate_hz
     if not used.any() or not np.ptp(velocity[used]) > 0:
         return None
     seconds = np.arange(len(force)) / rate_hz
-    parts = _slices([len(one.command) for one in evidence])
+    parts = _slices([len(each.command) for each in evidence])
     return _Course(rate_hz, seconds, position, velocity, force, force + missing, None, used, parts)
 
 
@@ -212,7 +212,7 @@ def _loops(course: _Course, length: str) -> tuple[Loop, ...]:
 
 def _stretch(course: _Course) -> slice:
     """About a period of the motion where it travels furthest."""
-    part = max(course.parts, key=lambda one: float(np.ptp(course.position[one])) if one.stop > one.start else 0.0)
+    part = max(course.parts, key=lambda each: float(np.ptp(course.position[each])) if each.stop > each.start else 0.0)
     position = course.position[part]
     power = np.abs(np.fft.rfft(position - position.mean()))
     line = int(np.argmax(power[1:])) + 1 if len(power) > 1 else 1

@@ -89,21 +89,21 @@ def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecord
     around = _around(measure, context.tuning.model)
     cut = [_cut(record, around) for record in measure.records]
     before = sum(len(record.command) for record in measure.records)
-    if not len(cut[0].kept) or sum(len(one.kept) for one in cut) > BRIEF_SHARE * before:
+    if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > BRIEF_SHARE * before:
         return None
     short = _in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _spliced(measure, cut)
     if short is None:
         return None
     return ShortRecordings(
-        replace(context, measure=short), tuple(one.kept for one in cut if len(one.kept)), _stands_in(measure, cut)
+        replace(context, measure=short), tuple(each.kept for each in cut if len(each.kept)), _stands_in(measure, cut)
     )
 
 
 def _stands_in(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
     found, before = [], 0
-    for record, one in zip(measure.records, cut, strict=True):
-        found.append(before + (np.cumsum(one.fit) - 1)[one.instead[record.fit]])
-        before += int(one.fit.sum())
+    for record, each in zip(measure.records, cut, strict=True):
+        found.append(before + (np.cumsum(each.fit) - 1)[each.instead[record.fit]])
+        before += int(each.fit.sum())
     return np.concatenate(found)
 
 
@@ -136,17 +136,17 @@ def _cut(record: Observed, around_s: tuple[float, float]) -> _Cut:
 def _spliced(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
     """End to end, as one course."""
     pairs = zip(measure.records, cut, strict=True)
-    return measure.with_records(tuple(_piece(record, one.kept, one.fit) for record, one in pairs if len(one.kept)))
+    return measure.with_records(tuple(_piece(record, each.kept, each.fit) for record, each in pairs if len(each.kept)))
 
 
 def _in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
     """Each stretch a record of its own; None where one drives an axis that the whole record drives, but it does not:
     errors count over what is commanded."""
     records, motions = [], []
-    for record, motion, one in zip(measure.records, measure.motions, cut, strict=True):
+    for record, motion, each in zip(measure.records, measure.motions, cut, strict=True):
         driven = np.abs(record.command).max(axis=0) > 0
-        for kept in np.split(one.kept, np.flatnonzero(np.diff(one.kept) > 1) + 1):
-            piece = _piece(record, kept, one.fit)
+        for kept in np.split(each.kept, np.flatnonzero(np.diff(each.kept) > 1) + 1):
+            piece = _piece(record, kept, each.fit)
             if not len(kept) or (driven & (np.abs(piece.command).max(axis=0) == 0)).any():
                 return None
             records.append(piece)

@@ -38,11 +38,11 @@ class Calibration:
 
 def calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) -> Calibration:
     """Of every effect that was named: it is right where the device has it, at whatever axis."""
-    named = [(one, effect) for one in outcomes if one.kind in kinds for effect in one.named]
+    named = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
     if not named:
         return Calibration(None, None, None, ())
     stated = np.array([effect.probability for _, effect in named])
-    right = np.array([float(effect.effect in one.names) for one, effect in named])
+    right = np.array([float(effect.effect in each.names) for each, effect in named])
     drawn = np.random.default_rng(21).integers(len(named), size=(RESAMPLED, len(named)))
     low, high = np.quantile([_error(stated[k], right[k]) for k in drawn], (0.025, 0.975))
     return Calibration(_error(stated, right), float(low), float(high), tuple(_bins(stated, right)))

@@ -26,25 +26,27 @@ def controlled(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> Co
 
 
 def _no_name(answers: Sequence[Diagnosis | None]) -> bool:
-    return not any(effect.probability >= CONFIDENT for one in answers if one is not None for effect in one.effects)
+    return not any(
+        effect.probability >= CONFIDENT for answer in answers if answer is not None for effect in answer.effects
+    )
 
 
 def _not_explained(answers: Sequence[Diagnosis | None]) -> bool:
-    return all(one is None or one.verdict != "explained" for one in answers)
+    return all(answer is None or answer.verdict != "explained" for answer in answers)
 
 
 def _nothing(answers: Sequence[Diagnosis | None]) -> bool:
-    return all(one is not None and one.verdict in ("no_mismatch", "parameters") for one in answers)
+    return all(answer is not None and answer.verdict in ("no_mismatch", "parameters") for answer in answers)
 
 
 def _same(answers: Sequence[Diagnosis | None]) -> bool:
     """The same verdict, effects and axes, and at least one effect."""
-    said = {_place(one, with_axes=True) for one in answers if one is not None}
+    said = {_place(answer, with_axes=True) for answer in answers if answer is not None}
     return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
-    said = {_place(one, with_axes=False) for one in answers if one is not None}
+    said = {_place(answer, with_axes=False) for answer in answers if answer is not None}
     return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
@@ -58,21 +60,21 @@ def _axis_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
 
 def _opposite(answers: Sequence[Diagnosis | None]) -> bool:
     """One effect, its main number with the other sign."""
-    mains = [next(iter(one.effects[0].parameters.values())).value for one in answers if one and one.effects]
+    mains = [next(iter(answer.effects[0].parameters.values())).value for answer in answers if answer and answer.effects]
     if len(mains) != len(answers) or not _same(answers):
         return False
     return abs(mains[0] + mains[1]) <= SAME_NUMBER * abs(mains[0])
 
 
-def _place(one: Diagnosis, with_axes: bool) -> tuple[object, ...]:
-    return one.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in one.effects)
+def _place(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
+    return diagnosis.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in diagnosis.effects)
 
 
-def _words(one: Diagnosis | None) -> str:
-    if one is None:
+def _words(diagnosis: Diagnosis | None) -> str:
+    if diagnosis is None:
         return "no answer"
-    named = ", ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in one.effects)
-    return one.verdict.replace("_", " ") + (f": {named}" if named else "")
+    named = ", ".join(f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in diagnosis.effects)
+    return diagnosis.verdict.replace("_", " ") + (f": {named}" if named else "")
 
 
 CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {

@@ -33,11 +33,11 @@ class Part:
 
 
 def detection_strips(singles: Sequence[Outcome]) -> tuple[Strip, ...]:
-    names = sorted({one.names[0] for one in singles})
+    names = sorted({single.names[0] for single in singles})
     found = []
     for name in names:
-        own = [one for one in singles if one.names[0] == name]
-        draws = tuple(sorted((one.strengths[0], what_became_of(one)) for one in own))
+        own = [single for single in singles if single.names[0] == name]
+        draws = tuple(sorted((each.strengths[0], what_became_of(each)) for each in own))
         found.append(Strip(name, draws, seen_from(own)))
     return tuple(found)
 
@@ -45,7 +45,7 @@ def detection_strips(singles: Sequence[Outcome]) -> tuple[Strip, ...]:
 def seen_from(draws: Sequence[Outcome]) -> float | None:
     """The strength (0 to 1) from which on an oracle sees an effect: what it adds grows about as a power of its number,
     whose logarithm the strength is."""
-    known = [(one.strengths[0], np.log(one.adds)) for one in draws if one.adds > 0]
+    known = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
     strengths = [strength for strength, _ in known]
     if len(known) < LEAST_DRAWS or np.ptp(strengths) == 0:
         return None
@@ -55,21 +55,21 @@ def seen_from(draws: Sequence[Outcome]) -> float | None:
     return float(np.clip((np.log(np.sqrt(DETECTABLE**2 - 1)) - start) / slope, 0.0, 1.0))
 
 
-def what_became_of(one: Outcome) -> str:
-    if one.right:
+def what_became_of(outcome: Outcome) -> str:
+    if outcome.right:
         return "right"
-    if one.names[0] in one.returned:
+    if outcome.names[0] in outcome.returned:
         return "in the set"
-    return "missed" if one.detectable else "invisible"
+    return "missed" if outcome.detectable else "invisible"
 
 
 def shares_by_size(singles: Sequence[Outcome]) -> tuple[Part, ...]:
     """In parts of equal count, the smallest effects first."""
-    order = sorted(singles, key=lambda one: one.adds)
+    order = sorted(singles, key=lambda single: single.adds)
     found = []
     for part in np.array_split(np.arange(len(order)), min(PARTS, len(order))):
         drawn = [order[k] for k in part]
-        hits = sum(one.right for one in drawn)
-        size = float(np.median([max(one.adds, 1e-3) for one in drawn]))
+        hits = sum(each.right for each in drawn)
+        size = float(np.median([max(each.adds, 1e-3) for each in drawn]))
         found.append(Part(size, hits / len(drawn), *wilson(hits, len(drawn)), len(drawn)))
     return tuple(found)

@@ -34,10 +34,10 @@ class FollowUp:
 
 
 def follow_up_figures(found: Sequence[FollowUp]) -> tuple[Figure, ...]:
-    asked = [one for one in found if one.proposed]
+    asked = [each for each in found if each.proposed]
     return (
-        share("several names, the right one left by the proposed recording", found, lambda one: one.resolved),
-        share("several names, the right one left by a random recording", found, lambda one: one.resolved_by_chance),
-        share("the same where one is proposed, by the proposed", asked, lambda one: one.resolved),
-        share("the same where one is proposed, by a random one", asked, lambda one: one.resolved_by_chance),
+        share("several names, the right one left by the proposed recording", found, lambda each: each.resolved),
+        share("several names, the right one left by a random recording", found, lambda each: each.resolved_by_chance),
+        share("the same where one is proposed, by the proposed", asked, lambda each: each.resolved),
+        share("the same where one is proposed, by a random one", asked, lambda each: each.resolved_by_chance),
     )

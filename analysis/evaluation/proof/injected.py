@@ -65,8 +65,8 @@ def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedO
     """From a sealed label and what the diagnosis wrote."""
     diagnosis = answer.get("diagnosis", {})
     effects = diagnosis.get("effects", [])
-    named = [one["effect"] for one in effects]
-    rivals = [rival["effect"] for one in effects for rival in one["rivals"] if rival["inseparable"]]
+    named = [effect["effect"] for effect in effects]
+    rivals = [rival["effect"] for effect in effects for rival in effect["rivals"] if rival["inseparable"]]
     return InjectedOutcome(
         recording=str(label["recording"]),
         effects=tuple(label["effects"]),
@@ -76,7 +76,7 @@ def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedO
         change=label["change"],
         verdict=str(diagnosis.get("verdict", "failed")),
         named=tuple(named),
-        named_places=tuple(one["place"] for one in effects),
+        named_places=tuple(effect["place"] for effect in effects),
         returned=tuple(dict.fromkeys([*named, *rivals])),
         seconds=float(answer.get("seconds", 0.0)),
         failed=str(answer.get("failed", "")),
@@ -85,21 +85,21 @@ def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedO
 
 def injected_figures(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
     """With Wilson's 95 % intervals."""
-    faults = [one for one in outcomes if one.detectable]
-    weak = [one for one in outcomes if one.effects and not one.detectable]
-    nothing = [one for one in outcomes if not one.effects]
+    faults = [outcome for outcome in outcomes if outcome.detectable]
+    weak = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
+    nothing = [outcome for outcome in outcomes if not outcome.effects]
     return (
-        share("nothing injected, nothing named", nothing, lambda one: one.right),
-        share("detectable faults named, or in the class", faults, lambda one: one.right),
+        share("nothing injected, nothing named", nothing, lambda each: each.right),
+        share("detectable faults named, or in the class", faults, lambda each: each.right),
         share("detectable faults, another name at the right place", faults, _is("other name, right place")),
         share("detectable faults, a wrong story", faults, _is("wrong")),
-        share("too weak to ask for, named all the same", weak, lambda one: one.right),
+        share("too weak to ask for, named all the same", weak, lambda each: each.right),
         share("too weak to ask for, a wrong story", weak, _is("wrong")),
     )
 
 
 def _is(judged: Judged) -> Callable[[InjectedOutcome], bool]:
-    return lambda one: one.judged == judged
+    return lambda each: each.judged == judged
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,19 +118,20 @@ class Tally:
 def tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
     """By key, in order of its names; outcomes with an empty key are left out."""
     return tuple(
-        _tally(name, [one for one in outcomes if key(one) == name]) for name in sorted({*map(key, outcomes)} - {""})
+        _tally(name, [outcome for outcome in outcomes if key(outcome) == name])
+        for name in sorted({*map(key, outcomes)} - {""})
     )
 
 
 def _tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
-    faults = [one for one in outcomes if one.effects]
-    asked = [one for one in faults if one.detectable]
-    nothing = [one for one in outcomes if not one.effects]
-    counts = tuple(sum(one.judged == judged for one in asked) for judged in JUDGED[:-1])
+    faults = [outcome for outcome in outcomes if outcome.effects]
+    asked = [fault for fault in faults if fault.detectable]
+    nothing = [outcome for outcome in outcomes if not outcome.effects]
+    counts = tuple(sum(each.judged == judged for each in asked) for judged in JUDGED[:-1])
     return Tally(
         name,
         len(faults),
         counts,
-        share(name, asked, lambda one: one.right),
-        share(name, nothing, lambda one: one.right),
+        share(name, asked, lambda each: each.right),
+        share(name, nothing, lambda each: each.right),
     )

@@ -55,7 +55,7 @@ CHANGES: tuple[Change, ...] = (
         "",
     ),
 )
-CHANGES_BY_NAME = {one.name: one for one in CHANGES}
+CHANGES_BY_NAME = {each.name: each for each in CHANGES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +85,8 @@ class Scored:
 def scored(label: Label, diagnosis: Diagnosis) -> Scored:
     """Right: one of the change's effects is in the returned set; of nothing, no effect is named."""
     wanted = CHANGES_BY_NAME[label.change].effects
-    named = tuple(one.effect for one in diagnosis.effects)
-    right = any(one in diagnosis.returned_set for one in wanted) if wanted else not named
+    named = tuple(effect.effect for effect in diagnosis.effects)
+    right = any(each in diagnosis.returned_set for each in wanted) if wanted else not named
     return Scored(
         label.recording,
         label.change,
@@ -115,19 +115,19 @@ def _inside(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool |
 
 def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
     """With Wilson's 95 % intervals."""
-    changed = [one for one in rows if one.change != NOTHING]
-    kinds = [one.name for one in CHANGES if any(row.change == one.name for row in changed)]
+    changed = [row for row in rows if row.change != NOTHING]
+    kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed)]
     return (
-        share("changes named", changed, lambda one: one.right),
-        share("nothing changed, nothing named", _of(rows, NOTHING), lambda one: one.right),
-        share("written numbers inside their interval", _asked(rows), lambda one: bool(one.inside)),
-        *(share(kind, _of(rows, kind), lambda one: one.right) for kind in kinds),
+        share("changes named", changed, lambda each: each.right),
+        share("nothing changed, nothing named", _of(rows, NOTHING), lambda each: each.right),
+        share("written numbers inside their interval", _asked(rows), lambda each: bool(each.inside)),
+        *(share(kind, _of(rows, kind), lambda each: each.right) for kind in kinds),
     )
 
 
 def _of(rows: Sequence[Scored], change: str) -> list[Scored]:
-    return [one for one in rows if one.change == change]
+    return [row for row in rows if row.change == change]
 
 
 def _asked(rows: Sequence[Scored]) -> list[Scored]:
-    return [one for one in rows if one.inside is not None]
+    return [row for row in rows if row.inside is not None]

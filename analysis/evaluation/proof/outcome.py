@@ -42,7 +42,7 @@ class Outcome:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(one.effect for one in self.concealed)
+        return tuple(each.effect for each in self.concealed)
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:
@@ -50,7 +50,7 @@ class Outcome:
 
     @property
     def named_names(self) -> tuple[str, ...]:
-        return tuple(one.effect for one in self.named)
+        return tuple(each.effect for each in self.named)
 
     @property
     def verdict(self) -> str:

@@ -32,31 +32,31 @@ def as_said(name: str, said: float, values: Mapping[str, float]) -> float:
 NOT_EXPLAINED = ("unexplained", "partly_explained")
 
 
-def is_miss(one: Outcome) -> bool:
+def is_miss(outcome: Outcome) -> bool:
     """A wrong name is one even where nothing could be seen; where the true effect is not to be named, any name is."""
-    if one.said is None or has_wrong_name(one):
+    if outcome.said is None or has_wrong_name(outcome):
         return True
-    if one.kind in ("nothing", "without") or not one.detectable:
+    if outcome.kind in ("nothing", "without") or not outcome.detectable:
         return False
-    if one.kind == "outside":
-        return one.verdict not in NOT_EXPLAINED
-    return not one.right or on_another_axis(one)
+    if outcome.kind == "outside":
+        return outcome.verdict not in NOT_EXPLAINED
+    return not outcome.right or on_another_axis(outcome)
 
 
-def has_wrong_name(one: Outcome) -> bool:
+def has_wrong_name(outcome: Outcome) -> bool:
     """An effect is named that is not there, or that was not to be considered."""
-    there = () if one.kind in ("nothing", "without") else one.names
-    return not set(one.named_names) <= set(there)
+    there = () if outcome.kind in ("nothing", "without") else outcome.names
+    return not set(outcome.named_names) <= set(there)
 
 
-def on_another_axis(one: Outcome) -> bool:
+def on_another_axis(outcome: Outcome) -> bool:
     """A right name, but at an axis where nothing is concealed; of devices with several."""
-    if len(one.axes) < 2:
+    if len(outcome.axes) < 2:
         return False
-    true = {each.effect: each.axis for each in one.concealed}
+    true = {each.effect: each.axis for each in outcome.concealed}
     return any(
         true.get(said.effect) is not None and said.axis is not None and said.axis != true[said.effect]
-        for said in one.named
+        for said in outcome.named
     )
 
 
@@ -76,72 +76,74 @@ def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Sco
         *_singles(outcomes), *_nothing(outcomes), *_open_set(outcomes), *_pairs(outcomes),
         *follow_up_figures(followed), *_numbers(outcomes),
     )  # fmt: skip
-    return Score(figures, calibration(outcomes), tuple(one for one in outcomes if is_miss(one)))
+    return Score(figures, calibration(outcomes), tuple(outcome for outcome in outcomes if is_miss(outcome)))
 
 
 def _of(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
-    return [one for one in outcomes if one.kind == kind and (not bank or one.bank == bank)]
+    return [outcome for outcome in outcomes if outcome.kind == kind and (not bank or outcome.bank == bank)]
 
 
 def _detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
-    return [one for one in outcomes if one.detectable]
+    return [outcome for outcome in outcomes if outcome.detectable]
 
 
 def _singles(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         seen = _detectable(_of(outcomes, "single", bank))
-        yield share(f"named right{words[bank]}", seen, lambda one: one.right)
+        yield share(f"named right{words[bank]}", seen, lambda each: each.right)
     whole = _detectable(_of(outcomes, "single"))
-    yield share("named first, all banks", whole, lambda one: one.named_names[:1] == one.names)
-    yield share("in the returned set", whole, lambda one: one.names[0] in one.returned)
-    named = [one for one in whole if one.named]
-    yield statistic("names in the returned set, mean", [float(len(one.returned)) for one in named], np.mean)
-    alone = [one for one in whole if len(one.returned) == 1]
-    yield share("right where one name is returned", alone, lambda one: one.right)
-    yield share("place", named, lambda one: one.named[0].place == one.concealed[0].place)
-    sided = [one for one in named if one.right and one.concealed[0].axis is not None and len(one.axes) > 1]
-    yield share("axis, of two or three", sided, lambda one: not on_another_axis(one))
+    yield share("named first, all banks", whole, lambda each: each.named_names[:1] == each.names)
+    yield share("in the returned set", whole, lambda each: each.names[0] in each.returned)
+    named = [each for each in whole if each.named]
+    yield statistic("names in the returned set, mean", [float(len(each.returned)) for each in named], np.mean)
+    alone = [each for each in whole if len(each.returned) == 1]
+    yield share("right where one name is returned", alone, lambda each: each.right)
+    yield share("place", named, lambda each: each.named[0].place == each.concealed[0].place)
+    sided = [each for each in named if each.right and each.concealed[0].axis is not None and len(each.axes) > 1]
+    yield share("axis, of two or three", sided, lambda each: not on_another_axis(each))
     singles = _of(outcomes, "single")
-    seen = [one for one in singles if one.seen_by_oracle]
-    yield share("single effects that count as detectable", singles, lambda one: one.detectable)
-    yield share("named right, of those that an oracle sees", seen, lambda one: one.right)
-    hidden = [one for one in outcomes if one.kind != "nothing" and not one.detectable]
+    seen = [single for single in singles if single.seen_by_oracle]
+    yield share("single effects that count as detectable", singles, lambda each: each.detectable)
+    yield share("named right, of those that an oracle sees", seen, lambda each: each.right)
+    hidden = [outcome for outcome in outcomes if outcome.kind != "nothing" and not outcome.detectable]
     yield share("not detectable, yet a wrong name", hidden, has_wrong_name)
 
 
 def _nothing(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    yield share("nothing missing, yet named", _of(outcomes, "nothing"), lambda one: bool(one.named))
+    yield share("nothing missing, yet named", _of(outcomes, "nothing"), lambda each: bool(each.named))
     clean = _of(outcomes, "nothing")
-    yield share("nothing missing, and said so", clean, lambda one: one.verdict in ("no_mismatch", "parameters"))
+    yield share("nothing missing, and said so", clean, lambda each: each.verdict in ("no_mismatch", "parameters"))
 
 
 def _open_set(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     outside = _detectable(_of(outcomes, "outside"))
-    yield share("outside the catalogue, not explained", outside, lambda one: one.verdict in NOT_EXPLAINED)
-    yield share("outside the catalogue, no name at all", outside, lambda one: not one.named)
+    yield share("outside the catalogue, not explained", outside, lambda each: each.verdict in NOT_EXPLAINED)
+    yield share("outside the catalogue, no name at all", outside, lambda each: not each.named)
     without = _detectable(_of(outcomes, "without"))
-    yield share("without the true effect, any name", without, lambda one: bool(one.named))
-    yield share("without the true effect, yet explained", without, lambda one: one.verdict == "explained")
+    yield share("without the true effect, any name", without, lambda each: bool(each.named))
+    yield share("without the true effect, yet explained", without, lambda each: each.verdict == "explained")
 
 
 def _pairs(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     pairs = _detectable(_of(outcomes, "pair"))
-    yield share("pairs, both and no other", pairs, lambda one: one.right)
-    yield share("pairs, at least one", pairs, lambda one: bool(set(one.names) & set(one.named_names)))
+    yield share("pairs, both and no other", pairs, lambda each: each.right)
+    yield share("pairs, at least one", pairs, lambda each: bool(set(each.names) & set(each.named_names)))
 
 
 def _numbers(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    right = [one for one in _detectable(_of(outcomes, "single")) if one.right]
-    errors = [main_error(one.concealed[0], one.named[0]) for one in right]
+    right = [each for each in _detectable(_of(outcomes, "single")) if each.right]
+    errors = [main_error(each.concealed[0], each.named[0]) for each in right]
     yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
-    covered = [list(within(one.concealed[0], one.named[0]).values()) for one in right]
+    covered = [list(within(each.concealed[0], each.named[0]).values()) for each in right]
     yield pooled("true value in the 95 % interval", covered)
-    mains = [one for one in right if EFFECTS_BY_NAME[one.names[0]].main.name in within(one.concealed[0], one.named[0])]
-    yield share("the same, main parameters", mains, lambda one: main_within(one.concealed[0], one.named[0]))
-    after = [one.left("after") for one in right]
+    mains = [
+        each for each in right if EFFECTS_BY_NAME[each.names[0]].main.name in within(each.concealed[0], each.named[0])
+    ]
+    yield share("the same, main parameters", mains, lambda each: main_within(each.concealed[0], each.named[0]))
+    after = [each.left("after") for each in right]
     yield statistic("held-out error over noise, worst channel, median", after, np.median)
-    yield statistic("seconds per diagnosis, median", [one.seconds for one in outcomes], np.median)
+    yield statistic("seconds per diagnosis, median", [outcome.seconds for outcome in outcomes], np.median)
 
 
 def main_error(true: Concealed, said: NamedEffect) -> float | None:

@@ -27,7 +27,7 @@ class Figure:
 
 
 def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Figure:
-    hits, of = sum(right(one) for one in among), len(among)
+    hits, of = sum(right(each) for each in among), len(among)
     if not of:
         return Figure(name, None, None, None, 0, 0)
     low, high = wilson(hits, of)

@@ -13,14 +13,14 @@ def figure_text(figure: Figure) -> str:
     return f"{100 * figure.value:.1f} % [{low:.0f}, {high:.0f}], {figure.hits} of {figure.of}"
 
 
-def concealed_text(one: Outcome) -> str:
-    return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in one.concealed) or "nothing"
+def concealed_text(outcome: Outcome) -> str:
+    return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in outcome.concealed) or "nothing"
 
 
-def said_text(one: Outcome) -> str:
-    said = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in one.named)
-    return f"{one.verdict.replace('_', ' ')}{f': {said}' if said else ''}"
+def said_text(outcome: Outcome) -> str:
+    said = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
+    return f"{outcome.verdict.replace('_', ' ')}{f': {said}' if said else ''}"
 
 
-def strength_text(one: Outcome) -> str:
-    return ", ".join(f"{value:.2f}" for value in one.strengths)
+def strength_text(outcome: Outcome) -> str:
+    return ", ".join(f"{value:.2f}" for value in outcome.strengths)

@@ -85,8 +85,8 @@ def _near(value: float, published: float) -> bool:
 
 
 def _low_resonance(resonances: Sequence[Resonance]) -> Finding:
-    low = [one for one in resonances if _near(one.frequency_hz, 11.0)]
-    found = max(low, key=lambda one: one.prominence_db, default=None)
+    low = [resonance for resonance in resonances if _near(resonance.frequency_hz, 11.0)]
+    found = max(low, key=lambda each: each.prominence_db, default=None)
     couples = found is not None and COUPLING in found.seen_in
     here = "none was found"
     if found is not None:
@@ -108,12 +108,12 @@ def _large_resonances(response: FrequencyResponse, resonances: Sequence[Resonanc
     middle = (response.frequency_hz >= 15) & (response.frequency_hz <= 60) & response.reliable
     level = float(np.median(gain[middle])) if middle.any() else np.inf
 
-    def height(one: Resonance) -> float:
-        near = np.abs(response.frequency_hz - one.frequency_hz) <= 0.02 * one.frequency_hz
+    def height(resonance: Resonance) -> float:
+        near = np.abs(response.frequency_hz - resonance.frequency_hz) <= 0.02 * resonance.frequency_hz
         return float(np.median(gain[near])) if near.any() else 0.0
 
-    large = [one for one in resonances if height(one) > LARGE * level]
-    first = min((one.frequency_hz for one in large), default=None)
+    large = [resonance for resonance in resonances if height(resonance) > LARGE * level]
+    first = min((each.frequency_hz for each in large), default=None)
     return Finding(
         what="Large resonances",
         published="from about 80 Hz on",

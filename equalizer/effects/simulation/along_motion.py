@@ -33,7 +33,7 @@ def force_along(
     """(n, m): what the effects' forces at the driven axes add along the motion. forces: (n, m) each, the commands, and
     the force over each step that the motion takes beside the linear model; what sticks answers to it."""
     commands, pushing = forces
-    bodies = bodies_of(model, [one for one in effects if isinstance(one.effect.acts, AxisForce)])
+    bodies = bodies_of(model, [effect for effect in effects if isinstance(effect.effect.acts, AxisForce)])
     if not bodies.acts:
         return np.zeros_like(pushing)
     axes = tuple(range(model.inputs))
@@ -43,7 +43,7 @@ def force_along(
         [_own(steps.motion[: 2 * len(axes)] @ steps.by_axis_force), _own(steps.motion_by_axis_force[2 * len(axes) :])]
     )
     force = np.array(pushing, dtype=np.float64, order="C")
-    position, velocity, acceleration = (np.ascontiguousarray(one) for one in motion)
+    position, velocity, acceleration = (np.ascontiguousarray(each) for each in motion)
     follow(
         acting.laws, acting.places, acting.of, acting.memory, (position, velocity, acceleration),
         np.ascontiguousarray(commands, dtype=np.float64) if acting.sees else np.empty((0, 0)),

@@ -50,7 +50,7 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     where: list[int] = []
     numbers: list[FloatArray] = []
     # Joints come first: friction that is found after them knows what they do.
-    for placed in sorted(effects, key=lambda one: isinstance(one.effect.acts, AxisForce)):
+    for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.acts, AxisForce)):
         act = placed.effect.acts
         for site in placed.sites if isinstance(act, (AxisForce, JointForce)) else ():
             assert isinstance(act, (AxisForce, JointForce))

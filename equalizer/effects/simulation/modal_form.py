@@ -63,8 +63,8 @@ def _planes(advance: FloatArray) -> Iterator[FloatArray]:
         (vectors[:, i].real, vectors[:, j].real, values[i], values[j])
         for i, j in zip(real[::2], real[1::2], strict=False)
     ]
-    for one, other, first, second in pairs:
-        plane, sizes, _ = np.linalg.svd(np.column_stack([one, other]), full_matrices=False)
+    for each, other, first, second in pairs:
+        plane, sizes, _ = np.linalg.svd(np.column_stack([each, other]), full_matrices=False)
         if sizes[1] < NEARLY_ONE * sizes[0]:
             square = advance @ advance - (first + second).real * advance + (first * second).real * np.eye(len(advance))
             plane = np.linalg.svd(square)[2][-2:].T

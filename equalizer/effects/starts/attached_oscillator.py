@@ -101,7 +101,7 @@ def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_rati
     beside = _span(linear)
     alone = aim - beside @ (beside.T @ aim)
     power = max(float(alone[:, axis] @ alone[:, axis]), np.finfo(float).tiny)
-    natural = np.array([one for one in natural_hz if one < seen.frequency_hz[-1]])
+    natural = np.array([item for item in natural_hz if item < seen.frequency_hz[-1]])
     found = []
     for ratio in damping_ratios:
         shape = hanging(seen.frequency_hz[:, None], natural, ratio) * root[:, None]
@@ -111,14 +111,14 @@ def hung(seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_rati
         size = np.einsum("lt,lt->t", own, own)
         apart = size > SPANNED**2 * np.einsum("lt,lt->t", shapes, shapes)
         pulls = own[:, apart].T @ alone
-        for one, pull, square in zip(natural[apart].tolist(), pulls, size[apart].tolist(), strict=True):
+        for each, pull, square in zip(natural[apart].tolist(), pulls, size[apart].tolist(), strict=True):
             if pull[axis] > 0:
                 explained = float(pull[axis]) ** 2 / square / power
-                found.append(Hung(one, ratio, float(pull[axis]) / square, explained, pull / pull[axis]))
-    return sorted((one for one in found if one.explained > CHANCE), key=lambda one: -one.explained)
+                found.append(Hung(each, ratio, float(pull[axis]) / square, explained, pull / pull[axis]))
+    return sorted((item for item in found if item.explained > CHANCE), key=lambda item: -item.explained)
 
 
-def without(seen: MissingMass, one: Hung) -> MissingMass:
+def without(seen: MissingMass, each: Hung) -> MissingMass:
     """What an oscillator leaves of the missing force."""
-    pull = seen.power * one.mass * hanging(seen.frequency_hz, one.natural_hz, one.damping_ratio)
-    return MissingMass(seen.frequency_hz, seen.power, seen.cross - pull[:, None] * one.by_axis)
+    pull = seen.power * each.mass * hanging(seen.frequency_hz, each.natural_hz, each.damping_ratio)
+    return MissingMass(seen.frequency_hz, seen.power, seen.cross - pull[:, None] * each.by_axis)

@@ -134,22 +134,24 @@ def _experiment(recording: Recording, starts: Sequence[int], length: int, window
     )
 
 
-def _with_first(recording: Recording, one: Experiment, counted: Sequence[int], first: int, over: int) -> Experiment:
+def _with_first(
+    recording: Recording, experiment: Experiment, counted: Sequence[int], first: int, over: int
+) -> Experiment:
     """The first period as one more look. Until its transient is over it borrows the mean of the others: linear as the
     plant is, command and response then are those of the steady state throughout."""
 
     def spectra(samples: FloatArray) -> ComplexArray:
-        look = samples[first : first + one.length].copy()
+        look = samples[first : first + experiment.length].copy()
         look[:over] = np.mean([samples[start : start + over] for start in counted], axis=0)
-        spectrum = np.fft.rfft(look - look.mean(axis=0), axis=0)[1 : (one.length + 1) // 2] / one.length
+        spectrum = np.fft.rfft(look - look.mean(axis=0), axis=0)[1 : (experiment.length + 1) // 2] / experiment.length
         return np.asarray(spectrum[None], dtype=np.complex128)
 
     return Experiment(
-        one.length,
-        np.concatenate([one.command, spectra(recording.command.samples)]),
-        np.concatenate([one.response, spectra(recording.response.samples)]),
-        np.concatenate([one.instrument, spectra(instrument_of(recording))]),
-        borrowed=over / one.length,
+        experiment.length,
+        np.concatenate([experiment.command, spectra(recording.command.samples)]),
+        np.concatenate([experiment.response, spectra(recording.response.samples)]),
+        np.concatenate([experiment.instrument, spectra(instrument_of(recording))]),
+        borrowed=over / experiment.length,
     )
 
 

@@ -85,11 +85,12 @@ def solve_shared_lines(
 def _columns(experiments: Sequence[Experiment]) -> _Columns:
     def stacked(name: str) -> ComplexArray:
         weighted = [
-            getattr(one, name).mean(axis=0) * np.sqrt(one.length * one.independent_looks) for one in experiments
+            getattr(experiment, name).mean(axis=0) * np.sqrt(experiment.length * experiment.independent_looks)
+            for experiment in experiments
         ]
         return np.stack(weighted, axis=2)
 
-    power = sum(one.length * np.mean(np.abs(one.response) ** 2, axis=0) for one in experiments)
+    power = sum(experiment.length * np.mean(np.abs(experiment.response) ** 2, axis=0) for experiment in experiments)
     return _Columns(stacked("command"), stacked("response"), stacked("instrument"), np.asarray(power))
 
 
@@ -108,9 +109,11 @@ def _density_of_looks(experiments: Sequence[Experiment], kept: BoolArray, respon
     """(lines, outputs, experiments), from what differs between looks once the command is accounted for. Experiments
     with one look take the mean of the others; None where all have one."""
     found: list[FloatArray | None] = []
-    for one in experiments:
-        residuals = one.response[:, kept] - np.einsum("lpm,klm->klp", response, one.command[:, kept])
-        found.append(one.length * spread_over_looks(residuals) / one.spread_seen if one.looks > 1 else None)
+    for experiment in experiments:
+        residuals = experiment.response[:, kept] - np.einsum("lpm,klm->klp", response, experiment.command[:, kept])
+        found.append(
+            experiment.length * spread_over_looks(residuals) / experiment.spread_seen if experiment.looks > 1 else None
+        )
     known = [density for density in found if density is not None]
     if not known:
         return None

@@ -61,7 +61,7 @@ def _looks(recordings: Sequence[Recording], settings: EstimateSettings) -> Looks
     if not looks.experiments:
         looks = windowed_looks(recordings, settings.window_s)
     remarks = list(looks.remarks)
-    if looks.experiments and all(one.looks == 1 for one in looks.experiments) and looks.periodic:
+    if looks.experiments and all(experiment.looks == 1 for experiment in looks.experiments) and looks.periodic:
         remarks.append(
             "No experiment has two counted periods: errors were judged by the scatter from line to line, and by the "
             "noise at rest where that is larger."
@@ -78,7 +78,7 @@ def _by_shared_lines(
     experiments: Sequence[Experiment], rate_hz: float
 ) -> Iterator[tuple[FloatArray, list[Experiment]]]:
     """Lines that the same experiments have, with those experiments cut down to them."""
-    lengths = sorted({one.length for one in experiments})
+    lengths = sorted({experiment.length for experiment in experiments})
     # Lines as whole numbers: k / length is the same line in every period that holds it.
     common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
     numbers = {length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common // length) for length in lengths}
@@ -87,7 +87,11 @@ def _by_shared_lines(
     for pattern in np.unique(holders, axis=0):
         shared = every[(holders == pattern).all(axis=1)]
         chosen = {length for length, holds in zip(lengths, pattern, strict=True) if holds}
-        cut = [_cut(one, shared // (common // one.length) - 1) for one in experiments if one.length in chosen]
+        cut = [
+            _cut(experiment, shared // (common // experiment.length) - 1)
+            for experiment in experiments
+            if experiment.length in chosen
+        ]
         yield shared * (rate_hz / common), cut
 
 
@@ -135,14 +139,14 @@ def _check_alike(recordings: Sequence[Recording]) -> None:
         raise TransferEstimateError("there is no recording to estimate from")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
-        for what, one, two in (
+        for what, each, two in (
             ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
             ("command channels", _channels(first.command), _channels(other.command)),
             ("response channels", _channels(first.response), _channels(other.response)),
         ):
-            if one != two:
+            if each != two:
                 raise TransferEstimateError(
-                    f"recording {number} has the {what} {two}, but the first has {one}; estimate them apart"
+                    f"recording {number} has the {what} {two}, but the first has {each}; estimate them apart"
                 )
 
 

@@ -25,12 +25,12 @@ def simulation_errors(
     known; the last entry is over all channels, each in units of its response."""
     p = model.outputs
     error, power, noise = np.zeros(p), np.zeros(p), np.zeros(p)
-    for one in segments:
-        inside = (one.frequency_hz >= band_hz[0]) & (one.frequency_hz <= band_hz[1])
-        misfit = simulation_misfit(model, one)[inside]
+    for segment in segments:
+        inside = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
+        misfit = simulation_misfit(model, segment)[inside]
         error += (np.abs(misfit) ** 2).sum(axis=0)
-        power += (np.abs(one.response[inside]) ** 2).sum(axis=0)
-        noise += one.noise[inside].sum(axis=0)
+        power += (np.abs(segment.response[inside]) ** 2).sum(axis=0)
+        noise += segment.noise[inside].sum(axis=0)
     shares, floor = error / np.maximum(power, 1e-300), noise / np.maximum(power, 1e-300)
     return (
         np.sqrt(np.append(shares, shares.mean())),
@@ -38,20 +38,20 @@ def simulation_errors(
     )
 
 
-def simulation_misfit(model: MechanicalModel, one: SegmentLines) -> ComplexArray:
+def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
     """(lines, p)"""
-    response = sampled_response(model, one.frequency_hz, one.rate_hz, one.hold)
-    misfit = one.response - np.einsum("lpm,lm->lp", response, one.command)
-    if not one.transient:
+    response = sampled_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
+    misfit = segment_lines.response - np.einsum("lpm,lm->lp", response, segment_lines.command)
+    if not segment_lines.transient:
         return np.asarray(misfit)
-    free = free_response(model, one.frequency_hz, one.rate_hz)
+    free = free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
     if model.quantity == "acceleration":
         straight = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, straight], axis=2)
     every = max(1, len(free) // _STATE_LINES)
     # A state shows at low frequencies most; strided lines from the first on keep those that matter.
     some = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), every)]))
-    size = np.linalg.norm(one.response, axis=0)[:, None] + 1e-300
+    size = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
     columns = (free[some] / size).reshape(-1, free.shape[2])
     wanted = (misfit[some] / size[:, 0]).ravel()
     real = np.concatenate([columns.real, columns.imag])

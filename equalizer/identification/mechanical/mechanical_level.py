@@ -50,7 +50,7 @@ def as_one_piece(
         settings, band_hz=(low, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
     )
     ratio = _amplitude(strong) / _amplitude(weaker)
-    mine, other = (_driven(fit_mechanical_model([one], rigid).model) for one in (strong, weaker))
+    mine, other = (_driven(fit_mechanical_model([each], rigid).model) for each in (strong, weaker))
     mass, damping, _ = mine
     of_friction = np.clip((other[1] - damping) / max(ratio - 1, 1e-3), 0.0, MOST_OFF * damping)
     own = fit.model.tolerance or Tolerance()

@@ -104,14 +104,14 @@ def of_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] | Non
     that does not repeat, no more than a model needs."""
     low, high = band_hz or (0.0, np.inf)
     found = []
-    for one in segments:
-        alike = [other.excited for other in segments if repeat_alike(one, other)]
-        excited = one.excited if one.transient else np.any(alike, axis=0)
-        chosen = np.flatnonzero(excited & (one.frequency_hz >= low) & (one.frequency_hz <= high))
-        if one.transient and len(chosen) > MOST_LINES:
+    for segment in segments:
+        alike = [other.excited for other in segments if repeat_alike(segment, other)]
+        excited = segment.excited if segment.transient else np.any(alike, axis=0)
+        chosen = np.flatnonzero(excited & (segment.frequency_hz >= low) & (segment.frequency_hz <= high))
+        if segment.transient and len(chosen) > MOST_LINES:
             chosen = chosen[:: -(-len(chosen) // MOST_LINES)]
         if len(chosen):
-            found.append(_taken(one, chosen))
+            found.append(_taken(segment, chosen))
     return tuple(found)
 
 

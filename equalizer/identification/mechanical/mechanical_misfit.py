@@ -26,7 +26,9 @@ def with_scatter(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, ...]:
 
     Scatter is what no linear model can explain, because segments with the same lines contradict each other there:
     friction and the like, seen between realisations, directions and levels."""
-    return tuple(_raised(one, [other for other in segments if repeat_alike(one, other)]) for one in segments)
+    return tuple(
+        _raised(segment, [other for other in segments if repeat_alike(segment, other)]) for segment in segments
+    )
 
 
 def _raised(one: SegmentLines, alike: Sequence[SegmentLines]) -> SegmentLines:
@@ -40,8 +42,8 @@ def _raised(one: SegmentLines, alike: Sequence[SegmentLines]) -> SegmentLines:
     return replace(one, noise=np.fmax(one.noise, scatter))
 
 
-def _size(one: SegmentLines) -> float:
-    return max(float(np.sqrt(np.mean(np.abs(one.command) ** 2))), 1e-300)
+def _size(segment_lines: SegmentLines) -> float:
+    return max(float(np.sqrt(np.mean(np.abs(segment_lines.command) ** 2))), 1e-300)
 
 
 def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArray:

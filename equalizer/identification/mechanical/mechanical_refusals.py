@@ -23,14 +23,14 @@ def refuse_unfit(recordings: Sequence[Recording]) -> None:
         raise MechanicalFitRefused("there is no recording to fit a model to")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
-        for what, one, two in (
+        for what, each, two in (
             ("sample rate", first.sample_rate_hz, other.sample_rate_hz),
             ("hold", first.hold.value, other.hold.value),
             ("command", _words(first.command), _words(other.command)),
             ("response", _words(first.response), _words(other.response)),
         ):
-            if one != two:
-                raise MechanicalFitRefused(f"recording {number} has the {what} {two}, the first {one}; fit them apart")
+            if each != two:
+                raise MechanicalFitRefused(f"recording {number} has the {what} {two}, the first {each}; fit them apart")
     quantities = set(first.response.quantities)
     if len(quantities) > 1 or not quantities <= set(DERIVATIVE_OF_QUANTITY):
         raise MechanicalFitRefused(

@@ -117,8 +117,8 @@ def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
 
 def best(found: Sequence[Candidate]) -> Candidate:
     """The cheapest of the sane ones; of none sane, the least extreme."""
-    sane = [one for one in found if one.sane]
-    return min(sane, key=lambda one: one.cost) if sane else min(found, key=lambda one: one.outside_gain)
+    sane = [each for each in found if each.sane]
+    return min(sane, key=lambda each: each.cost) if sane else min(found, key=lambda each: each.outside_gain)
 
 
 def _largest(response: ComplexArray) -> float:

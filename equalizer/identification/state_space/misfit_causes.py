@@ -84,7 +84,12 @@ def held_out_remarks(
 
 
 def _amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
-    found = [segment.amplitude for one in recordings for segment in one.segments if (segment.role == "test") is test]
+    found = [
+        segment.amplitude
+        for recording in recordings
+        for segment in recording.segments
+        if (segment.role == "test") is test
+    ]
     return max(found, default=0.0)
 
 

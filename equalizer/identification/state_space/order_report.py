@@ -55,7 +55,9 @@ def order_report(
     tell = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     highest = replace(settings, order=max(orders))
-    fit, test = (lines_or_refusal([one.of_lines(_every_second(one, k)) for one in responses], highest) for k in (0, 1))
+    fit, test = (
+        lines_or_refusal([each.of_lines(_every_second(each, k)) for each in responses], highest) for k in (0, 1)
+    )
     per_line = []
     rows = []
     for number, order in enumerate(sorted(orders)):

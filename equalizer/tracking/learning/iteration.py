@@ -170,7 +170,7 @@ def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
 def noise_of_repeats(measured: FloatArray, repetition: Repetition) -> float:
     """rms in the band of what differs between plays of the same forces, for one play. measured: (plays, N, p)."""
     off = measured - measured.mean(axis=0)
-    squares = sum(float(np.sum(repetition.part(one) ** 2)) for one in off)
+    squares = sum(float(np.sum(repetition.part(each) ** 2)) for each in off)
     return float(np.sqrt(squares / ((len(measured) - 1) * measured[0].size)))
 
 

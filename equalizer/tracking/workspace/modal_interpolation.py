@@ -59,9 +59,9 @@ def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
     tracks = _tracks(workspace, modes)
     lines = [band_lines(model, band_hz) for model in workspace.models]
     remainders = []
-    for index, one in enumerate(lines):
-        resonant = sum((track[index].response(one.z) for track in tracks), np.zeros_like(one.response))
-        remainders.append(one.response - resonant)
+    for index, line in enumerate(lines):
+        resonant = sum((track[index].response(line.z) for track in tracks), np.zeros_like(line.response))
+        remainders.append(line.response - resonant)
     return ModalInterpolation(workspace, tracks, lines[0], np.array(remainders))
 
 

@@ -64,10 +64,10 @@ def _costs(ones: Sequence[BandMode], others: Sequence[BandMode]) -> FloatArray:
     rows, columns = len(ones), len(others)
     costs = np.full((rows + columns, rows + columns), ALONE)
     costs[rows:, columns:] = 0.0
-    for i, one in enumerate(ones):
+    for i, each in enumerate(ones):
         for j, other in enumerate(others):
-            moved = abs(np.log(one.natural_hz / other.natural_hz)) / FREQUENCY_SCALE
-            costs[i, j] = moved + 1 - mode_likeness(one.residue, other.residue)
+            moved = abs(np.log(each.natural_hz / other.natural_hz)) / FREQUENCY_SCALE
+            costs[i, j] = moved + 1 - mode_likeness(each.residue, other.residue)
     return costs
 
 

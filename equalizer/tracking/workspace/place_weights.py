@@ -89,7 +89,7 @@ def _linear(points: FloatArray, place: FloatArray) -> FloatArray:
     if dimensions == 1:
         order = np.argsort(points[:, 0])
         along = points[order, 0]
-        shares = np.array([np.interp(place[0], along, one) for one in np.eye(count)[:, order]])
+        shares = np.array([np.interp(place[0], along, each) for each in np.eye(count)[:, order]])
         shares[shares < ROUNDING] = 0.0
         return np.asarray(shares / shares.sum())
     mesh = Delaunay(points)

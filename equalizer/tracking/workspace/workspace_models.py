@@ -56,15 +56,15 @@ class WorkspaceModels:
 
 
 def _check_alike(first: IdentifiedModel, model: IdentifiedModel, number: int) -> None:
-    for what, one, other in (
+    for what, each, other in (
         ("sample rate", first.sample_rate_hz, model.sample_rate_hz),
         ("input channels", first.input_channels, model.input_channels),
         ("output channels", first.output_channels, model.output_channels),
         ("input unit", first.input_unit, model.input_unit),
         ("output unit", first.output_unit, model.output_unit),
     ):
-        if one != other:
-            raise WorkspaceError(f"model {number} has the {what} {other}, but the first has {one}")
+        if each != other:
+            raise WorkspaceError(f"model {number} has the {what} {other}, but the first has {each}")
     if model.spectral_radius >= 1:
         raise WorkspaceError(f"model {number} is not stable, so nothing can be played through it")
 

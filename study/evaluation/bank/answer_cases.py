@@ -91,7 +91,7 @@ def answer(place: Path, digest: str) -> None:
 
 def challenge_is_loaded() -> bool:
     """The name alone stands for nothing: that is how its import is forbidden."""
-    return any(name.split(".")[:2] == APART.split(".") for name, one in vars(sys)["modules"].items() if one is not None)
+    return any(name.split(".")[:2] == APART.split(".") for name, var in vars(sys)["modules"].items() if var is not None)
 
 
 def engine_digest() -> str:

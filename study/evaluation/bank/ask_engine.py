@@ -102,7 +102,7 @@ def _engines(
     folder: ProofFolder, workers: int, left: SimpleQueue[str], answered: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
     engines = [Engine(folder) for _ in range(workers)]
-    threads = [threading.Thread(target=_work, args=(one, folder, left, answered), daemon=True) for one in engines]
+    threads = [threading.Thread(target=_work, args=(each, folder, left, answered), daemon=True) for each in engines]
     for thread in threads:
         thread.start()
     try:

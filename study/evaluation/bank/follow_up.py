@@ -44,15 +44,17 @@ def follow_up(
     """Of single effects. wishes: how many processes, and whether recordings stay once they are answered. Interrupted,
     the same call goes on. Raises StudyError."""
     workers, keep = wishes
-    starts = [one for one in outcomes if one.kind == "single" and len(one.returned) > len(one.named) > 0]
+    starts = [
+        outcome for outcome in outcomes if outcome.kind == "single" and len(outcome.returned) > len(outcome.named) > 0
+    ]
     if not starts:
         return ()
     again = opened(folder.path / NEXT, plan.seed, plan.brief)
-    for one in starts:
-        if not again.label(one.number).exists():
-            _seal(folder, again, plan, one)
+    for start in starts:
+        if not again.label(start.number).exists():
+            _seal(folder, again, plan, start)
     seal(again)
-    labels = [label_at(again.label(one.number)) for one in starts]
+    labels = [label_at(again.label(each.number)) for each in starts]
     names = [label[which]["name"] for label in labels for which in (PROPOSED, DRAWN) if which in label]
     done = sum(is_answered(again.open / name) for name in names)
     on_done(done, len(names))
@@ -66,7 +68,7 @@ def follow_up(
         on_done(done, len(names))
 
     ask_engine(again, names, workers, on_answered)
-    return tuple(_found(again, one, label) for one, label in zip(starts, labels, strict=True))
+    return tuple(_found(again, each, label) for each, label in zip(starts, labels, strict=True))
 
 
 def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
@@ -79,7 +81,7 @@ def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcom
         model = read_mechanical_model(place / MODEL)
         menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
         drawn = menu[int(np.random.default_rng([plan.seed, start.number, NOISE_SEED]).integers(len(menu)))]
-        wanted = [(DRAWN, drawn), *((PROPOSED, one) for one in menu if one.words == proposal["best"])]
+        wanted = [(DRAWN, drawn), *((PROPOSED, each) for each in menu if each.words == proposal["best"])]
         label |= {which: _written(again, plan, (first, place), experiment) for which, experiment in wanted}
     write_text(again.label(start.number), json.dumps(label, indent=1) + "\n")
 

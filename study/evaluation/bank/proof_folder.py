@@ -64,7 +64,7 @@ def opened(path: Path, seed: int, brief: bool) -> ProofFolder:
             "Choose another name with --out, or empty it.",
             saved="Nothing was written.",
         )
-    for one in (folder.open, folder.sealed):
-        one.mkdir(parents=True, exist_ok=True)
+    for each in (folder.open, folder.sealed):
+        each.mkdir(parents=True, exist_ok=True)
     write_text(said, wanted)
     return folder

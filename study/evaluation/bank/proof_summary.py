@@ -11,10 +11,10 @@ from study.evaluation.bank.prove import Proof
 def proof_lines(proof: Proof) -> Iterator[str]:
     score = proof.score
     yield f"{len(score.misses)} misses in {len(proof.outcomes)} cases"
-    for one in score.misses:
-        strength = strength_text(one)
-        drawn = f"{concealed_text(one)}{f' at {strength}' if strength else ''}"
-        yield f"  {one.number:5d} {one.kind}, {one.bank}: {drawn} -> {said_text(one)}"
+    for miss in score.misses:
+        strength = strength_text(miss)
+        drawn = f"{concealed_text(miss)}{f' at {strength}' if strength else ''}"
+        yield f"  {miss.number:5d} {miss.kind}, {miss.bank}: {drawn} -> {said_text(miss)}"
     yield from control_lines(proof)
     yield ""
     for figure in score.figures:
@@ -32,10 +32,10 @@ def proof_lines(proof: Proof) -> Iterator[str]:
 def control_lines(proof: Proof) -> Iterator[str]:
     """Those that did not hold one by one."""
     if proof.controls:
-        yield f"{sum(one.held for one in proof.controls)} of {len(proof.controls)} controls held"
-    for one in proof.controls:
-        if not one.held:
-            yield f"  {one.name}: {', then '.join(one.said)}"
+        yield f"{sum(each.held for each in proof.controls)} of {len(proof.controls)} controls held"
+    for control in proof.controls:
+        if not control.held:
+            yield f"  {control.name}: {', then '.join(control.said)}"
 
 
 def remarks(proof: Proof) -> Iterator[str]:
@@ -62,7 +62,7 @@ def summary(proof: Proof) -> dict[str, Any]:
             for figure in proof.score.figures
         },
         "expected_calibration_error": proof.score.calibration.error,
-        "followed": [asdict(one) for one in proof.followed],
-        "controls": {one.name: one.held for one in proof.controls},
-        "misses": [one.number for one in proof.score.misses],
+        "followed": [asdict(each) for each in proof.followed],
+        "controls": {control.name: control.held for control in proof.controls},
+        "misses": [miss.number for miss in proof.score.misses],
     }

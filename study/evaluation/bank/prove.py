@@ -43,8 +43,8 @@ def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
 
 def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
     concealed = tuple(
-        Concealed(one["effect"], one["place"], one["axis"], {**one["values"], **one["unseen"]})
-        for one in label["truth"]
+        Concealed(each["effect"], each["place"], each["axis"], {**each["values"], **each["unseen"]})
+        for each in label["truth"]
     )
     return Outcome(
         number=label["number"],
@@ -65,7 +65,7 @@ def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
 def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
     """Digests of the code that gave the answers; more than one where it changed on the way."""
     answers = [answer_at(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
-    return tuple(sorted({one["engine"] for one in answers if "engine" in one}))
+    return tuple(sorted({answer["engine"] for answer in answers if "engine" in answer}))
 
 
 CONTROL_TURNS = 3
@@ -104,7 +104,7 @@ class Wishes:
 def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> Proof:
     """Interrupted, the same call goes on. Raises StudyError."""
     folder = opened(path, plan.seed, plan.brief)
-    numbers = [one.number for one in to_draw(plan)]
+    numbers = [each.number for each in to_draw(plan)]
     try:
         seal = seal_cases(folder, plan, wishes.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = sealed_names(folder, numbers)
@@ -132,8 +132,10 @@ def prove(path: Path, plan: BankPlan, wishes: Wishes, on_progress: Progress) -> 
 
 
 def _beside(path: Path) -> tuple[str, ...]:
-    folders = [ProofFolder(path / NEXT), *(ProofFolder(one) for one in sorted(path.glob("controls/*")))]
-    found = {digest for one in folders for digest in engines(one, [place.name for place in one.open.glob("*")])}
+    folders = [ProofFolder(path / NEXT), *(ProofFolder(each) for each in sorted(path.glob("controls/*")))]
+    found = {
+        digest for folder in folders for digest in engines(folder, [place.name for place in folder.open.glob("*")])
+    }
     return tuple(sorted(found))
 
 

@@ -44,8 +44,10 @@ def run_controls(
 
     ask_engine(folder, every, workers, on_answered)
     return tuple(
-        controlled(f"{one.name}, seed {seed}", one.claim, [_said(folder.open / name) for name in names[one.name]])
-        for one in controls
+        controlled(
+            f"{control.name}, seed {seed}", control.claim, [_said(folder.open / name) for name in names[control.name]]
+        )
+        for control in controls
     )
 
 
@@ -57,8 +59,8 @@ def _given(folder: ProofFolder, seed: int, control: Control, rig: Rig) -> tuple[
         return written
     asked = control.draw(seed, rig)
     names = tuple(f"{begun}{number}" for number in range(len(asked)))
-    for name, one in zip(names, asked, strict=True):
-        _write(folder.open / name, one)
+    for name, each in zip(names, asked, strict=True):
+        _write(folder.open / name, each)
     write_text(known, json.dumps(names) + "\n", overwrite=True)
     return names
 
@@ -73,11 +75,11 @@ def _names(known: Path, begun: str) -> tuple[str, ...] | None:
     return tuple(names) if ours and names else None
 
 
-def _write(place: Path, one: Asked) -> None:
+def _write(place: Path, asked: Asked) -> None:
     place.mkdir(exist_ok=True)
-    write_recording(place / RECORDING, one.recording, precision="float32", overwrite=True)
-    write_mechanical_model(place / MODEL, one.model, overwrite=True)
-    write_text(place / SETTINGS, json.dumps({"without": list(one.without)}) + "\n", overwrite=True)
+    write_recording(place / RECORDING, asked.recording, precision="float32", overwrite=True)
+    write_mechanical_model(place / MODEL, asked.model, overwrite=True)
+    write_text(place / SETTINGS, json.dumps({"without": list(asked.without)}) + "\n", overwrite=True)
 
 
 def _said(place: Path) -> Diagnosis | None:

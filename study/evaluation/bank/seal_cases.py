@@ -51,33 +51,33 @@ class BankPlan:
 def to_draw(plan: BankPlan) -> tuple[Draw, ...]:
     """All that can be drawn here: without the second engine its cases are left out."""
     whole = (draw(plan.seed, number, plan.brief) for number in range(plan.cases))
-    return tuple(one for one in whole if one.bank != "engine" or second_engine.is_installed())
+    return tuple(each for each in whole if each.bank != "engine" or second_engine.is_installed())
 
 
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draws, writes and seals what is not sealed yet, calling `on_sealed(how many are)`. Returns the SHA-256 of
     labels.sha256, to be kept elsewhere before anything is diagnosed. Raises StudyError."""
     drawn = to_draw(plan)
-    left = [one for one in drawn if not folder.label(one.number).exists()]
+    left = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(left)
     on_sealed(done)
     with worker_processes(workers if len(left) > 1 else 1) as pool:
-        for finished in as_completed([pool.submit(seal_one, folder, one) for one in left]):
+        for finished in as_completed([pool.submit(seal_one, folder, each) for each in left]):
             finished.result()
             done += 1
             on_sealed(done)
     return seal(folder)
 
 
-def seal_one(folder: ProofFolder, one: Draw) -> None:
+def seal_one(folder: ProofFolder, each: Draw) -> None:
     """The label comes last: a case without one is drawn again."""
     name = secrets.token_hex(6)
-    case, place = case_of(one, name), folder.open / name
+    case, place = case_of(each, name), folder.open / name
     place.mkdir()
     write_recording(place / RECORDING, case.recording, precision="float32")
     write_mechanical_model(place / MODEL, case.model)
-    write_text(place / SETTINGS, settings_text(one.without, PROCESSOR_S))
-    write_text(folder.label(one.number), json.dumps(_label(one, case, place), indent=1, allow_nan=False) + "\n")
+    write_text(place / SETTINGS, settings_text(each.without, PROCESSOR_S))
+    write_text(folder.label(each.number), json.dumps(_label(each, case, place), indent=1, allow_nan=False) + "\n")
 
 
 def settings_text(without: Sequence[str], processor_s: float | None = None) -> str:
@@ -100,15 +100,15 @@ def redrawn(place: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
     return case
 
 
-def _label(one: Draw, case: Case, place: Path) -> dict[str, Any]:
+def _label(each: Draw, case: Case, place: Path) -> dict[str, Any]:
     """All that is concealed. The salt keeps a hash from being guessed: there are few effects."""
-    drawn = asdict(one)
+    drawn = asdict(each)
     return {
         "name": place.name,
         **{key: drawn[key] for key in ("number", "seed", "kind", "bank", "strengths", "concealed")},
-        "axes": ["xyz"[axis] for axis in one.rig.axes],
-        "extras": one.rig.extras,
-        "without": list(one.without),
+        "axes": ["xyz"[axis] for axis in each.rig.axes],
+        "extras": each.rig.extras,
+        "without": list(each.without),
         "truth": truths(case),
         "adds": case.adds,
         "recording_sha256": sha256_of(place / RECORDING),

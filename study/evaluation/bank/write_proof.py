@@ -74,12 +74,12 @@ def write_proof(proof: Proof) -> None:
         "commit": at,
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
-        "followed": [asdict(one) for one in proof.followed],
-        "controls": [asdict(one) for one in proof.controls],
-        "misses": [one.number for one in score.misses],
+        "followed": [asdict(each) for each in proof.followed],
+        "controls": [asdict(control) for control in proof.controls],
+        "misses": [miss.number for miss in score.misses],
     }
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
-    rows = [_row(one, one in score.misses) for one in proof.outcomes]
+    rows = [_row(outcome, outcome in score.misses) for outcome in proof.outcomes]
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
     pictures = proof_pictures(proof.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
@@ -95,10 +95,12 @@ def write_proof(proof: Proof) -> None:
 def write_table(path: Path, proof: Proof) -> None:
     """Figures with what they were measured on, small enough to be kept beside the code. Raises StudyError."""
     calibration = proof.score.calibration
-    figures = [FigureRow(one.name, one.value, one.low, one.high, one.of) for one in proof.score.figures]
+    figures = [
+        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in proof.score.figures
+    ]
     named = sum(part.of for part in calibration.bins)
     figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
-    failed = [one.name for one in proof.controls if not one.held]
+    failed = [control.name for control in proof.controls if not control.held]
     held = f"{len(proof.controls) - len(failed)} of {len(proof.controls)} held" if proof.controls else "not asked"
     lines = [
         f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
@@ -109,7 +111,7 @@ def write_table(path: Path, proof: Proof) -> None:
         f"# controls {', not '.join((held, *failed))}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
-    misses = [_row(one, True) for one in proof.score.misses]
+    misses = [_row(miss, True) for miss in proof.score.misses]
     write_text(misses_table(path), rows_to_csv(misses, CaseRow), overwrite=True)
 
 
@@ -147,20 +149,20 @@ def _git(folder: Path, *words: str) -> str:
     return done.stdout.strip()
 
 
-def _row(one: Outcome, miss: bool) -> CaseRow:
-    known = one.kind == "single" and one.right and bool(one.concealed)
+def _row(outcome: Outcome, miss: bool) -> CaseRow:
+    known = outcome.kind == "single" and outcome.right and bool(outcome.concealed)
     return CaseRow(
-        one.number, one.seed, one.kind, one.bank, " ".join(one.axes), one.model,
-        " ".join(one.names),
-        " ".join(c.axis or "all" for c in one.concealed),
-        " ".join(f"{value:.3f}" for value in one.strengths),
-        round(one.adds, 4), one.detectable, one.verdict,
-        " ".join(one.named_names),
-        " ".join(effect.axis or "all" for effect in one.named),
-        " ".join(f"{effect.probability:.3f}" for effect in one.named),
-        " ".join(one.returned),
-        _short(main_error(one.concealed[0], one.named[0]) if known else None),
-        _short(one.left("retuned")), _short(one.left("after")), _short(one.seconds), miss,
+        outcome.number, outcome.seed, outcome.kind, outcome.bank, " ".join(outcome.axes), outcome.model,
+        " ".join(outcome.names),
+        " ".join(c.axis or "all" for c in outcome.concealed),
+        " ".join(f"{value:.3f}" for value in outcome.strengths),
+        round(outcome.adds, 4), outcome.detectable, outcome.verdict,
+        " ".join(outcome.named_names),
+        " ".join(effect.axis or "all" for effect in outcome.named),
+        " ".join(f"{effect.probability:.3f}" for effect in outcome.named),
+        " ".join(outcome.returned),
+        _short(main_error(outcome.concealed[0], outcome.named[0]) if known else None),
+        _short(outcome.left("retuned")), _short(outcome.left("after")), _short(outcome.seconds), miss,
     )  # fmt: skip
 
 

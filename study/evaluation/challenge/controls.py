@@ -110,7 +110,7 @@ def _mirrored(seed: int, rig: Rig) -> tuple[Asked, ...]:
 
 def _fewer(seed: int, rig: Rig) -> tuple[Asked, ...]:
     case = _strong(seed, rig)
-    irrelevant = tuple(one.name for one in EFFECT_NAMES if one.place == "sensor")
+    irrelevant = tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.place == "sensor")
     return Asked(case.recording, case.model, irrelevant), Asked(case.recording, case.model)
 
 
@@ -129,7 +129,13 @@ def _renamed(seed: int, rig: Rig) -> tuple[Asked, ...]:
 
 def _one_wrong(seed: int, rig: Rig) -> tuple[Asked, ...]:
     case = _strong(seed, rig)
-    return (Asked(case.recording, case.model, tuple(one.name for one in EFFECT_NAMES if one.name != WRONG)),)
+    return (
+        Asked(
+            case.recording,
+            case.model,
+            tuple(effect_name.name for effect_name in EFFECT_NAMES if effect_name.name != WRONG),
+        ),
+    )
 
 
 def _mapped(recording: Recording, how: Callable[[FloatArray], FloatArray], command: bool = True) -> Recording:

@@ -22,7 +22,7 @@ COUNTS: dict[tuple[Kind, Bank], int] = {
     ("single", "main"): 10, ("single", "dirty"): 4, ("single", "engine"): 4,
     ("pair", "main"): 4, ("outside", "main"): 4, ("without", "main"): 4,
 }  # fmt: skip
-TURN: tuple[tuple[Kind, Bank], ...] = tuple(one for one, count in COUNTS.items() for _ in range(count))
+TURN: tuple[tuple[Kind, Bank], ...] = tuple(each for each, count in COUNTS.items() for _ in range(count))
 EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
 """Strength. Singles go from invisible to strong; the others ask what is said of something that is there."""
@@ -75,11 +75,11 @@ def draw(seed: int, number: int, brief: bool = False) -> Draw:
     return Draw(number, seed + number, kind, bank, effects, strengths, concealed, rig)
 
 
-def case_of(one: Draw, name: str) -> Case:
+def case_of(each: Draw, name: str) -> Case:
     """name: what recording and model call the device. Raises ImportError where the second engine is not installed."""
-    if one.bank == "engine":
-        return second_engine.draw_engine_case(one.seed, one.effects, one.concealed, one.strengths, name, one.rig)
-    return draw_case(one.seed, one.effects, one.concealed, one.strengths or None, name, one.rig)
+    if each.bank == "engine":
+        return second_engine.draw_engine_case(each.seed, each.effects, each.concealed, each.strengths, name, each.rig)
+    return draw_case(each.seed, each.effects, each.concealed, each.strengths or None, name, each.rig)
 
 
 def _effects(
@@ -89,7 +89,7 @@ def _effects(
     if kind == "nothing":
         return (), ()
     if kind == "pair":
-        return _pair(random), tuple(float(one) for one in random.uniform(lowest, 1.0, 2))
+        return _pair(random), tuple(float(each) for each in random.uniform(lowest, 1.0, 2))
     names = tuple(DECOYS if kind == "outside" else second_engine.EFFECTS if bank == "engine" else EFFECTS)
     own = [seed, 3, sorted(LOWEST).index(kind), sorted(EXTRAS).index(bank)]
     order = np.random.default_rng(own).permutation(len(names))

@@ -110,9 +110,9 @@ def draw_case(
 def added(bare: Device, device: Device, moved: Moved, rig: Rig) -> float:
     """By which two devices' readings differ: rms over that of the noise, in the worst channel. moved: how both move."""
     readings = []
-    for one, (acceleration, position) in zip((bare, device), moved, strict=True):
+    for each, (acceleration, position) in zip((bare, device), moved, strict=True):
         # The same noise and the same losses for both: what is left is the difference of the devices.
-        seen, _ = read(one.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0))
+        seen, _ = read(each.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0))
         readings.append(np.hstack([seen[:, rig.axes], position[:, rig.axes]]))
     noise = NOISE[[*rig.axes, *(3 + axis for axis in rig.axes)]]
     power = np.mean(((readings[1] - readings[0]) / noise) ** 2, axis=0)

@@ -73,6 +73,6 @@ def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device
 def with_amplifier(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
     """None: the amplifiers of all axes."""
     table = device.amplifiers
-    for one in range(3) if axis is None else (axis,):
-        table = with_cells(table, one, cells)
+    for index in range(3) if axis is None else (axis,):
+        table = with_cells(table, index, cells)
     return replace(device, amplifiers=table)

@@ -20,7 +20,7 @@ CORRECT = "Correct it before it is sealed; from then on nothing in it may be cha
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
     """Each change so many times, and nothing twice as often, in a drawn order. seed: None draws one that nobody knows.
     Raises AlreadyThereError, CannotWriteError."""
-    every = [one.name for one in CHANGES for _ in range(repeats * (2 if one.name == NOTHING else 1))]
+    every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
     order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))
     labels = tuple(
         Label(f"rec_{number:02d}", every[int(place)], None, "", secrets.token_hex(8))
@@ -37,12 +37,12 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     except CsvError as error:
         raise UnusableFileError(path, "table of labels", error.problems, CORRECT) from error
     problems = [
-        f"{one.recording}: '{one.change}' is no change of the kit{nearest(one.change, tuple(CHANGES_BY_NAME))}"
-        for one in labels
-        if one.change not in CHANGES_BY_NAME
+        f"{label.recording}: '{label.change}' is no change of the kit{nearest(label.change, tuple(CHANGES_BY_NAME))}"
+        for label in labels
+        if label.change not in CHANGES_BY_NAME
     ]
-    names = [one.recording for one in labels]
-    problems += [f"{name} is there twice" for name in sorted({one for one in names if names.count(one) > 1})]
+    names = [label.recording for label in labels]
+    problems += [f"{name} is there twice" for name in sorted({name for name in names if names.count(name) > 1})]
     if problems or not labels:
         raise UnusableFileError(path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT)
     return labels

@@ -36,28 +36,31 @@ def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -
     labels = read_labels(path)
     found = _diagnoses(diagnoses, labels)
     rows = tuple(
-        not_answered(label) if one is None else scored(label, one) for label, one in zip(labels, found, strict=True)
+        not_answered(label) if each is None else scored(label, each) for label, each in zip(labels, found, strict=True)
     )
     write_text(out, rows_to_csv(rows, Scored))
     return KitScore(rows, kit_figures(rows), digest, compared_with)
 
 
 def score_lines(score: KitScore) -> tuple[str, ...]:
-    figures = (_figure_line(one) for one in score.figures)
-    rows = (_row_line(one) for one in score.rows if not one.right)
+    figures = (_figure_line(figure) for figure in score.figures)
+    rows = (_row_line(row) for row in score.rows if not row.right)
     return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
 
 
-def _figure_line(one: Figure) -> str:
-    if one.value is None or one.low is None or one.high is None:
-        return f"{one.name}: none"
-    return f"{one.name}: {one.hits} of {one.of}, {100 * one.value:.0f} % [{100 * one.low:.0f}, {100 * one.high:.0f}]"
+def _figure_line(figure: Figure) -> str:
+    if figure.value is None or figure.low is None or figure.high is None:
+        return f"{figure.name}: none"
+    interval = f"[{100 * figure.low:.0f}, {100 * figure.high:.0f}]"
+    return f"{figure.name}: {figure.hits} of {figure.of}, {100 * figure.value:.0f} % {interval}"
 
 
-def _row_line(one: Scored) -> str:
-    if one.verdict == MISSING:
-        return f"Missing: {one.recording}, {one.change}: no diagnosis; it counts as not right."
-    return f"Missed: {one.recording}, {one.change}: {one.verdict.replace('_', ' ')}, named {one.named or 'nothing'}."
+def _row_line(each: Scored) -> str:
+    if each.verdict == MISSING:
+        return f"Missing: {each.recording}, {each.change}: no diagnosis; it counts as not right."
+    return (
+        f"Missed: {each.recording}, {each.change}: {each.verdict.replace('_', ' ')}, named {each.named or 'nothing'}."
+    )
 
 
 def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | None, ...]:
@@ -70,7 +73,7 @@ def _diagnoses(folder: Path, labels: tuple[Label, ...]) -> tuple[Diagnosis | Non
             saved=UNSCORED,
         )
     found = tuple(_diagnosis(folder, label.recording) for label in labels)
-    if any(one is not None for one in found):
+    if any(each is not None for each in found):
         return found
     raise StudyError(
         "There is no diagnosis to score",

@@ -23,37 +23,37 @@ class _Kept:
     """What is otherwise than when it was made."""
 
 
-def answer_place(out: Path, one: RealRecording) -> Path:
+def answer_place(out: Path, real_recording: RealRecording) -> Path:
     """Folder of one recording's results."""
-    return out / one.folder.name / one.name
+    return out / real_recording.folder.name / real_recording.name
 
 
-def origin_of_answer(one: RealRecording, seconds: float | None) -> Provenance:
+def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Provenance:
     """Everything that an answer hangs on. Raises CannotReadError."""
-    files = tuple(dict.fromkeys((*one.parents, *one.tested_on)))
+    files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
     return gather_provenance(parents=files, settings={"seconds": seconds})
 
 
 def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
     """By their place; nothing is written. Raises StudyError where one is torn, or was made from something else."""
-    there = [one for one in wanted if (answer_place(out, one) / ANSWER_NAME).is_file()]
-    kept = [_kept(answer_place(out, one), one, seconds) for one in there]
-    if outdated := [one for one in kept if one.changes]:
+    there = [each for each in wanted if (answer_place(out, each) / ANSWER_NAME).is_file()]
+    kept = [_kept(answer_place(out, each), each, seconds) for each in there]
+    if outdated := [each for each in kept if each.changes]:
         raise _made_otherwise(out, outdated)
-    return {one.place: one.answer for one in kept}
+    return {each.place: each.answer for each in kept}
 
 
-def _kept(place: Path, one: RealRecording, seconds: float | None) -> _Kept:
+def _kept(place: Path, real_recording: RealRecording, seconds: float | None) -> _Kept:
     try:
         answer, origin = read_answer_and_origin(place / ANSWER_NAME)
     except StudyError as error:
         raise StudyError(
-            f"{one.folder.name}/{one.name}/{error.title}",
+            f"{real_recording.folder.name}/{real_recording.name}/{error.title}",
             error.happened,
             f"Move {place} away to have it answered anew, or choose another --out.",
             saved="Nothing was written.",
         ) from error
-    now = origin_of_answer(one, seconds)
+    now = origin_of_answer(real_recording, seconds)
     files = {(parent.file, parent.sha256) for parent in now.parents}
     return _Kept(place, answer, (*_file_changes(_files_in(origin), files), *_setting_changes(origin, seconds)))
 
@@ -61,7 +61,7 @@ def _kept(place: Path, one: RealRecording, seconds: float | None) -> _Kept:
 def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
     said = origin.get("parents")
     parents = said if isinstance(said, list) else []
-    return {(str(one.get("file")), str(one.get("sha256"))) for one in parents if isinstance(one, dict)}
+    return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
 
 
 def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iterator[str]:
@@ -87,8 +87,8 @@ def _seconds(said: float | None) -> str:
 
 
 def _made_otherwise(out: Path, outdated: Sequence[_Kept]) -> StudyError:
-    said = (f"{one.place.relative_to(out) / ANSWER_NAME}: {', '.join(one.changes)}." for one in outdated)
-    places = [str(one.place) for one in outdated]
+    said = (f"{each.place.relative_to(out) / ANSWER_NAME}: {', '.join(each.changes)}." for each in outdated)
+    places = [str(each.place) for each in outdated]
     if (injected := out / INJECTED_NAME).exists():
         places.append(f"{injected}, which was made with them")
     return StudyError(

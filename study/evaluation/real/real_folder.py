@@ -47,7 +47,7 @@ class RealRecording:
     @property
     def tested_on(self) -> tuple[Path, ...]:
         """Files of the recordings that are only predicted, and their maps."""
-        return tuple(path for one in self.tests for path in (*one.files, one.source.path))
+        return tuple(path for test in self.tests for path in (*test.files, test.source.path))
 
     def _model_path(self) -> Path | None:
         wanted = self.found.source.map.diagnosis.model
@@ -89,12 +89,12 @@ def _said(problem: StudyError | OSError) -> str:
 
 def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
     made = []
-    for one in found:
-        if one.source.map.diagnosis.tests and any(_tests(one, other) for other in found):
+    for each in found:
+        if each.source.map.diagnosis.tests and any(_tests(each, other) for other in found):
             continue
-        tests = tuple(other for other in found if _tests(other, one))
-        before, changed = _pair(one, found)
-        made.append(RealRecording(folder, one, tests, before, changed))
+        tests = tuple(other for other in found if _tests(other, each))
+        before, changed = _pair(each, found)
+        made.append(RealRecording(folder, each, tests, before, changed))
     return made
 
 

@@ -95,7 +95,7 @@ def _found(plan: RealPlan) -> RealFolder:
         return found
     raise StudyError(
         "There is no recording to diagnose",
-        " ".join(f"{one.where}: {one.why}" for one in found.troubles),
+        " ".join(f"{trouble.where}: {trouble.why}" for trouble in found.troubles),
         "Give a folder whose sub-folders hold recordings, as docs/real.md says.",
         saved="Nothing was written.",
     )
@@ -131,22 +131,26 @@ def _answers(
 ) -> tuple[RealAnswer, ...]:
     answers, count, end = [], max(len(found.recordings), 1), DIAGNOSED_OF_BOTH if plan.inject else 0.98
     whole = plan.seconds or 0.0
-    left = dict.fromkeys((one.folder.name for one in found.recordings), whole)
-    for number, one in enumerate(found.recordings):
-        rest = sum(other.folder == one.folder for other in found.recordings[number:])
+    left = dict.fromkeys((each.folder.name for each in found.recordings), whole)
+    for number, recording in enumerate(found.recordings):
+        rest = sum(other.folder == recording.folder for other in found.recordings[number:])
         begun = process_time()
-        budget = max(left[one.folder.name] / rest - BESIDE_S, 0.1 * whole)
+        budget = max(left[recording.folder.name] / rest - BESIDE_S, 0.1 * whole)
 
-        def show(what: str, share: float, number: int = number, one: RealRecording = one) -> None:
-            on_progress(f"{one.folder.name}, {one.name}: {what}", end * (number + min(share, 1.0)) / count)
+        def show(what: str, share: float, number: int = number, real_recording: RealRecording = recording) -> None:
+            on_progress(
+                f"{real_recording.folder.name}, {real_recording.name}: {what}", end * (number + min(share, 1.0)) / count
+            )
 
-        there = kept.get(answer_place(plan.out, one))
-        answers.append(there or _answer(plan, one, budget, show, clock))
-        left[one.folder.name] -= process_time() - begun
+        there = kept.get(answer_place(plan.out, recording))
+        answers.append(there or _answer(plan, recording, budget, show, clock))
+        left[recording.folder.name] -= process_time() - begun
     return tuple(answers)
 
 
-def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Progress, clock: Clock) -> RealAnswer:
+def _answer(
+    plan: RealPlan, real_recording: RealRecording, budget_s: float, on_progress: Progress, clock: Clock
+) -> RealAnswer:
     """budget_s: of processor time, that the search may take."""
     begun_s, worked, guard = clock.now_s(), process_time(), crash_guard()
     timed: TimeBudget = lambda: process_time() - worked < budget_s  # noqa: E731
@@ -154,17 +158,21 @@ def _answer(plan: RealPlan, one: RealRecording, budget_s: float, on_progress: Pr
 
     def kept(done: RealDiagnosis) -> RealAnswer:
         answer = replace(done.answer, seconds=round(clock.now_s() - begun_s, 1))
-        _write(answer_place(plan.out, one), replace(done, answer=answer), origin_of_answer(one, plan.seconds))
+        _write(
+            answer_place(plan.out, real_recording),
+            replace(done, answer=answer),
+            origin_of_answer(real_recording, plan.seconds),
+        )
         return answer
 
     try:
-        return kept(diagnose_real(one, time_left, guard, on_progress))
+        return kept(diagnose_real(real_recording, time_left, guard, on_progress))
     except StudyError:
         raise
     except Exception as crash:
         if not guard.on:
             raise
-        return kept(crashed(one, crash))
+        return kept(crashed(real_recording, crash))
 
 
 def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:

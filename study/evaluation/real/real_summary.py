@@ -10,24 +10,24 @@ from study.evaluation.real.write_real import WrittenReal
 
 def real_lines(done: WrittenReal) -> tuple[str, ...]:
     results = done.results
-    troubles = tuple(f"Could not be used: {one.where}: {one.why}" for one in results.troubles)
+    troubles = tuple(f"Could not be used: {trouble.where}: {trouble.why}" for trouble in results.troubles)
     figures = injected_figures(results.injected) if results.injected else ()
-    counted = tuple(f"Injected: {one.name}: {figure_text(one)}" for one in figures)
-    lines = (*(_line(one) for one in results.answers), *troubles, *counted)
+    counted = tuple(f"Injected: {figure.name}: {figure_text(figure)}" for figure in figures)
+    lines = (*(_line(answer) for answer in results.answers), *troubles, *counted)
     return (*lines, "", f"Page: {done.page}", f"Table: {done.table}")
 
 
-def _line(one: RealAnswer) -> str:
-    named = f": {', '.join(one.effects)}" if one.effects else ""
-    if one.verdict == "unexplained" and one.candidates:
-        named = f", best candidate (not confirmed) {one.candidates[0].effect}"
-    said = f"{one.folder}, {one.recording}: {VERDICT_WORDS[one.verdict]}{named}"
-    if one.held_out is None:
-        return f"{said}. {one.answer}"
-    errors = one.held_out
-    after = f", with what was found {error_text(errors.after)}" if one.effects else ""
-    box = "" if one.black_box is None else f", black box {error_text(one.black_box)}"
+def _line(real_answer: RealAnswer) -> str:
+    named = f": {', '.join(real_answer.effects)}" if real_answer.effects else ""
+    if real_answer.verdict == "unexplained" and real_answer.candidates:
+        named = f", best candidate (not confirmed) {real_answer.candidates[0].effect}"
+    said = f"{real_answer.folder}, {real_answer.recording}: {VERDICT_WORDS[real_answer.verdict]}{named}"
+    if real_answer.held_out is None:
+        return f"{said}. {real_answer.answer}"
+    errors = real_answer.held_out
+    after = f", with what was found {error_text(errors.after)}" if real_answer.effects else ""
+    box = "" if real_answer.black_box is None else f", black box {error_text(real_answer.black_box)}"
     return (
         f"{said}. Held out: as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}{after}{box} "
-        f"({one.seconds:.0f} s)."
+        f"({real_answer.seconds:.0f} s)."
     )

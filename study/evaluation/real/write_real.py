@@ -68,9 +68,9 @@ class WrittenReal:
 def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
     """What is there from an earlier run is replaced. Raises CannotWriteError."""
     answers = results.answers
-    pictures = {(one.folder, one.recording): real_picture(one) for one in answers}
+    pictures = {(answer.folder, answer.recording): real_picture(answer) for answer in answers}
     write_pictures(out / FIGURES_NAME, tuple(pictures.values()))
-    write_text(out / TABLE_NAME, rows_to_csv([_row(one) for one in answers], RealRow), overwrite=True)
+    write_text(out / TABLE_NAME, rows_to_csv([_row(answer) for answer in answers], RealRow), overwrite=True)
     origin = gather_provenance()
     shown = {
         "command": " ".join(origin.command),
@@ -78,29 +78,31 @@ def write_real(out: Path, results: RealResults, generated: str) -> WrittenReal:
     }
     if results.injected:
         write_text(
-            out / INJECTED_NAME, rows_to_csv([_injected(one) for one in results.injected], InjectedRow), overwrite=True
+            out / INJECTED_NAME,
+            rows_to_csv([_injected(each) for each in results.injected], InjectedRow),
+            overwrite=True,
         )
     page = render_real_report(results.answers, results.troubles, results.injected, pictures, shown, generated)
     write_text(out / PAGE_NAME, page, overwrite=True)
     return WrittenReal(results, out / PAGE_NAME, out / TABLE_NAME)
 
 
-def _row(one: RealAnswer) -> RealRow:
-    errors = one.held_out
+def _row(real_answer: RealAnswer) -> RealRow:
+    errors = real_answer.held_out
     before, retuned, after, noise = (
         (None, None, None, None) if errors is None else (errors.before, errors.retuned, errors.after, errors.noise)
     )
-    effects = " ".join(one.effects)
+    effects = " ".join(real_answer.effects)
     return RealRow(
-        one.folder, one.recording, one.verdict, effects, one.error,
-        before, retuned, after, one.black_box, noise, one.seconds,
-        " ".join(each.effect for each in one.candidates),
+        real_answer.folder, real_answer.recording, real_answer.verdict, effects, real_answer.error,
+        before, retuned, after, real_answer.black_box, noise, real_answer.seconds,
+        " ".join(each.effect for each in real_answer.candidates),
     )  # fmt: skip
 
 
-def _injected(one: InjectedOutcome) -> InjectedRow:
-    values = " ".join(f"{name}={value:.6g}" for name, value in one.values.items())
+def _injected(outcome: InjectedOutcome) -> InjectedRow:
+    values = " ".join(f"{name}={value:.6g}" for name, value in outcome.values.items())
     return InjectedRow(
-        one.recording, one.injected or "nothing", one.strength, values, one.change, one.detectable, one.judged,
-        one.verdict, " ".join(one.named), " ".join(one.returned), one.seconds,
+        outcome.recording, outcome.injected or "nothing", outcome.strength, values, outcome.change,
+        outcome.detectable, outcome.judged, outcome.verdict, " ".join(outcome.named), " ".join(outcome.returned), outcome.seconds,
     )  # fmt: skip

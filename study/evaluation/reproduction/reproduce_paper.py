@@ -88,7 +88,7 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
     steps = Steps(_weights(plan, wanted, models), on_progress)
     try:
         _make_folders(plan)
-        recordings = {name: recorded(plan, one, steps.of(f"recording {name}")) for name, one in wanted.items()}
+        recordings = {name: recorded(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
         collected = _sit(plan, steps)
         identified = {name: modelled(plan, recordings[name], steps.of(f"model {name}")) for name in models}
         results = _results(plan, recordings, identified, collected, steps)
@@ -112,7 +112,7 @@ def _wanted(plan: ReproductionPlan) -> Mapping[str, Wanted]:
         Wanted(SLICK_NAME, asked.band, device=FRICTIONLESS),
         Wanted(HAND_NAME, asked.hand),
     )
-    return {one.name: one for one in wanted}
+    return {each.name: each for each in wanted}
 
 
 def _between_names() -> tuple[str, ...]:
@@ -182,11 +182,11 @@ def _results(
         device_name=centre.device,
         played=play_equalized(plan, models, steps.of("playing")),
         baselines=play_baselines(plan, models, estimate, steps.of("baselines")),
-        models=tuple(one.used(name) for name, one in identified.items()),
+        models=tuple(each.used(name) for name, each in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[SLICK_NAME].tested,
-        remarks=tuple(f"{name}: {said}" for name, one in recordings.items() for said in one.warnings),
-        sources=tuple(one.path for one in recordings.values()),
+        remarks=tuple(f"{name}: {said}" for name, recording in recordings.items() for said in recording.warnings),
+        sources=tuple(recording.path for recording in recordings.values()),
         protocol_hash=collected.protocol_hash,
     )
 

@@ -67,9 +67,9 @@ def opened_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]
             opened.append(folder)
         yield folder
     finally:
-        for one in opened:
-            if one.descriptor is not None:
-                os.close(one.descriptor)
+        for each in opened:
+            if each.descriptor is not None:
+                os.close(each.descriptor)
 
 
 def _open(path: Path, parent: int | None) -> RealFolder:

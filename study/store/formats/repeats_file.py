@@ -59,7 +59,7 @@ def read_repeats(path: Path) -> Repeats:
     try:
         found = REPEATS.validate_python(document)
     except ValidationError as error:
-        problems = tuple(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        problems = tuple(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
         raise UnusableFileError(path, KIND, problems) from error
     if not 0 <= found.kept < len(found.errors):
         raise UnusableFileError(path, KIND, (f"kept is {found.kept}, but there are {len(found.errors)} plays",))

@@ -155,7 +155,7 @@ class Desk:
         self._link.send(Working("getting ready", 0.0))
         sources = tuple(Path(source) for source in wanted.sources)
         out = Path(wanted.out) if wanted.out else free_out(sources[0])
-        model, clean = Path(wanted.model) if wanted.model else None, tuple(Path(one) for one in wanted.clean)
+        model, clean = Path(wanted.model) if wanted.model else None, tuple(Path(each) for each in wanted.clean)
         plan = DiagnosePlan(sources, out, model, clean=clean)
         written = diagnose_at_screen(plan, lambda what, share: self._link.send(Working(what, share)))
         self._link.send(_diagnosis(written))

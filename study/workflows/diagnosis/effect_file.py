@@ -84,7 +84,7 @@ def _laws(found: Path) -> list[Law]:
     if found.suffix == ".toml":
         return [effect.law for effect in read_mechanical_model(found).effects if effect.law is not None]
     document: Diagnosis = read_diagnosis(found / "diagnosis.json" if found.is_dir() else found)
-    laws = [one.law for one in document.effects] + [one.law for one in document.candidates]
+    laws = [effect.law for effect in document.effects] + [candidate.law for candidate in document.candidates]
     return [law_of(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
 
 

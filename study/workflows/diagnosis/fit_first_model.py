@@ -70,13 +70,14 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:
     """For a person: what was chosen and why, the numbers, and what remains."""
     choice, fit = done.choice, done.choice.fit
-    rows = [_row(one) for one in fit.numbers]
+    rows = [_row(number) for number in fit.numbers]
     errors = [
         f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
         for name, error in zip(fit.channels, fit.held_out, strict=True)
     ]
     others = [
-        f"  {one.kind}: " + (one.why_not if one.error is None else f"{100 * one.error:.3g} %") for one in choice.tried
+        f"  {each.kind}: " + (each.why_not if each.error is None else f"{100 * each.error:.3g} %")
+        for each in choice.tried
     ]
     return (str(done.plan.out), f"Structure: {fit.kind}. {choice.reason}", *others, *rows, *errors, choice.remains)
 
@@ -89,24 +90,24 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
         "structure": fit.kind,
         "reason": choice.reason,
         "numbers": [
-            {"name": one.name, "unit": one.unit, "value": one.value,
-             "ci95": None if one.half is None else [one.value - one.half, one.value + one.half]}
-            for one in fit.numbers
+            {"name": number.name, "unit": number.unit, "value": number.value,
+             "ci95": None if number.half is None else [number.value - number.half, number.value + number.half]}
+            for number in fit.numbers
         ],
         "compared": fit.compared,
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
-        "tried": [{"structure": one.kind, "error": one.error, "why_not": one.why_not} for one in choice.tried],
+        "tried": [{"structure": each.kind, "error": each.error, "why_not": each.why_not} for each in choice.tried],
         "remains": choice.remains,
         "remarks": list(done.remarks),
     }  # fmt: skip
 
 
-def _row(one: Number) -> str:
-    value = typeset(f"{one.value:.4g}")
-    if one.half is None:
-        return f"  {one.name}: {value} {one.unit}"
-    low, high = (typeset(f"{one.value + sign * one.half:.4g}") for sign in (-1, 1))
-    return f"  {one.name}: {value} {one.unit} (95 %: {low} to {high})"
+def _row(number: Number) -> str:
+    value = typeset(f"{number.value:.4g}")
+    if number.half is None:
+        return f"  {number.name}: {value} {number.unit}"
+    low, high = (typeset(f"{number.value + sign * number.half:.4g}") for sign in (-1, 1))
+    return f"  {number.name}: {value} {number.unit} (95 %: {low} to {high})"
 
 
 def _wanted(structure: str) -> Kind | None:

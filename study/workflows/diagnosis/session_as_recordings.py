@@ -175,13 +175,13 @@ def _with_lead(recording: Recording, lead: int) -> dict[str, FloatArray]:
 def spring_of(recordings: Sequence[Recording]) -> float:
     """N/m, from what was commanded beyond what was decided, over the way; 0 where that is not known."""
     pushed, way = 0.0, 0.0
-    for one in recordings:
-        if one.excitation is None or one.position is None:
+    for recording in recordings:
+        if recording.excitation is None or recording.position is None:
             return 0.0
-        place = one.position.samples
-        if place.shape != one.command.samples.shape or not np.isfinite(place).all():
+        place = recording.position.samples
+        if place.shape != recording.command.samples.shape or not np.isfinite(place).all():
             return 0.0
-        pushed -= float(np.sum((one.command.samples - one.excitation.samples) * place))
+        pushed -= float(np.sum((recording.command.samples - recording.excitation.samples) * place))
         way += float(np.sum(place**2))
     return pushed / way if way > 0 else 0.0
 

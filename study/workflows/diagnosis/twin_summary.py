@@ -35,7 +35,8 @@ def twin_summary(written: WrittenTwin) -> dict[str, Any]:
         "held_out": fit.held_out,
         "noise": fit.noise,
         "channels": [
-            {"channel": one.channel, "fit": one.fit, "held_out": one.held_out, "noise": one.noise} for one in fit.errors
+            {"channel": error.channel, "fit": error.fit, "held_out": error.held_out, "noise": error.noise}
+            for error in fit.errors
         ],
         "notes": list(written.notes),
     }
@@ -53,10 +54,12 @@ def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
     if modes := _modes_hz(written):
         swing = ", ".join(f"{each:.3g}" for each in modes)
         lines.append(f"{model.coordinates} coordinates; what hangs on the driven axes swings at {swing} Hz")
-    for one in fit.errors:
-        held = "" if one.held_out is None else f", {one.held_out:.1%} on what was kept for a test"
-        noise = "" if one.noise is None else f" (noise {one.noise:.1%})"
-        lines.append(f"{one.channel}: error {one.fit:.1%}{held}{noise}, {fit.band_hz[0]:g} to {fit.band_hz[1]:g} Hz")
+    for error in fit.errors:
+        held = "" if error.held_out is None else f", {error.held_out:.1%} on what was kept for a test"
+        noise = "" if error.noise is None else f" (noise {error.noise:.1%})"
+        lines.append(
+            f"{error.channel}: error {error.fit:.1%}{held}{noise}, {fit.band_hz[0]:g} to {fit.band_hz[1]:g} Hz"
+        )
     return tuple(lines)
 
 

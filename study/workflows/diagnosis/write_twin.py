@@ -125,7 +125,7 @@ def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
 
 
 def _lowered(protocol: RecordingProtocol) -> RecordingProtocol:
-    segments = tuple(replace(one, amplitude_n=LOWER_LEVEL * one.amplitude_n) for one in protocol.segments)
+    segments = tuple(replace(segment, amplitude_n=LOWER_LEVEL * segment.amplitude_n) for segment in protocol.segments)
     return replace(protocol, segments=segments)
 
 

@@ -97,7 +97,7 @@ def _quality_lines(done: EqualizedTrajectory) -> list[str]:
     lines = [f"Of the {where} model: {quality_sentence(nearest)}"]
     if worst != nearest:
         lines.append(f"Of the worst of the {len(models.given)} models: {quality_sentence(worst)}")
-    return [*lines, *dict.fromkeys(remark for one in (nearest, worst) if one for remark in one.remarks)]
+    return [*lines, *dict.fromkeys(remark for each in (nearest, worst) if each for remark in each.remarks)]
 
 
 def predicted_error(done: EqualizedTrajectory) -> float:

@@ -22,7 +22,7 @@ def freed_recordings(recordings: Sequence[Recording], physics: MechanicalModel, 
         left = "".join(f" {effect.kind}: {why_not(effect)}." for effect in physics.effects)
         raise _not_freed(f"{path.name} names no effect that can be taken off a recording.{left}")
     try:
-        return tuple(without_effects(one, physics, excited_band_hz(one)) for one in recordings)
+        return tuple(without_effects(recording, physics, excited_band_hz(recording)) for recording in recordings)
     except ValueError as problem:
         raise _not_freed(f"{path.name}: {problem}.") from problem
 

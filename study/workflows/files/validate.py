@@ -49,7 +49,9 @@ def _notes(found: Validation) -> tuple[str, ...]:
     if found.problems or not found.kind.startswith("recording, "):
         return ()
     command = read_recording(found.path).command
-    idle = [name for name, one in zip(command.channels, command.samples.T, strict=True) if not np.nan_to_num(one).any()]
+    idle = [
+        name for name, each in zip(command.channels, command.samples.T, strict=True) if not np.nan_to_num(each).any()
+    ]
     return (f"No command drives {', '.join(idle)}.",) if idle else ()
 
 

@@ -14,18 +14,20 @@ from study.workflows.files.validate import Validation
 
 def validated_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
     """Of sound files; a model is held against recordings with as many commands and responses as it has."""
-    recordings = [(one.path, read_recording(one.path)) for one in _sound(found, "recording, ")]
+    recordings = [(each.path, read_recording(each.path)) for each in _sound(found, "recording, ")]
     if not recordings:
         return tuple(found)
-    models = {one.path: read_mechanical_model(one.path) for one in _sound(found, "mechanical model ")}
+    models = {each.path: read_mechanical_model(each.path) for each in _sound(found, "mechanical model ")}
     return tuple(
-        replace(one, problems=(*one.problems, *_problems(models[one.path], recordings))) if one.path in models else one
-        for one in found
+        replace(each, problems=(*each.problems, *_problems(models[each.path], recordings)))
+        if each.path in models
+        else each
+        for each in found
     )
 
 
 def _sound(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
-    return (one for one in found if one.kind.startswith(kind) and not one.problems)
+    return (each for each in found if each.kind.startswith(kind) and not each.problems)
 
 
 def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:

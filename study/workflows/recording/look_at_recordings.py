@@ -36,7 +36,7 @@ def write_look(found: Sequence[Overview], folder: Path) -> Path:
     """report.html and figures/ in `folder`; returns the page. Raises CannotWriteError."""
     pictures = pictures_of(found)
     write_pictures(folder / "figures", [picture for drawn in pictures for picture in drawn])
-    provenance = {"recordings": ", ".join(one.name for one in found)}
+    provenance = {"recordings": ", ".join(each.name for each in found)}
     write_text(folder / PAGE_NAME, render_look_report(found, pictures, provenance, local_now()), overwrite=True)
     return folder / PAGE_NAME
 
@@ -59,29 +59,29 @@ def recording_facts(found: Overview) -> tuple[str, ...]:
 
 def look_document(found: Sequence[Overview]) -> list[dict[str, Any]]:
     """For programs: one entry per recording, numbers in SI."""
-    return [_entry(one) for one in found]
+    return [_entry(each) for each in found]
 
 
-def _entry(one: Overview) -> dict[str, Any]:
-    recording = one.recording
+def _entry(each: Overview) -> dict[str, Any]:
+    recording = each.recording
     return {
-        "recording": one.name,
+        "recording": each.name,
         "device": recording.device,
         "sample_rate_hz": recording.sample_rate_hz,
         "samples": len(recording),
         "hold": recording.hold.value,
         "time": "unknown" if recording.meta.get("time") == "unknown" else "known",
-        "channels": [_finite(asdict(summary)) for summary in one.summaries],
-        "segments": [asdict(level) for level in one.levels],
-        "driven": [asdict(band) for band in one.bands],
+        "channels": [_finite(asdict(summary)) for summary in each.summaries],
+        "segments": [asdict(level) for level in each.levels],
+        "driven": [asdict(band) for band in each.bands],
         "coherence": [
             {"response": c.response, "share": c.share, "lowest_hz": c.lowest_hz, "lowest": c.lowest}
-            for c in one.coherences
+            for c in each.coherences
         ],
-        "derivatives": [asdict(pair) for pair in one.pairs],
-        "found_period": one.repeats.found,
-        "repeats": [asdict(noise) for noise in one.repeats.noise],
-        "checks": [asdict(check) for check in one.checks],
+        "derivatives": [asdict(pair) for pair in each.pairs],
+        "found_period": each.repeats.found,
+        "repeats": [asdict(noise) for noise in each.repeats.noise],
+        "checks": [asdict(check) for check in each.checks],
     }
 
 

@@ -95,7 +95,7 @@ def analysis_names(folder: Path, subject: str) -> bool | None:
     figure = re.compile(rf"staircases-\d+-{re.escape(subject)}\.(svg|png)")
     if any(figure.fullmatch(path.name) for path in written_by_analysis(folder)):
         return True
-    return None if all(one is None for one in said) else False
+    return None if all(each is None for each in said) else False
 
 
 def _opening(folder: SessionFolder) -> tuple[Any, Any] | None:

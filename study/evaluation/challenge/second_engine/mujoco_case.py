@@ -42,7 +42,7 @@ def draw_mujoco_case(
     still = moved(free, plan.command)
     device, sensing, truth = free, Device(bench), []
     peak = np.minimum(np.abs(still[0]).max(axis=0), RANGE_MPS2)
-    for effect, strong in zip((EFFECTS[one] for one in effects), strength, strict=True):
+    for effect, strong in zip((EFFECTS[each] for each in effects), strength, strict=True):
         axis = rig.axes[int(random.integers(len(rig.axes)))]
         at = Circumstances(random, strong, bench, axis, np.abs(still[1]).max(axis=0), peak, rig.axes)
         values = effect.draw(at)
