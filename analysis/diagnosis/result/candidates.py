@@ -98,15 +98,7 @@ def with_balances(
         for effect in diagnosis.effects
         if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
-    named = {
-        (name, effect.axis)
-        for effect in effects
-        for name in (
-            effect.effect,
-            *effect.class_,
-            *(rival.effect for rival in effect.rivals if rival.why_not == REFINED),
-        )
-    }
+    named = {(name, effect.axis) for effect in effects for name in _told_with(effect)}
     found = [
         (_rank(law), _candidate(law, axis_letter(channels[axis], channels)))
         for axis, balance in enumerate(balances)
@@ -119,6 +111,12 @@ def with_balances(
     if not effects and diagnosis.effects:
         verdict = "parameters" if verdict == "explained" else "unexplained"
     return replace(diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
+
+
+def _told_with(effect: NamedEffect) -> tuple[str, ...]:
+    """Names that are no candidates beside it: its own, its class, and what only refines it."""
+    refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINED)
+    return (effect.effect, *effect.class_, *refined)
 
 
 def _rank(weighed: Weighed) -> int:

@@ -104,5 +104,6 @@ def _injected(outcome: InjectedOutcome) -> InjectedRow:
     values = " ".join(f"{name}={value:.6g}" for name, value in outcome.values.items())
     return InjectedRow(
         outcome.recording, outcome.injected or "nothing", outcome.strength, values, outcome.change,
-        outcome.detectable, outcome.judged, outcome.verdict, " ".join(outcome.named), " ".join(outcome.returned), outcome.seconds,
+        outcome.detectable, outcome.judged, outcome.verdict, " ".join(outcome.named),
+        " ".join(outcome.returned), outcome.seconds,
     )  # fmt: skip

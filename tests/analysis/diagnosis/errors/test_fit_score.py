@@ -47,9 +47,9 @@ def test_recordings_count_by_their_samples(arena_of):
     assert rms_over((record, cut), (long, short), masks) == pytest.approx(np.sqrt((n + 90) / (n + 10)))
 
 
-def test_the_worst_channel_is_seen_and_all_are_chosen_by():
+def test_the_worst_channel_and_the_mean_of_all():
     score = FitScore(np.array([1.0, np.e]), np.array([1.0, 1.0]), np.array([9.0, 9.0]))
-    assert score.seen == pytest.approx(np.e)
+    assert score.worst_channel == pytest.approx(np.e)
     assert score.mean_log_error == pytest.approx(0.5)
 
 
