@@ -9,11 +9,11 @@ import rigs
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices import cells
-from study.devices.block import _TICK
 from study.devices.device import DeviceSettings, Fault
-from study.devices.govern import ROWS, VECTOR
-from study.devices.governor import Governor
+from study.devices.drive.runner import _TICK
+from study.devices.governor import cells
+from study.devices.governor.govern import ROWS, VECTOR
+from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
@@ -235,8 +235,8 @@ class Played:
 
 
 def play(hold: Hold, tick=None) -> Played:
-    """`tick`: of `study.devices.govern`, compiled, or a plain function in its place."""
-    from study.devices import govern
+    """`tick`: of `study.devices.governor.govern`, compiled, or a plain function in its place."""
+    from study.devices.governor import govern
 
     governor = Governor(rigs.INFO, hold.settings)
     governor.begin_hold(hold.stimulus)

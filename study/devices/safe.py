@@ -1,7 +1,7 @@
 """The device behind its safety layer: the `Device` port over any rig, compiled or stepped, in any time.
 
-What a force may be is decided in `study.devices.govern`, what is refused beforehand in `study.devices.admission`,
-when ticks run in `virtual_drive` and `realtime_drive`.
+What a force may be is decided in `governor.govern`, what is refused beforehand in `admission`, when ticks run in
+`drive.virtual_drive` and `drive.realtime_drive`.
 """
 
 import atexit
@@ -15,14 +15,14 @@ from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
-from study.devices.governor import SETTLE_S, Governor
-from study.devices.played import played_loop, played_once
-from study.devices.realtime_drive import RealtimeDrive
+from study.devices.drive.played import played_loop, played_once
+from study.devices.drive.realtime_drive import RealtimeDrive
+from study.devices.drive.runner import CompiledRunner, Runner
+from study.devices.drive.seen import look_of
+from study.devices.drive.stepped_runner import SteppedRunner
+from study.devices.drive.virtual_drive import VirtualDrive
+from study.devices.governor.governor import SETTLE_S, Governor
 from study.devices.rig import CompiledRig, Rig
-from study.devices.runner import CompiledRunner, Runner
-from study.devices.seen import look_of
-from study.devices.stepped_runner import SteppedRunner
-from study.devices.virtual_drive import VirtualDrive
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 

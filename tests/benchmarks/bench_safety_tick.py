@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from study.devices import govern
-from study.devices.block import run_block
 from study.devices.clock import VirtualClock
-from study.devices.governor import Governor
+from study.devices.drive.runner import run_block
+from study.devices.governor import govern
+from study.devices.governor.governor import Governor
 from study.devices.opening import open_device
 from study.devices.rig import READING_SIZE, CompiledRig
 from study.devices.safe import SafeDevice

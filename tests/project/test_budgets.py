@@ -29,26 +29,10 @@ CATALOGUES = {
 """Folders of things of one kind, each in a file that is found by its name: neither crowded nor with files too small."""
 
 LONG_FILES: set[str] = set()
-CROWDED = {
-    "study/devices",
-}
 SMALL_BESIDE_THEIR_IMPORTER = {
     "analysis/diagnosis/discovery/along.py",
     "analysis/diagnosis/result/error_table.py",
-    "equalizer/effects/simulation/low_pass_kernel.py",
-    "study/devices/accelerometer/packet.py",
-    "study/devices/block.py",
-    "study/devices/glances.py",
-    "study/devices/played.py",
     "study/devices/rigs_by_name.py",
-    "study/devices/simulated/drives.py",
-    "study/devices/simulated/friction.py",
-    "study/devices/simulated/isotropy.py",
-    "study/devices/simulated/random_numbers.py",
-    "study/devices/simulated/sensors.py",
-    "study/devices/simulated/stops.py",
-    "study/devices/standby.py",
-    "study/tui/app/asked_screens.py",
     "study/tui/app/everywhere.py",
     "study/tui/app/load_screens.py",
     "study/tui/app/outcomes.py",
@@ -115,8 +99,7 @@ def test_a_file_holds_one_thing():
 def test_a_folder_can_be_taken_in_at_a_glance():
     modules = [path.parent for path in SOURCES if path.name != "__init__.py"]
     full = {short(folder) for folder in modules if modules.count(folder) > FILES_IN_A_FOLDER}
-    assert full - CATALOGUES.keys() - CROWDED == set(), "make rooms"
-    assert CROWDED - full == set(), "no longer crowded: take it from the list"
+    assert full - CATALOGUES.keys() == set(), "make rooms"
     assert all((ROOT / folder).is_dir() for folder in CATALOGUES)
 
 

@@ -48,7 +48,7 @@ def test_a_session_begins_and_a_file_is_checked_without_statistics_and_plots():
 def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():
     screens = sorted((ROOT / "study" / "tui" / "screens").glob("*.py"))
     names = [f"study.tui.screens.{module.stem}" for module in screens if module.stem != "__init__"]
-    apps = ("study.cli.main", "study.tui.app.app", "study.tui.app.asked_screens", "study.tui.watch.watch_app")
+    apps = ("study.cli.main", "study.tui.app.app", "study.tui.app.sitting_screens", "study.tui.watch.watch_app")
     everything = ", ".join((*apps, *names))
     loaded = loaded_by(f"import {everything}")
     assert "textual" in loaded

@@ -1,7 +1,7 @@
 """The compiled entry points. Their machine code is kept on disk, so that only a first run waits for the compiler.
 
 Most of the mechanism stands in other files of this folder: each entry point encloses the fingerprint of them all, as
-`study.devices.compiling` explains.
+`study.devices.governor.compiling` explains.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ from numba import njit, types
 from numpy import uint64
 
 from equalizer.signals.signal import FloatArray
-from study.devices.compiling import fingerprint
+from study.devices.governor.compiling import fingerprint
 from study.devices.simulated.dynamics import integrate_tick
 from study.devices.simulated.linkage import inverse_kinematics
 from study.devices.simulated.sensors import read_sensors

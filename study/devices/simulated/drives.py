@@ -1,7 +1,11 @@
-"""The three drives: amplifier, motor with friction, and the cable that pulls the arm."""
+"""The three drives: amplifier, motor with friction, and the cable that pulls the arm.
+
+Friction is Dahl's (P. R. Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14(12), 1976): a bristle
+that bends as an elastic spring first and slips at the Coulomb level. It is passive, holds without creep, and has no
+corner at zero speed where a simulation at a fixed step would chatter.
+"""
 
 from equalizer.signals.signal import FloatArray
-from study.devices.simulated.friction import bent_bristle
 from study.devices.simulated.inlined import inlined
 from study.devices.simulated.layout import (
     AMPLIFIER,
@@ -18,6 +22,13 @@ from study.devices.simulated.layout import (
     TORQUE,
     VELOCITY,
 )
+
+
+@inlined
+def bent_bristle(bristle: float, travel: float, longest: float) -> float:
+    """The bristle's bend after a `travel`, both rad: dz = dx - |dx| z / longest, solved backwards, so |z| <= longest
+    for any step."""
+    return (bristle + travel) / (1.0 + abs(travel) / longest)
 
 
 @inlined

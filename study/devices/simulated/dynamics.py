@@ -4,6 +4,7 @@ The linkage (Jacobian, mass matrix) is taken once per tick at the handle's predi
 (cables, handle, base, friction) takes finer steps, speeds before positions, which keeps energy from growing.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,12 +26,29 @@ from study.devices.simulated.layout import (
     ROCKING,
     ROCKING_SPEED,
     STEP_S,
+    STOP_DAMPING,
+    STOP_RADIUS,
+    STOP_STIFFNESS,
     SUBSTEPS,
     TICK_S,
     VELOCITY,
 )
 from study.devices.simulated.linkage import inverse_kinematics
-from study.devices.simulated.stops import add_stops
+
+
+@inlined
+def add_stops(state: FloatArray, parameters: FloatArray, pull: FloatArray) -> None:
+    """Adds to pull[:3] the force of a spherical cushion. It damps on the way out only, and never sucks."""
+    x, y, z = state[RELATIVE], state[RELATIVE + 1], state[RELATIVE + 2]
+    radius = math.sqrt(x * x + y * y + z * z)
+    depth = radius - parameters[STOP_RADIUS]
+    if depth <= 0.0:
+        return
+    outwards = (x * state[VELOCITY] + y * state[VELOCITY + 1] + z * state[VELOCITY + 2]) / radius
+    push = parameters[STOP_STIFFNESS] * depth + parameters[STOP_DAMPING] * max(outwards, 0.0)
+    pull[0] -= push * x / radius
+    pull[1] -= push * y / radius
+    pull[2] -= push * z / radius
 
 
 class Held(NamedTuple):

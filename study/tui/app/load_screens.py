@@ -5,7 +5,7 @@ import threading
 from importlib import import_module
 
 NEEDED_LATER = (
-    "study.tui.app.asked_screens",
+    "study.tui.app.sitting_screens",
     "study.tui.screens.trial",
     "study.tui.screens.help",
     "textual.widgets._markdown",

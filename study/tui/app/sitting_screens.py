@@ -20,6 +20,41 @@ if TYPE_CHECKING:
 from textual._styles_cache import StylesCache
 from textual.widgets import Footer
 
+from study.tui.screens.await_return import AwaitReturnScreen
+from study.tui.screens.demo import DemoScreen
+from study.tui.screens.device_check import DeviceCheckScreen
+from study.tui.screens.form import FormScreen
+from study.tui.screens.goodbye import GoodbyeScreen
+from study.tui.screens.handle import HandleScreen
+from study.tui.screens.instructions import InstructionsScreen
+from study.tui.screens.pause import PauseScreen
+from study.tui.screens.playing import PlayingScreen
+from study.tui.screens.practice_over import PracticeOverScreen
+from study.tui.screens.rest import RestScreen
+from study.tui.trial_replies import LEAVING
+
+SCREENS: dict[Call, Callable[[Any], Screen[Any]]] = {
+    Call.FILL_IN: FormScreen,
+    Call.DEVICE_CHECKED: DeviceCheckScreen,
+    Call.SHOW_PLAYING: PlayingScreen,
+    Call.AWAIT_HANDLE: HandleScreen,
+    Call.PRACTICE_OVER: PracticeOverScreen,
+    Call.REST: RestScreen,
+    Call.AWAIT_RETURN: AwaitReturnScreen,
+    Call.GOODBYE: GoodbyeScreen,
+}
+
+
+def screen_for(ask: Ask, keys: AnswerKeys) -> Screen[Any]:
+    """Of all but the trial, whose one screen stays for the whole sitting. Each is dismissed with the reply."""
+    if ask.call is Call.WELCOME:
+        return InstructionsScreen(ask.shown, keys)
+    if ask.call is Call.CHOOSE_DEMO:
+        return DemoScreen(ask.shown, keys)
+    if ask.call is Call.PAUSE:
+        return PauseScreen(ask.shown, leaving=ask.shown.reason == LEAVING.reason)
+    return SCREENS[ask.call](ask.shown)
+
 
 def forget_drawn_before(app: App[Any]) -> None:
     """What Textual 8.2 keeps of widgets that are gone. Searching it for garbage holds the event loop up: for longer
@@ -104,7 +139,7 @@ class SittingScreens:
             trial = self._trial if self._trial is not None else await self._trial_screen()
             trial.arm(ask.shown)
             return
-        from study.tui.app.asked_screens import screen_for
+        from study.tui.app.sitting_screens import screen_for
 
         self._shown = screen_for(ask, self._keys)
         await self._app.push_screen(self._shown, partial(self._dismissed, ask.number))

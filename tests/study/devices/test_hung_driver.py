@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.devices import govern
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.governor import Governor
+from study.devices.drive.stepped_runner import SteppedRunner
+from study.devices.governor import govern
+from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
-from study.devices.stepped_runner import SteppedRunner
 from study.errors import DeviceError
 
 pytestmark = pytest.mark.real_time

@@ -11,7 +11,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.glances import PATIENCE_S, Glances
+from study.devices.drive.realtime_drive import PATIENCE_S, Glances
 from study.devices.rig import READING_SIZE
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError

@@ -28,15 +28,15 @@ NAMED_IN = {
     "dhdSetForce": {"study/devices/force_dimension/handle.py", "study/devices/force_dimension/library.py"},
     "CompiledRunner": {"study/devices/safe.py"},
     "SteppedRunner": {"study/devices/safe.py"},
-    "Standby": {"study/devices/stepped_runner.py"},
-    "run_block": {"study/devices/runner.py"},
+    "Standby": set(),
+    "run_block": set(),
 }
 """Where else than at home a name may stand at all: imported, called, under another name or as a string."""
 
 CALLED_IN = {
     "CompiledRig": {"study/devices/simulated/omega3.py"},
-    "advance": {"study/devices/block.py"},
-    "write": {"study/devices/stepped_runner.py"},
+    "advance": {"study/devices/drive/runner.py"},
+    "write": {"study/devices/drive/stepped_runner.py"},
 }
 """`write` and `advance` count inside study/devices only: files are written elsewhere."""
 

@@ -10,11 +10,11 @@ import pytest
 from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.governor import Governor
-from study.devices.realtime_drive import RealtimeDrive
-from study.devices.runner import CompiledRunner
+from study.devices.drive.realtime_drive import RealtimeDrive
+from study.devices.drive.runner import CompiledRunner
+from study.devices.drive.stepped_runner import SteppedRunner
+from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
-from study.devices.stepped_runner import SteppedRunner
 from study.errors import DeviceError, ExitCode
 
 

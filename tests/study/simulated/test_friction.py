@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study.devices.simulated.friction import bent_bristle
+from study.devices.simulated.drives import bent_bristle
 
 LONGEST = 2e-4
 

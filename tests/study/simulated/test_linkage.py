@@ -4,10 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study.devices.simulated.compiled import pose
-from study.devices.simulated.isotropy import isotropic_depth_m
 from study.devices.simulated.layout import PLATFORM_DEPTH
 from study.devices.simulated.linkage import forward_kinematics
-from study.devices.simulated.packing import pack_parameters
+from study.devices.simulated.packing import isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import Linkage, Omega3Parameters
 
 PARAMETERS = pack_parameters(Omega3Parameters(), hand=False, place_m=(0, 0, 0))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from study.devices.simulated.random_numbers import three_normals, uniform
+from study.devices.simulated.sensors import three_normals, uniform
 
 
 @njit

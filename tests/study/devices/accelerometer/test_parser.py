@@ -9,8 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.devices.accelerometer.packet import CHECKED, SIZE, SYNC, crc_of, packed
-from study.devices.accelerometer.parser import PacketParser
+from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, crc_of, packed
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
 

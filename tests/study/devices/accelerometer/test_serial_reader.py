@@ -12,7 +12,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP, Calibration
-from study.devices.accelerometer.packet import SIZE, packed
+from study.devices.accelerometer.parser import SIZE, packed
 from study.devices.accelerometer.serial_reader import FRESH_S, SerialAccelerometer, open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
 from study.devices.force_dimension.lab import SensorSettings

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from study.devices.accelerometer.packet import LAYOUT, SIZE
+from study.devices.accelerometer.parser import LAYOUT, SIZE
 from study.devices.force_dimension.lab import LabSettings
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.usb import RULE, RULE_FILE

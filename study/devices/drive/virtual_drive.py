@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from study.devices.clock import VirtualClock
-from study.devices.governor import Governor
-from study.devices.runner import Runner
+from study.devices.drive.runner import Runner
+from study.devices.governor.governor import Governor
 
 
 class VirtualDrive:

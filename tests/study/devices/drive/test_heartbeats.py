@@ -9,11 +9,11 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.devices.device import Fault
-from study.devices.governor import Governor
-from study.devices.realtime_drive import LATE_S, RealtimeDrive
-from study.devices.runner import CompiledRunner
+from study.devices.drive.realtime_drive import LATE_S, RealtimeDrive
+from study.devices.drive.runner import CompiledRunner
+from study.devices.drive.stepped_runner import SteppedRunner
+from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
-from study.devices.stepped_runner import SteppedRunner
 
 pytestmark = pytest.mark.real_time
 

@@ -4,6 +4,10 @@ A stimulus is a function of time. Ticks that come late are caught up where the w
 it does not, they are counted as missed and the waveform goes on where the time is, never stretched.
 
 The thread watches its callers (the governor's watchdog), and every caller watches the thread (`check`).
+
+Readings while nothing moves are asked of the same thread: a rig is driven by one thread even then, a stimulus that
+begins meanwhile cannot collide with the reading, and a driver that hangs keeps a caller waiting for at most
+`PATIENCE_S`.
 """
 
 import math
@@ -12,10 +16,48 @@ from collections.abc import Callable
 
 from study.devices.clock import Clock
 from study.devices.device import Fault
-from study.devices.glances import Glances
-from study.devices.governor import Governor
-from study.devices.runner import Runner
-from study.devices.virtual_drive import ticks_by
+from study.devices.drive.runner import Runner
+from study.devices.drive.virtual_drive import ticks_by
+from study.devices.governor.governor import Governor
+
+PATIENCE_S = 0.1
+"""A reading takes well below a millisecond; a busy computer is late by some 10 ms."""
+
+
+class _Request:
+    def __init__(self, until_s: float) -> None:
+        self.until_s = until_s
+        self.taken = threading.Event()
+
+
+class Glances:
+    """One request at a time: who asks while another waits gets the same reading."""
+
+    def __init__(self, clock: Clock, wake: Callable[[], None]) -> None:
+        """`wake` lets the loop's thread look whether something is `wanted`."""
+        self._clock = clock
+        self._wake = wake
+        self._asking = threading.Lock()
+        self._request: _Request | None = None
+
+    def ask(self) -> bool:
+        """Wait for a reading. False where none came in time; a request that is late already is not waited for."""
+        with self._asking:
+            request = self._request
+            if request is None or request.taken.is_set():
+                self._request = request = _Request(self._clock.now_s() + PATIENCE_S)
+        self._wake()
+        return request.taken.wait(min(PATIENCE_S, max(0.0, request.until_s - self._clock.now_s())))
+
+    @property
+    def wanted(self) -> bool:
+        return self._request is not None and not self._request.taken.is_set()
+
+    def taken(self) -> None:
+        """To be said by the loop's thread after a reading."""
+        if self._request is not None:
+            self._request.taken.set()
+
 
 LEISURELY_S = 0.003
 """Between two pumps of a simulated rig: nobody feels it, so it need not wake for each tick."""

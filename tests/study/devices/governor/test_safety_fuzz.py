@@ -10,11 +10,11 @@ import pytest
 from hypothesis import settings as hypothesis_settings
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 
-from study.devices import govern
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
-from study.devices.governor import Governor
-from study.devices.runner import CompiledRunner
+from study.devices.drive.runner import CompiledRunner
+from study.devices.governor import govern
+from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 

@@ -1,4 +1,4 @@
-"""The governed tick's arrays and what may be asked of them: the only hands that touch `study.devices.govern` cells."""
+"""The governed tick's arrays and what may be asked of them: nothing else touches the cells of `govern`."""
 
 import math
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
 from protocols.definition.plausibility import PlausibilitySettings
-from study.devices import cells, govern
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health
+from study.devices.governor import cells, govern
 from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
@@ -161,7 +161,7 @@ class Governor:
 
 
 def packed_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
-    """The cells of `study.devices.govern` that hold from opening to closing."""
+    """The cells of `study.devices.governor.govern` that hold from opening to closing."""
     limits, rate_hz = settings.limits, info.sample_rate_hz
     packed = np.zeros(cells.SETTINGS_SIZE)
     packed[cells.TICK_S] = 1.0 / rate_hz

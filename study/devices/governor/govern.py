@@ -11,15 +11,15 @@ from typing import Any
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices.compiling import fingerprint, part
-from study.devices.confine import BEYOND, WITHIN, below, clear, confine, norm_of
-from study.devices.feedback import add_feedback
-from study.devices.plausibility import fault_of_reading
+from study.devices.governor.compiling import fingerprint, part
+from study.devices.governor.confine import BEYOND, WITHIN, below, clear, confine, norm_of
+from study.devices.governor.feedback import add_feedback
+from study.devices.governor.plausibility import fault_of_reading
 from study.devices.rig import SENSOR_CLIPPED
 
 # isort: off
 # fmt: off
-from study.devices.cells import (
+from study.devices.governor.cells import (
     ELAPSED, EXCITATION, FADE_IN, FADE_OUT, FAULT, FORCE, HELD_TOO_LONG, LAST_POSITION, LAST_SIGN, LEAD, LENGTH,
     LETTING_GO, LET_GO_ASKED, LET_GO_AT, LET_GO_FROM, LET_GO_TICKS, LONGEST, NOT_A_NUMBER, NO_FAULT, PEAK,
     PHASE, PLAYING, RAISED_COSINE, READ_AT, READ_AT_S, RECORDED, RECORD_FROM, RELEASED_AT, RELEASE_ASKED,

@@ -11,8 +11,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from study.devices import cells, compiling, confine, feedback, govern, plausibility
 from study.devices.device import Fault
+from study.devices.governor import cells, compiling, confine, feedback, govern, plausibility
 
 TICKS_OF_HOLD = 2500
 ENCODERS = {Fault.NOT_A_NUMBER, Fault.OUTSIDE, Fault.JUMPED, Fault.SHAKEN, Fault.STALE}
@@ -251,7 +251,7 @@ def test_time_stamps_of_a_loop_are_what_the_speed_is_made_from(rigs):
 
 
 def govern_at_rest(rigs, damping: float):
-    from study.devices.governor import Governor
+    from study.devices.governor.governor import Governor
 
     governor = Governor(rigs.INFO, replace(rigs.SETTINGS, spring_frequency_hz=0.0, spring_damping_n_s_per_m=damping))
     governor.begin_hold(rigs.sine(0.0, fade_s=0.0))

@@ -3,7 +3,7 @@
 import math
 
 from equalizer.signals.signal import FloatArray
-from study.devices.compiling import part
+from study.devices.governor.compiling import part
 
 OVERFLOWING = 1e100
 

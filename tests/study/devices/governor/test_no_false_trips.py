@@ -7,9 +7,9 @@ import pytest
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
-from study.devices.governor import Governor
+from study.devices.drive.runner import CompiledRunner
+from study.devices.governor.governor import Governor
 from study.devices.rigs_by_name import RIGS_BY_NAME
-from study.devices.runner import CompiledRunner
 
 FREQUENCIES_HZ = (1, 2, 3, 5, 10, 15, 25, 35, 45, 80, 134, 250, 500)
 LEVELS_N = (0.0, 0.05, 0.3, 0.6, 0.8, 1.2, 2.0, 3.0)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.devices import cells, govern
 from study.devices.device import Fault, Health
-from study.devices.governor import Governor
-from study.devices.runner import CompiledRunner
+from study.devices.drive.runner import CompiledRunner
+from study.devices.governor import cells, govern
+from study.devices.governor.governor import Governor
 
 
 class Bench:

@@ -4,7 +4,7 @@ wrong in a way that nothing can tell pulls with no more than that."""
 import math
 
 from equalizer.signals.signal import FloatArray
-from study.devices.cells import (
+from study.devices.governor.cells import (
     CENTRE_X,
     DAMPING,
     EASE_TICKS,
@@ -21,8 +21,8 @@ from study.devices.cells import (
     VELOCITY,
     VELOCITY_SHARE,
 )
-from study.devices.compiling import part
-from study.devices.confine import BEYOND, kept_share, norm_of
+from study.devices.governor.compiling import part
+from study.devices.governor.confine import BEYOND, kept_share, norm_of
 
 
 @part

@@ -4,9 +4,9 @@ import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
-from study.devices.cells import ROW_SIZE
 from study.devices.device import DeviceInfo, Fault, Played
-from study.devices.governor import Governor
+from study.devices.governor.cells import ROW_SIZE
+from study.devices.governor.governor import Governor
 
 COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) for start in range(0, ROW_SIZE, 3))
 

@@ -7,7 +7,7 @@ the feedback's cap at the most.
 import math
 
 from equalizer.signals.signal import FloatArray
-from study.devices.cells import (
+from study.devices.governor.cells import (
     ACCELERATION,
     ACCELERATION_SHARE,
     CHANGED,
@@ -39,8 +39,8 @@ from study.devices.cells import (
     UNCHANGED,
     WORKSPACE,
 )
-from study.devices.compiling import part
-from study.devices.confine import below, norm_of
+from study.devices.governor.compiling import part
+from study.devices.governor.confine import below, norm_of
 
 IMPLAUSIBLE_M = 0.5
 """Beyond it a reading counts as no number at all."""
