@@ -56,7 +56,6 @@ RETUNING_NAMED, RETUNING_DOUBTED = 1.0, 3.0  # standard deviations from which a 
 
 # Where a mismatch sits (`mismatch_cells`, `level_trends`, `entry_point`, `tied_states`). By hand.
 FALSE_DISCOVERY_RATE = 0.01  # of cells and states, by the test of Benjamini and Bogomolov (2014)
-EQUIVALENCE_MARGIN = 0.02  # share of the signal in a cell that is no mismatch
 DISTORTION_P = 0.001  # p-value below which a kind of distortion is there
 STEADY_DB = 1.5  # change of distortion per doubling of the level that is neither rising nor falling
 ENTRY_ANGLE = 0.1  # mean sine between two entries' directions below which they cannot be told apart

@@ -58,9 +58,9 @@ def mismatch_map_pictures(maps: Maps, unit: str = "N") -> tuple[Picture, ...]:
         Picture(
             name=f"mismatch-map-{number}",
             title=f"Where model and device disagree, driven by {input_}",
-            caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and the "
-            "margin of equivalence, at a false discovery rate of 1 %. Rows: measured channels; columns: octaves, by "
-            f"their lower edge{_level_words(maps, input_, unit)}; grey: not driven there; without "
+            caption="Residual in units of what noise alone would leave: 1 is noise. Framed: more than noise and "
+            "what the model errs by elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
+            f"octaves, by their lower edge{_level_words(maps, input_, unit)}; grey: not driven there; without "
             f"a number: below {_NUMBERED:g}." + _grouped_words(maps, input_),
             figure=draw_mismatch_map(maps, input_, unit),
             folded=number > 1,

@@ -1,6 +1,5 @@
 """How a diagnosis was made, in words, with its own numbers."""
 
-from analysis.diagnosis.localisation.mismatch_cells import Margin
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
 from analysis.wording import listed
@@ -75,7 +74,8 @@ def _choice(found: Findings) -> tuple[str, ...]:
 
 def _map() -> str:
     return (
-        f"In the map, a mismatch of {100 * Margin().share:g} % of the signal, or as much as recordings in which "
-        "nothing is missing have, counts as none. Significant is what is larger beyond noise, with false discoveries "
-        f"held at {100 * FALSE_DISCOVERY_RATE:g} % by closed testing: channel, then band, then level."
+        "In the map, what recordings in which nothing is missing have counts as no mismatch; what "
+        "the most complete model errs by on held-out data of the same channel, in the same octave and those beside it, "
+        "counts as its usual error. Significant is what is larger beyond all that and noise, with false "
+        f"discoveries held at {100 * FALSE_DISCOVERY_RATE:g} % by closed testing: channel, then band, then level."
     )

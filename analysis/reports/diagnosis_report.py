@@ -3,14 +3,18 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
-from analysis.diagnosis.result.ceiling_wording import black_box_beats, black_box_sentence, ceiling_sentences
+from analysis.diagnosis.result.ceiling_wording import (
+    black_box_beats,
+    black_box_sentence,
+    ceiling_sentences,
+    confirmation_sentence,
+)
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.localisation_words import localisation_sentences
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.retuned_numbers import doubtful_sentences, retuned_sentence
 from analysis.diagnosis.result.wording import (
     answer_of,
-    confirmation_sentence,
     device_of,
     effect_sentence,
     effect_title,

@@ -43,7 +43,7 @@ def localised(
     measure: ErrorMeasure, tuning: Tuning, stages: Mapping[str, Fitted], floors: tuple[NoiseFloor, ...], cells: Cells
 ) -> Localisation:
     """Of the first recording, which stands for the device. stages: see `Explanation.stages`."""
-    left = any(cell.significant for cell in cells["retuned"])
+    left = any(cell.beyond_noise for cell in cells["retuned"])
     entry = _entry(measure, tuning, stages["retuned"], floors[0]) if left else None
     states = {stage: _states(measure, tuning, fitted, cells[stage], entry) for stage, fitted in stages.items()}
     return Localisation(states, entry, distortion(measure.records[0].recording, floors[0]))
@@ -72,7 +72,7 @@ def _states(
     cells: tuple[MismatchCell, ...],
     entry: EntryPoint | None,
 ) -> tuple[StateMismatch, ...]:
-    if not any(cell.significant for cell in cells):
+    if not any(cell.beyond_noise for cell in cells):
         return ()
     recording, evidence = measure.records[0].recording, gather_evidence(measure, tuning, fitted)[0]
     best = entry.ranking[0] if entry is not None and entry.ranking else None

@@ -1,6 +1,7 @@
 """Tests of prediction against recording, per cell: channel x driving input x octave x level.
 
-The residual is tested against noise and a margin of equivalence: a model that is two per cent off is not wrong physics.
+The residual is tested against noise, and what counts as none beside it: what clean recordings have, where there are
+any; `model_error` tests it against what a model errs by elsewhere.
 """
 
 from collections.abc import Hashable, Sequence
@@ -14,7 +15,7 @@ from analysis.diagnosis.data.line_statistics import noncentral_f_sf
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.settings import EQUIVALENCE_MARGIN, FALSE_DISCOVERY_RATE
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -34,7 +35,7 @@ class Prediction:
 class Margin:
     """What is no mismatch: so much of the signal in a cell, and what clean recordings have, squares added."""
 
-    share: float = EQUIVALENCE_MARGIN
+    share: float = MODEL_FLOOR
     learned: CleanFloor = field(default_factory=CleanFloor)
 
     def of(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
@@ -64,6 +65,16 @@ class MismatchCell:
     adjusted_p_value: float
     """For the number of cells, within channel and band."""
     seconds: float
+    lines: float = 1.0
+    """That are independent of each other."""
+    freedom: float = 1.0
+    """Degrees of freedom that the noise is known with."""
+    signal_in_noise: float = 0.0
+    """Power of `signal_rms` over the noise's, mean over the lines."""
+    part: int = 0
+    """Of the recordings' parts, in which it lies."""
+    beyond_noise: bool = False
+    """More than noise and margin leave, whatever the model errs by elsewhere."""
 
     @property
     def share(self) -> float:
@@ -100,7 +111,7 @@ def mismatch_cells(
             groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
         for group in groups.values():
             cells += [_cell(group, k, name, observation, allowed) for k, name in enumerate(channels)]
-    return _adjusted(cells)
+    return tuple(replace(cell, beyond_noise=cell.significant) for cell in adjusted(cells))
 
 
 def _observations(
@@ -129,19 +140,20 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, 
         for what in ("residual", "noise", "signal")
     )
     ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
-    shift = 2 * allowed**2 * sum(float(part.signal_to_noise[k]) for part in group)
-    p_value = float(noncentral_f_sf(ratio, lines.sum(), max(float(seen.noise.freedom[k]), 1.0), shift))
+    loud, freedom = sum(float(part.signal_to_noise[k]) for part in group), max(float(seen.noise.freedom[k]), 1.0)
+    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * loud))
     return MismatchCell(
         name, quantity, first.input, first.band_hz, first.amplitude,
         float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(ratio)),
-        allowed, p_value, 1.0, float(seconds.sum()),
+        allowed, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom, loud / float(lines.sum()),
     )  # fmt: skip
 
 
-def _adjusted(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
+def adjusted(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
+    """With p-values for the number of cells."""
     paths = [((cell.output, cell.quantity), cell.band_hz) for cell in cells]
-    adjusted = closed_adjusted(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
-    return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, adjusted, strict=True))
+    p_values = closed_adjusted(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
+    return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, p_values, strict=True))
 
 
 def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
@@ -158,8 +170,7 @@ def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
 
 # Many tests at once: false discoveries are controlled family by family, and only below what was found. Families nest
 # (channel, then band, then cell). A family's own p-value is Simes' of its members. Members of a family are looked at
-# only where the family was found, at a level lowered by the share of families that were (Benjamini and Bogomolov
-# 2014).
+# only where the family was found, at a level lowered by the share of families that were (Benjamini and Bogomolov 2014).
 def closed_adjusted(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
     """Adjusted p-values (tests,): found are those up to `level`.
 

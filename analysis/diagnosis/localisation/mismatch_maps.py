@@ -1,9 +1,10 @@
 """Where the given, the re-tuned and the completed model disagree with what was recorded, by channel, band and level."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import ttest_1samp
 
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -11,9 +12,12 @@ from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import Margin, MismatchCell, Prediction, mismatch_cells
+from analysis.diagnosis.localisation.model_error import beyond_error, model_error
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 
 Cells = tuple[MismatchCell, ...]
+STRETCHES = 16
+"""Of a record, that errors are taken over."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,12 +40,16 @@ def maps_of(
     floors: tuple[NoiseFloor, ...],
     learned: CleanFloor | None = None,
 ) -> Maps:
-    """stages: see `Explanation.stages`. learned: what is no mismatch, from clean recordings."""
-    return Maps({stage: cells_of(measure, fitted, floors, learned) for stage, fitted in stages.items()})
+    """stages: see `Explanation.stages`. learned: what is no mismatch, from clean recordings; beside it, what the
+    last stage errs by on held-out samples is none."""
+    cells = {stage: cells_of(measure, fitted, floors, learned) for stage, fitted in stages.items()}
+    error = model_error(cells_of(measure, stages["after"], floors, held_out=True))
+    return Maps({stage: beyond_error(own, error) for stage, own in cells.items()})
 
 
-def whole_mismatch(measure: ErrorMeasure, stands: FitScore) -> tuple[Mismatch, ...]:
-    """One row for the worst channel over the whole band, where no cell can be told apart from its neighbours."""
+def whole_mismatch(measure: ErrorMeasure, stands: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
+    """One row for the worst channel over the whole band, where no place stands out. Its p-value is that of more than
+    noise, in the mean over stretches (one-sided t test)."""
     record = measure.records[0].recording
     errors = np.fmax(np.maximum(stands.fit, stands.choose), stands.test)
     worst = int(np.argmax(errors))
@@ -49,18 +57,38 @@ def whole_mismatch(measure: ErrorMeasure, stands: FitScore) -> tuple[Mismatch, .
     signal = np.sqrt(np.nanmean(measure.records[0].measured[:, worst] ** 2))
     left = float(errors[worst] * measure.noise[worst])
     share = min(left / signal, 1.0) if signal > 0 else 1.0
-    inputs = "+".join(record.command.channels)
-    return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, 0.0),)
+    inputs, p_value = "+".join(record.command.channels), _more_than_noise(measure, fitted, worst)
+    return (Mismatch(names[worst], inputs, (0.0, record.sample_rate_hz / 2), None, None, share, p_value),)
+
+
+def _more_than_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> float:
+    """p-value of a larger error power than noise's, over stretches of time: within one, errors hang together."""
+    powers = []
+    for record, residuals in zip(measure.records, fitted.residuals, strict=True):
+        left = residuals[record.fit | record.choose | record.test, channel]
+        powers += [float(np.mean(part**2)) for part in np.array_split(left, STRETCHES) if len(part)]
+    over = np.array(powers) * (measure.unit[channel] / measure.noise[channel]) ** 2
+    known = over[np.isfinite(over)]
+    if len(known) < len(over) or len(known) < 2 or np.ptp(known) == 0:
+        return 0.0 if not known.size or known.mean() > 1 else 1.0
+    return float(ttest_1samp(known, 1.0, alternative="greater").pvalue)
 
 
 def cells_of(
-    measure: ErrorMeasure, fitted: Fitted, floors: tuple[NoiseFloor, ...], learned: CleanFloor | None = None
+    measure: ErrorMeasure,
+    fitted: Fitted,
+    floors: tuple[NoiseFloor, ...],
+    learned: CleanFloor | None = None,
+    held_out: bool = False,
 ) -> Cells:
+    """held_out: of samples that nothing was fitted to, alone."""
     margin = Margin(learned=learned or CleanFloor())
     cells: list[MismatchCell] = []
-    for record, residuals, floor in zip(measure.records, fitted.residuals, floors, strict=True):
+    for part, (record, residuals, floor) in enumerate(zip(measure.records, fitted.residuals, floors, strict=True)):
         p = record.recording.response.samples.shape[1]
         predicted = record.measured - residuals * measure.unit
         position = predicted[:, p:] if predicted.shape[1] > p else None
-        cells += mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor, margin=margin)
+        used = record.choose | record.test if held_out else None
+        found = mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor, used, margin)
+        cells += [replace(cell, part=part) for cell in found]
     return tuple(cells)

@@ -26,11 +26,11 @@ _DRIVEN = 0.02
 def tied_forces(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], system: UnitSystem
 ) -> tuple[StateMismatch, ...]:
-    """Of the missing force along each driven axis that has a significant cell. p-values are corrected for all regions
+    """Of the missing force along each driven axis that has a cell beyond noise. p-values are corrected for all regions
     that were looked at."""
     found = []
     for k, channel in enumerate(recording.command.channels):
-        mine = [cell for cell in cells if cell.significant and channel in cell.input.split("+")]
+        mine = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
         if not mine:
             continue
         letter = axis_letter(channel, recording.command.channels)
@@ -53,11 +53,11 @@ def tied_forces(
 def tied_errors(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
 ) -> tuple[StateMismatch, ...]:
-    """Of the error of each response channel among `channels` that has a significant cell."""
+    """Of the error of each response channel among `channels` that has a cell beyond noise."""
     found = []
     for k, channel in enumerate(recording.response.channels):
         own = recording.response.quantities[k]
-        mine = [cell for cell in cells if cell.significant and (cell.output, cell.quantity) == (channel, own)]
+        mine = [cell for cell in cells if cell.beyond_noise and (cell.output, cell.quantity) == (channel, own)]
         if not mine or channel not in channels:
             continue
         reading = evidence.response[:, k]

@@ -80,13 +80,14 @@ def quiet_band_noise(
 ) -> tuple[FloatArray, float] | None:
     """White density (lines, channels) as strong as the median line above all that is driven, and its degrees of
     freedom; None where no band is left above. The median, so that the lines of harmonics do not count."""
-    whole = np.asarray(np.isfinite(np.hstack([samples, instrument_of(recording)])).all(axis=1))
-    if not whole.all():
-        samples = np.where(whole[:, None], samples, np.nanmean(samples, axis=0))
+    instrument = instrument_of(recording)
+    start, stop = _longest_whole(np.hstack([samples, instrument]))
+    samples, command = samples[start:stop], instrument[start:stop]
+    if len(samples) < 2 * _LEAST_LINES:
+        return None
     n = len(samples)
     window = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n))
     lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
-    command = np.where(whole[:, None], instrument_of(recording), 0.0)
     driven = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
     smooth = over_neighbours(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
     if smooth.max() == 0:
@@ -98,6 +99,17 @@ def quiet_band_noise(
     power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
     level = np.median(power[quiet], axis=0) / np.log(2)
     return np.tile(level, (len(frequency_hz), 1)), float(len(quiet))
+
+
+def _longest_whole(samples: FloatArray) -> tuple[int, int]:
+    """First sample, and the one after the last, of the longest stretch without a gap: across one, the edge of what is
+    filled in is heard at all frequencies."""
+    known = np.isfinite(samples).all(axis=1).astype(np.int8)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], known, [0]]))).reshape(-1, 2)
+    if not len(edges):
+        return 0, 0
+    longest = edges[np.argmax(edges[:, 1] - edges[:, 0])]
+    return int(longest[0]), int(longest[1])
 
 
 def _rests(recording: Recording, settling_s: float) -> list[tuple[int, int]]:

@@ -128,14 +128,16 @@ def _document(
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
-        or (() if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score)),
+        or (
+            () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
+        ),
         effects=_named(searched, errors[len(tuning.names) :], said) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
         else impact_remainder(measure, found)
         or mismatch_rows(maps.cells["after"], local.states["after"])
-        or whole_mismatch(measure, found.after.score),
+        or whole_mismatch(measure, found.after.score, fitted),
         fit=errors_of(measure, found),
         error=measure.name,
         next_experiment=None if proposal is None else proposal.document,

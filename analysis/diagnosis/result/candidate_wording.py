@@ -51,6 +51,8 @@ class Device:
     single: bool
     """It has one axis, which then needs no name."""
     system: UnitSystem
+    noise: str = ""
+    """`NoiseFloor.how`; empty where it is not known."""
 
 
 def class_noun(effect: NamedEffect) -> str:

@@ -1,9 +1,11 @@
-"""What is said of how much could be predicted at all: by all laws together, and by a model without physics."""
+"""Errors on held-out data in plain sentences: beside what noise alone would leave, and beside what could be predicted
+at all, by all laws together and by a model without physics."""
 
 from collections.abc import Sequence
 
+from analysis.diagnosis.document import Errors
 from analysis.diagnosis.result.findings import BlackBox, Reached
-from analysis.diagnosis.settings import SAME_TO_READERS
+from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, share_text
 from analysis.wording import capital
 
@@ -50,3 +52,57 @@ def _ceiling(reached: Reached, single: bool) -> str:
         f"{alone}, and all laws together {error_text(reached.ceiling)}, which no sum of a few laws should be expected "
         f"to beat: {named}{share}."
     )
+
+
+_HEARD = {"rest": "as it is heard at rest", "quiet band": "as it is above the driven band"}
+"""Noise that no repeats show: how strong it is under a drive is not known, so no error is counted in it."""
+
+
+def times_text(ratio: float) -> str:
+    """ "1.04 times"."""
+    return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
+
+
+def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how: str = "") -> str:
+    """first, last: a field of `Errors`, and what it is called. how: `NoiseFloor.how`; empty where it is not known."""
+    before, after = getattr(errors, first[0]), getattr(errors, last[0])
+    if before is None or after is None:
+        return "how much better it predicts held-out data is not known"
+    goes = "falls" if after * SAME_TO_READERS < before else "goes"
+    return (
+        f"the error on held-out data {goes} from {error_text(before)} of the signal ({first[1]}) to "
+        f"{error_text(after)} ({last[1]}){_noise(errors, after, how)}"
+    )
+
+
+def one_error(said: str, error: float | None, errors: Errors, how: str = "") -> str:
+    if error is None:
+        return "its error on held-out data is not known"
+    return f"{said}, its error on held-out data is {error_text(error)} of the signal{_noise(errors, error, how)}"
+
+
+def _noise(errors: Errors, error: float, how: str) -> str:
+    if not errors.noise or how == "unknown":
+        return "; what noise alone would leave is not known"
+    if how in _HEARD:
+        return f"; noise {_HEARD[how]} would leave {error_text(errors.noise)}"
+    return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
+
+
+def confirmation_sentence(fit: Errors, test: Errors) -> str:
+    """Where the held-out data do not bear out the fit; else empty. Both records' errors are counted in their noise."""
+    if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
+        return ""
+    assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise
+    if test.after > test.retuned:
+        return (
+            "The held-out data do not confirm this: there the re-tuned model alone does better "
+            f"({error_text(test.retuned)} of the signal against {error_text(test.after)})."
+        )
+    there, here = test.after / test.noise, fit.after / fit.noise
+    if there > FIT_CONFIRMED * max(here, 1.0):
+        return (
+            f"The held-out data confirm this only in part: {times_text(there)} the noise is left there, "
+            f"{times_text(here)} the noise on what was fitted."
+        )
+    return ""

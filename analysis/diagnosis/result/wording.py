@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
+from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
 from analysis.diagnosis.found_law import law_text
 from analysis.diagnosis.result.candidate_wording import (
@@ -14,7 +14,13 @@ from analysis.diagnosis.result.candidate_wording import (
     class_sentence,
     refinement_sentence,
 )
-from analysis.diagnosis.result.ceiling_wording import black_box_sentence, ceiling_sentences
+from analysis.diagnosis.result.ceiling_wording import (
+    black_box_sentence,
+    ceiling_sentences,
+    confirmation_sentence,
+    fall_text,
+    one_error,
+)
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
@@ -27,11 +33,15 @@ from analysis.diagnosis.result.retuned_numbers import (
     raised_sentence,
     retuned_sentence,
 )
-from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
-from analysis.diagnosis.unit_wording import error_text, probability_text, share_text
+from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
+from analysis.diagnosis.unit_wording import probability_text, share_text
 from analysis.wording import capital, ended, listed, p_text
 
 _PLACES_NAMED = 3
+_NOT_MORE = (
+    "What is left is no more than the noise seems to be; only repeats of a drive would show that nothing else is "
+    "missing."
+)
 
 
 def effect_title(effect: NamedEffect, single: bool = False) -> str:
@@ -54,28 +64,26 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), de
     single = device is not None and device.single
     errors = diagnosis.fit.test
     named = listed([effect_title(effect, single) for effect in diagnosis.effects])
+    how = "" if device is None else device.noise
     if diagnosis.verdict == "no_mismatch":
-        return f"The model answers as the device does: {_one_error('as it was given', errors.before, errors)}."
+        return f"The model answers as the device does: {one_error('as it was given', errors.before, errors, how)}."
     if diagnosis.verdict == "parameters":
         off = (
             f": {listed([number.text for number in moved])}"
             if moved
             else ", each within its calibration's standard deviation"
         )
-        return (
-            f"No physics is missing; numbers of the model are off{off}. "
-            f"{capital(_fall(errors, ('before', 'as given'), ('retuned', 're-tuned')))}."
-        )
-    if diagnosis.verdict == "explained":
-        return f"Missing in the model: {named}. {capital(_fall(errors, better_model(errors), _AFTER))}."
-    if diagnosis.verdict == "partly_explained":
-        return (
-            f"Missing in the model: {named}, but that is not all. "
-            f"{capital(_fall(errors, better_model(errors), _AFTER))}, and a mismatch remains."
-        )
+        fall = fall_text(errors, ("before", "as given"), ("retuned", "re-tuned"), how)
+        return f"No physics is missing; numbers of the model are off{off}. {capital(fall)}."
+    if diagnosis.effects:
+        fall = capital(fall_text(errors, better_model(errors), ("after", "with it"), how))
+        if not significant(diagnosis.remainder):
+            open_ = "" if diagnosis.verdict == "explained" else f" {_NOT_MORE}"
+            return f"Missing in the model: {named}. {fall}.{open_}"
+        return f"Missing in the model: {named}, but that is not all. {fall}, and a mismatch remains."
     said = (
         "Model and device disagree, and no effect of the catalogue explains it. "
-        f"{capital(_one_error(*better_alone(errors), errors))}."
+        f"{capital(one_error(*better_alone(errors), errors, how))}."
     )
     return " ".join(filter(None, (said, best_candidate_sentence(diagnosis, device))))
 
@@ -89,15 +97,7 @@ def answer_of(found: Findings) -> str:
 
 
 def device_of(found: Findings) -> Device:
-    return Device(found.given.inputs == 1, found.given.system)
-
-
-_AFTER = ("after", "with it")
-
-
-def times_text(ratio: float) -> str:
-    """ "1.04 times"."""
-    return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
+    return Device(found.given.inputs == 1, found.given.system, "" if found.floor is None else found.floor.how)
 
 
 def rival_sentences(effect: NamedEffect) -> tuple[str, ...]:
@@ -135,12 +135,17 @@ def _inseparable(effect: NamedEffect) -> str:
 
 def remainder_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:
     """What is still unexplained, in the document's order: what misses most of the signal comes first."""
-    left = diagnosis.remainder
+    left = significant(diagnosis.remainder)
     if not left:
         return "Nothing significant is left unexplained."
     more = len(left) - _PLACES_NAMED
     rest = f"; and {more} smaller {'place' if more == 1 else 'places'}" if more > 0 else ""
     return f"Still unexplained: {'; '.join(place_of(row, device) for row in left[:_PLACES_NAMED])}{rest}."
+
+
+def significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
+    """Without what may be noise: a verdict that no repeats bear out comes with a remainder, however small."""
+    return tuple(row for row in rows if row.p_value <= FALSE_DISCOVERY_RATE)
 
 
 def place_of(mismatch: Mismatch, device: Device | None = None) -> str:
@@ -179,25 +184,6 @@ def gain_sentence(effect: NamedEffect) -> str:
     return f" On held-out data it takes {share_text(max(gain.value, 0.0))} of the error's power ({low} to {high})."
 
 
-def confirmation_sentence(fit: Errors, test: Errors) -> str:
-    """Where the held-out data do not bear out the fit; else empty. Both records' errors are counted in their noise."""
-    if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
-        return ""
-    assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise
-    if test.after > test.retuned:
-        return (
-            "The held-out data do not confirm this: there the re-tuned model alone does better "
-            f"({error_text(test.retuned)} of the signal against {error_text(test.after)})."
-        )
-    there, here = test.after / test.noise, fit.after / fit.noise
-    if there > FIT_CONFIRMED * max(here, 1.0):
-        return (
-            f"The held-out data confirm this only in part: {times_text(there)} the noise is left there, "
-            f"{times_text(here)} the noise on what was fitted."
-        )
-    return ""
-
-
 def summary_lines(found: Findings) -> tuple[str, ...]:
     """The diagnosis in a few sentences, the verdict first."""
     diagnosis, single = found.diagnosis, found.given.inputs == 1
@@ -232,27 +218,3 @@ def moved_of(found: Findings) -> tuple[MovedNumber, ...]:
 def signature_texts(found: Findings) -> Mapping[str, str]:
     """By effect, as the catalogue has it."""
     return {placed.effect.name: placed.effect.signature for placed in found.named}
-
-
-def _fall(errors: Errors, *stages: tuple[str, str]) -> str:
-    (first, said_first), (last, said_last) = stages
-    before, after = getattr(errors, first), getattr(errors, last)
-    if before is None or after is None:
-        return "how much better it predicts held-out data is not known"
-    goes = "falls" if after * SAME_TO_READERS < before else "goes"
-    return (
-        f"the error on held-out data {goes} from {error_text(before)} of the signal ({said_first}) to "
-        f"{error_text(after)} ({said_last}){_noise(errors, after)}"
-    )
-
-
-def _one_error(said: str, error: float | None, errors: Errors) -> str:
-    if error is None:
-        return "its error on held-out data is not known"
-    return f"{said}, its error on held-out data is {error_text(error)} of the signal{_noise(errors, error)}"
-
-
-def _noise(errors: Errors, error: float) -> str:
-    if not errors.noise:
-        return "; what noise alone would leave is not known"
-    return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"

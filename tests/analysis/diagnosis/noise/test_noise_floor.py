@@ -71,6 +71,23 @@ def test_without_repeats_or_rest_noise_is_heard_above_the_driven_band(device):
     assert "above the driven band" in floor.remarks[0]
 
 
+def test_a_gap_is_not_heard_as_noise():
+    random, n = np.random.default_rng(1), 20_000
+    slow = np.convolve(random.standard_normal(n), np.hanning(200), "same")[:, None]
+    heard = slow / slow.std() + 1e-3 * random.standard_normal((n, 1))
+    lost = heard.copy()
+    lost[6000:6200] = np.nan
+    whole, gap = (
+        noise_floor(
+            Recording("gap", Signal(slow, 1000.0, "force", "N", ("fx",)), Signal(one, 1000.0, "position", "m", ("x",)))
+        )
+        for one in (heard, lost)
+    )
+    assert whole.how == gap.how == "quiet band"
+    assert whole.response_rms == pytest.approx(1e-3, rel=0.1)
+    assert gap.response_rms == pytest.approx(1e-3, rel=0.1)
+
+
 def test_at_a_rate_of_few_samples_per_window_no_rest_is_heard(device):
     found = device(rest=3000).recorded()
     slow = {side: replace(getattr(found, side), sample_rate_hz=4.0) for side in ("command", "response", "position")}

@@ -4,6 +4,7 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
 from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text, place_words
+from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.retuned_numbers import MovedNumber, doubtful_sentences, raised_sentence, retuned_sentence
@@ -118,6 +119,25 @@ def test_the_verdict_says_where_more_is_missing():
     said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)))
     assert said.startswith("Missing in the model: dry friction on the x drive, but that is not all.")
     assert said.endswith("and a mismatch remains.")
+
+
+def test_no_mismatch_remains_where_none_is_told():
+    noise = replace(PLACE, p_value=0.4)
+    left = diagnosis("partly_explained", (DRY,), remainder=(noise,), errors=Errors(0.5, 0.36, 0.0026, 0.0114))
+    said = verdict_sentence(left)
+    assert remainder_sentence(left) == "Nothing significant is left unexplained."
+    assert "a mismatch remains" not in said
+    assert "not all" not in said
+    assert said.endswith("only repeats of a drive would show that nothing else is missing.")
+
+
+def test_an_error_is_not_counted_in_noise_that_no_repeats_show():
+    device = Device(True, LINEAR, "quiet band")
+    said = verdict_sentence(diagnosis("partly_explained", (DRY,), remainder=(PLACE,)), device=device)
+    assert "times" not in said
+    assert "noise as it is above the driven band would leave 2.65 %" in said
+    unknown = verdict_sentence(diagnosis("unexplained"), device=Device(True, LINEAR, "unknown"))
+    assert "what noise alone would leave is not known" in unknown
 
 
 def test_wrong_parameters_are_another_answer_than_missing_physics():
