@@ -1,13 +1,20 @@
 """`hapteq prove`: how often the diagnosis is right about physics that was concealed from it."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from study.cli.results import JsonOption
 from study.cli.seed import checked_seed
+
+if TYPE_CHECKING:
+    from study.evaluation.bank.prove import Wishes
+    from study.evaluation.bank.seal_cases import BankPlan
+
+Found = TypeVar("Found")
 
 
 def prove(
@@ -21,6 +28,7 @@ def prove(
     controls: Annotated[
         bool, typer.Option("--controls", help="Also ask what must change, or must not: minutes more.")
     ] = False,
+    laws: Annotated[bool, typer.Option("--laws", help="Conceal laws that no catalogue names.")] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings, 1 to 4 MB each.")] = False,
     table: Annotated[Path | None, typer.Option(help="A small table of the figures, CSV, to be kept.")] = None,
     as_json: JsonOption = False,
@@ -29,21 +37,37 @@ def prove(
 
     Writes proof.json, proof.csv and report.html. Interrupted, the same command goes on.
     """
-    from study.cli.progress import steps
     from study.evaluation.bank.proof_summary import proof_lines, summary
     from study.evaluation.bank.prove import Wishes
     from study.evaluation.bank.prove import prove as proved
     from study.evaluation.bank.seal_cases import BankPlan
     from study.evaluation.bank.write_proof import write_proof, write_table
 
-    with steps("Proving") as show:
-        proof = proved(
-            out,
-            BankPlan(seed, cases, brief),
-            Wishes(workers, keep, controls),
-            lambda what, done, of: show(f"{what} {done} of {of}", done / max(of, 1)),
-        )
+    plan, wishes = BankPlan(seed, cases, brief), Wishes(workers, keep, controls)
+    if laws:
+        _prove_laws(out, plan, wishes, table, as_json)
+        return
+    proof = _with_steps(lambda said: proved(out, plan, wishes, said))
     write_proof(proof)
     if table is not None:
         write_table(table, proof)
     typer.echo(json.dumps(summary(proof), indent=2) if as_json else "\n".join(proof_lines(proof)))
+
+
+def _prove_laws(out: Path, plan: "BankPlan", wishes: "Wishes", table: Path | None, as_json: bool) -> None:
+    from study.evaluation.bank.laws.prove_laws import prove_laws
+    from study.evaluation.bank.laws.write_laws import law_lines, law_summary, write_law_table, write_laws
+
+    proof = _with_steps(lambda said: prove_laws(out, plan, wishes, said))
+    write_laws(proof)
+    if table is not None:
+        write_law_table(table, proof)
+    typer.echo(law_summary(proof) if as_json else "\n".join(law_lines(proof)))
+
+
+def _with_steps(run: Callable[[Callable[[str, int, int], None]], Found]) -> Found:
+    """Shows what is being done."""
+    from study.cli.progress import steps
+
+    with steps("Proving") as show:
+        return run(lambda what, done, of: show(f"{what} {done} of {of}", done / max(of, 1)))

@@ -120,11 +120,18 @@ def _diagnosed(place: Path) -> dict[str, Any]:
     recordings = [read_recording(path) for path in sorted(place.glob("*.h5"))]
     clean = tuple(read_recording(path) for path in sorted(place.glob(f"{CLEAN}/*.h5")))
     settings = DiagnosisSettings(
-        without=tuple(asked["without"]), clean=clean, time_left=_time_budget(asked.get("processor_s"))
+        without=tuple(asked["without"]),
+        clean=clean,
+        discovery=bool(asked.get("discovery")),
+        time_left=_time_budget(asked.get("processor_s")),
     )
     found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
     errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
-    said = {"diagnosis": diagnosis_to_json(found.diagnosis), "channel_errors": errors}
+    said = {
+        "diagnosis": diagnosis_to_json(found.diagnosis),
+        "channel_errors": errors,
+        "remarks": list(found.remarks),
+    }
     if (proposal := found.proposal) is not None:
         best = proposal.document and proposal.foreseen[0].experiment.words
         said["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}

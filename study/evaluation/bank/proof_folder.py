@@ -44,15 +44,19 @@ CLEAN = "clean"
 """A folder beside them, where the case has recordings of the device when it was in order."""
 
 
-def opened(path: Path, seed: int, brief: bool) -> ProofFolder:
-    """Made, or the one that is there already, to go on. Raises StudyError where it holds something else."""
+def opened(path: Path, seed: int, brief: bool, of: str = "") -> ProofFolder:
+    """Made, or the one that is there already, to go on. of: what is concealed, where it is no effect of the catalogue.
+
+    Raises StudyError where it holds something else.
+    """
     folder, said = ProofFolder(path), path / "bank.json"
-    wanted = json.dumps({"format": "hapteq-bank", "version": 1, "seed": seed, "brief": brief}, indent=1) + "\n"
+    bank = {"format": "hapteq-bank", "version": 1, "seed": seed, "brief": brief, **({"of": of} if of else {})}
+    wanted = json.dumps(bank, indent=1) + "\n"
     if said.exists():
         if parse_json(said, read_text(said), "bank") != json.loads(wanted):
             raise StudyError(
                 "This folder holds another bank",
-                f"{path} was begun with another --seed, or another length of its recordings.",
+                f"{path} was begun with another --seed, other options, or another length of its recordings.",
                 "Choose another folder with --out, or the same options to go on.",
                 saved="Nothing was changed.",
             )

@@ -1,5 +1,6 @@
 """A device as it really is: a bench with everything that a model of it may lack. `record` reads it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +10,8 @@ from study.evaluation.challenge import handle_force_kernel as handle
 from study.evaluation.challenge.actuator_kernel import GAIN, drive
 from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.drive_plan import RATE_HZ
-from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, move
+from study.evaluation.challenge.law_kernel import COLUMNS
+from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, Moved, move
 from study.evaluation.challenge.sensor import Sensor, read
 
 STEPS = 20
@@ -51,6 +53,10 @@ class Device:
     coupling: float = 0.0
     skipped: int = 0
     """Every so many commands one is not written; 0 = never."""
+    laws: FloatArray = field(default_factory=lambda: np.zeros((0, COLUMNS)))
+    """(laws, 7), columns in `law_kernel`"""
+    drive_law: Callable[[FloatArray], FloatArray] | None = None
+    """What becomes of the commands (samples, 3), before the amplifiers."""
     sensor: Sensor = field(default_factory=Sensor)
     steps: int = STEPS
     """Of the integrator in a sample."""
@@ -64,23 +70,29 @@ class Device:
         return Mechanism(
             inverse_mass, damping, stiffness,
             self.friction, self.forces, self.inertia_per_m, self.axis_mass_per_m, self.varying, self.play,
-            self.creep_stiffness, 1.0 / (RATE_HZ * self.steps * self.creep_time_s), self.coupling,
+            self.creep_stiffness, 1.0 / (RATE_HZ * self.steps * self.creep_time_s), self.coupling, self.laws,
         )  # fmt: skip
 
 
 def motion(device: Device, command: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What the handle really does: acceleration and position at the samples, (samples, 3) each.
+    """What the handle really does: acceleration and position at the samples, (samples, 3) each. As `whole_motion`."""
+    moved = whole_motion(device, command)
+    return moved.acceleration, moved.position
+
+
+def whole_motion(device: Device, command: FloatArray) -> Moved:
+    """With its speed and the forces of its laws.
 
     Raises ValueError where the device does not stay in one place: its parts contradict each other.
     """
-    written = command.copy()
+    written = command.copy() if device.drive_law is None else device.drive_law(command)
     if device.skipped:
         written[device.skipped :: device.skipped] = written[device.skipped - 1 : -1 : device.skipped]
     force = drive(written, device.amplifiers, device.steps, RATE_HZ)
-    acceleration, position = move(device.mechanism(), force, device.steps, RATE_HZ)
-    if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
+    moved = move(device.mechanism(), force, device.steps, RATE_HZ)
+    if not (np.isfinite(moved.acceleration).all() and np.abs(moved.position).max() < 1.0):
         raise ValueError("the simulated device ran away: a stiffness, mass or per_m is too large for its step")
-    return acceleration, position
+    return moved
 
 
 def record(device: Device, command: FloatArray, random: np.random.Generator) -> tuple[FloatArray, FloatArray]:

@@ -62,6 +62,11 @@ def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
         together[:, axis] = multisine(random, LEVELS_N[1], rig.period)
     add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], rig.period, "test")
     add(_slow(rig), "slow", SLOW_N, 0, "test")
+    if rig.loud_n:
+        loud = np.zeros((rig.period, 3))
+        for axis in rig.axes:
+            loud[:, axis] = multisine(random, rig.loud_n, rig.period)
+        add(np.tile(loud, (TEST_PERIODS, 1)), "multisine", rig.loud_n, rig.period, "test")
     return DrivePlan(np.vstack(blocks), tuple(segments))
 
 

@@ -13,6 +13,7 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.friction_kernel import bristle_force
 from study.evaluation.challenge.handle_force_kernel import handle_force
+from study.evaluation.challenge.law_kernel import law_forces, law_memory
 
 RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, TURN, SQUARE = range(5)
 """Of `varying`: Hz, N s/m and N/m by which the ground's damping and stiffness swing, rad; 1 = to and fro in jumps."""
@@ -47,16 +48,30 @@ class Mechanism(NamedTuple):
     """(elements,), of the way that remains, in one step"""
     coupling: float
     """N/m^2: the potential coupling * x^2 y / 2."""
+    laws: FloatArray
+    """(laws, 7), columns in `law_kernel`"""
+
+
+class Moved(NamedTuple):
+    """At the samples, (samples, 3) each."""
+
+    acceleration: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    lawful: FloatArray
+    """N, of the laws alone, with the force that begins there."""
 
 
 @njit(cache=True, nogil=True)
-def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """force: (samples * steps, 3), N. Returns acceleration and position at the samples, (samples, 3) each.
+def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> Moved:
+    """force: (samples * steps, 3), N.
 
     A sample is read just before the force of its own step acts: the acceleration is that of the force before.
     """
     n, samples, h = m.inverse_mass.shape[0], force.shape[0] // steps, 1.0 / (rate_hz * steps)
     acceleration, position = np.zeros((samples, 3)), np.zeros((samples, 3))
+    velocity, lawful = np.zeros((samples, 3)), np.zeros((samples, 3))
+    kept, pushed = np.zeros(m.laws.shape[0]), np.zeros(3)
     q, v, f, a = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     bend, motor, slow = np.zeros(3), np.zeros(2), np.zeros(m.creep_stiffness.shape)
     drive, before, now = np.zeros(3), np.zeros(3), np.zeros(n)
@@ -67,18 +82,25 @@ def move(m: Mechanism, force: FloatArray, steps: int, rate_hz: float) -> tuple[F
         _slow_ground(m, q, now, slow, k * h, f)
         for j in range(3):
             drive[j] = force[k, j]
+        if m.laws.shape[0] > 0:
+            law_forces(m.laws, (q, now, drive), kept, k * h, pushed)
+            for number in range(m.laws.shape[0]):
+                kept[number] = law_memory(m.laws[number], q, drive, kept[number], h)
+            for j in range(3):
+                f[j] += pushed[j]
         if m.play[AXIS] >= 0.0:
             _through_play(m.play, q, v, motor, drive, h)
         if k % steps == 0:
             _accelerate(m, q, f, before, a)
             for j in range(3):
                 acceleration[k // steps, j], position[k // steps, j] = a[j], q[j]
+                velocity[k // steps, j], lawful[k // steps, j] = now[j], pushed[j]
         _accelerate(m, q, f, drive, a)
         for i in range(n):
             v[i] += h * a[i]
             q[i] += h * v[i]
         before[:] = drive
-    return acceleration, position
+    return Moved(acceleration, position, velocity, lawful)
 
 
 @njit(cache=True, nogil=True)

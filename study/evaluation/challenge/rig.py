@@ -18,6 +18,8 @@ class Rig:
     steps: int = 20
     """Of the bench's integrator in a sample. With few of them its error shows: at 20 it reads like a sensor of one axis
     that is off by two in a thousand."""
+    loud_n: float = 0.0
+    """Level of a further stretch of the test, all axes at once; 0 = none."""
 
     def along(self, samples: int) -> int:
         """So many samples of the whole rig's drive in this one's."""

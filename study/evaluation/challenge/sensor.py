@@ -4,6 +4,7 @@ Order: pole of the accelerometer, direction, gain, curve, drift, hum; the clock;
 range; steps; lost samples. A clock that drifts and a line that loses samples touch acceleration and position alike.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,6 +42,8 @@ class Sensor:
     """1/(m/s^2): how soon a saturating curve bends."""
     play: float = 0.0
     """m/s^2, half the width of a hysteresis."""
+    law: Callable[[FloatArray], FloatArray] | None = None
+    """What becomes of the readings (samples, 3)."""
 
 
 def read(
@@ -64,6 +67,7 @@ def read(
 
 
 def _distorted(sensor: Sensor, felt: FloatArray) -> FloatArray:
+    felt = felt if sensor.law is None else sensor.law(felt)
     felt = sensor.gain * felt + sensor.cubic * felt**3
     if sensor.bend > 0.0:
         felt = np.tanh(sensor.bend * felt) / sensor.bend

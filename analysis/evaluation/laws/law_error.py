@@ -1,0 +1,52 @@
+"""How far a found law is from the true one, along motion that no recording has."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.laws.evaluate import evaluate
+from equalizer.laws.law import Law
+from equalizer.signals.signal import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreshMotion:
+    """(samples,) each, SI, by the names that laws use: x, vx, ax, fx, ..., t."""
+
+    columns: Mapping[str, FloatArray]
+    added: Mapping[str, FloatArray]
+    """By axis: what the true laws add to its force (N), or to its reading (m/s^2)."""
+    response: bool
+    """To its reading."""
+    rate_hz: float
+
+
+def law_error(laws: Sequence[Law], fresh: FreshMotion) -> float:
+    """rms of the difference over that of the true one, on the worst axis that has one, beside mass, damping, stiffness
+    and a constant of that axis (of a reading: a gain and a constant), which are the model's own to fit. inf where a law
+    is no number there."""
+    return max(_on_axis(laws, fresh, axis) for axis in fresh.added)
+
+
+def _on_axis(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
+    true, found = fresh.added[axis], np.zeros(len(fresh.added[axis]))
+    for law in laws:
+        if law.axis[-1] != axis or (law.acts_on == "response") != fresh.response:
+            continue
+        replaced = {"force": None, "command": f"f{axis}", "response": f"a{axis}"}[law.acts_on]
+        said = evaluate(law, fresh.columns, fresh.rate_hz)
+        found = found + said - (0.0 if replaced is None else fresh.columns[replaced])
+    if not np.isfinite(found).all():
+        return float("inf")
+    own = [fresh.columns[name] for name in ((f"a{axis}",) if fresh.response else (f"a{axis}", f"v{axis}", axis))]
+    base = np.linalg.qr(np.column_stack([*(_unit(column) for column in own), np.ones(len(true))]))[0]
+
+    def beside(force: FloatArray) -> float:
+        return float(np.linalg.norm(force - base @ (base.T @ force)))
+
+    return beside(true - found) / max(beside(true), 1e-300)
+
+
+def _unit(column: FloatArray) -> FloatArray:
+    return np.asarray(column / max(float(np.linalg.norm(column)), 1e-300))

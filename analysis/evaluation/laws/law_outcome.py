@@ -1,0 +1,126 @@
+"""One case of a bank of laws, revealed: what was concealed, what was said, and how near it is."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect
+from analysis.evaluation.proof.outcome import DETECTABLE
+from equalizer.laws.law import Law, law_of
+from equalizer.laws.parse import MEMORY
+from equalizer.laws.tree import Apply, nodes
+
+CLOSE = 0.05
+"""Of a law's rms: so near is the same function (issue 16)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrueLaw:
+    law: str
+    formula: str
+    axes: tuple[str, ...]
+    acts_on: tuple[str, ...]
+    """In these ways it can be said."""
+    variables: tuple[tuple[str, ...], ...]
+    """Per axis, all readings of it: variables, sorted, with spaces between."""
+    memory: bool
+    numbers: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class LawOutcome:
+    number: int
+    seed: int
+    kind: str
+    """law, nothing, decoy (an effect of the catalogue) or mode (a linear one)."""
+    concealed: str
+    axes: tuple[str, ...]
+    truth: TrueLaw | None
+    adds: float
+    """By how much it changes the readings: rms over the noise's, in the worst channel."""
+    said: Diagnosis | None
+    """None: the diagnosis broke down."""
+    channel_errors: Mapping[str, Mapping[str, float]]
+    """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
+    seconds: float
+    errors: tuple[float, ...] = ()
+    """Of the laws that were said (`law_error`): in the visited range, and louder."""
+
+    @property
+    def named(self) -> tuple[Law, ...]:
+        return _laws(() if self.said is None else self.said.effects)
+
+    @property
+    def candidates(self) -> tuple[Law, ...]:
+        return _laws(() if self.said is None else self.said.candidates)
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """Named, or where none is, the candidates."""
+        return self.named or self.candidates
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the catalogue."""
+        return () if self.said is None else tuple(each.effect for each in self.said.effects if each.law is None)
+
+    @property
+    def verdict(self) -> str:
+        return "failed" if self.said is None else self.said.verdict
+
+    def left(self, stage: str) -> float:
+        return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
+
+    @property
+    def shows(self) -> bool:
+        """A diagnosis that broke down counts as one that should have seen something."""
+        return self.said is None or self.left("retuned") > DETECTABLE
+
+    @property
+    def structured(self) -> bool:
+        """Place, axis, variables and memory are right."""
+        return self.truth is not None and bool(self.laws) and _alike(self.laws, self.truth)
+
+    @property
+    def close(self) -> bool:
+        return bool(self.laws) and bool(self.errors) and self.errors[0] <= CLOSE
+
+    @property
+    def close_louder(self) -> bool:
+        return bool(self.laws) and len(self.errors) > 1 and self.errors[1] <= CLOSE
+
+    @property
+    def wrongly_explained(self) -> bool:
+        """A law is said to explain what it does not: nothing of it is there, or another structure is."""
+        return bool(self.named) and self.verdict == "explained" and not self.structured
+
+    @property
+    def false_law(self) -> bool:
+        return self.truth is None and bool(self.named)
+
+    @property
+    def missed(self) -> bool:
+        if self.said is None or self.false_law or self.wrongly_explained:
+            return True
+        return self.truth is not None and self.shows and not (self.structured and self.close)
+
+
+def _laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
+    return tuple(law_of(each.law.expression, each.law.acts_on, each.law.axis) for each in found if each.law is not None)
+
+
+def _alike(laws: Sequence[Law], truth: TrueLaw) -> bool:
+    said = {axis: [law for law in laws if law.axis[-1] == axis] for axis in {law.axis[-1] for law in laws}}
+    if set(said) != set(truth.axes):
+        return False
+    for axis, readings in zip(truth.axes, truth.variables, strict=True):
+        variables = " ".join(sorted({name for law in said[axis] for name in law.variables}))
+        remembers = any(_remembers(law) for law in said[axis])
+        if variables not in readings or remembers != truth.memory:
+            return False
+        if any(law.acts_on not in truth.acts_on for law in said[axis]):
+            return False
+    return True
+
+
+def _remembers(law: Law) -> bool:
+    return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))

@@ -1,0 +1,44 @@
+"""What a bank of laws amounts to: the figures of issue 16, each with its interval."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.evaluation.laws.law_outcome import LawOutcome
+from analysis.evaluation.proof.share import Figure, share, statistic
+
+
+@dataclass(frozen=True, slots=True)
+class LawScore:
+    figures: tuple[Figure, ...]
+    misses: tuple[LawOutcome, ...]
+
+
+def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
+    laws = [each for each in outcomes if each.truth is not None]
+    shown = [each for each in laws if each.shows]
+    nulls = [each for each in outcomes if each.kind == "nothing"]
+    others = [each for each in outcomes if each.kind in ("decoy", "mode")]
+    said = [each for each in shown if each.named]
+    figures = (
+        share("laws that show", laws, lambda each: each.shows),
+        share("of these a law is named", shown, lambda each: bool(each.named)),
+        share("a law is named or a candidate", shown, lambda each: bool(each.laws)),
+        share("structure right, named or a candidate", shown, lambda each: each.structured),
+        share("structure right and named", shown, lambda each: bool(each.named) and each.structured),
+        share("function within 5 % where it was visited", shown, lambda each: each.close),
+        share("function within 5 % on louder commands", shown, lambda each: each.close_louder),
+        share("wrong law explained, of laws that show", shown, lambda each: each.wrongly_explained),
+        share("wrong law explained, of laws named", said, lambda each: each.wrongly_explained),
+        share("a name of the catalogue explained instead", shown, _another),
+        share("a law named where nothing is missing", nulls, lambda each: each.false_law),
+        share("a law named on decoys", others, lambda each: each.false_law),
+        statistic("median processor seconds, laws", [each.seconds for each in laws], np.median),
+        statistic("median processor seconds, nothing missing", [each.seconds for each in nulls], np.median),
+    )
+    return LawScore(figures, tuple(each for each in outcomes if each.missed))
+
+
+def _another(of: LawOutcome) -> bool:
+    return of.verdict == "explained" and bool(of.names) and not of.named

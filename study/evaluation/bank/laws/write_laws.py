@@ -1,0 +1,129 @@
+"""What a proof of laws leaves behind: a document, a table with one row per case, and lines for the terminal."""
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from analysis.evaluation.laws.law_outcome import LawOutcome
+from analysis.evaluation.proof.wording import figure_text
+from equalizer.laws.law import Law
+from study.evaluation.bank.laws.prove_laws import LawProof
+from study.evaluation.bank.write_proof import FigureRow, commit
+from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.json_document import write_json
+from study.store.disk.provenance import command_line, gather_provenance
+from study.store.disk.text_file import write_text
+
+FORMAT, VERSION = "hapteq-proof", 1
+DOCUMENT, TABLE = "proof.json", "proof.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class LawRow:
+    number: int
+    seed: int
+    kind: str
+    concealed: str
+    at: str
+    numbers: str
+    shows: bool
+    verdict: str
+    named: str
+    names: str
+    candidates: str
+    structure: bool
+    error: float | None
+    louder: float | None
+    retuned: float | None
+    after: float | None
+    seconds: float | None
+    miss: bool
+
+
+def write_laws(proof: LawProof) -> None:
+    """Anew each time. Raises StudyError."""
+    document = {
+        **_facts(proof),
+        "commit": commit(),
+        "command": " ".join(command_line(sys.argv)),
+    }
+    write_json(proof.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
+    rows = [_row(each) for each in proof.outcomes]
+    write_text(proof.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
+
+
+def write_law_table(path: Path, proof: LawProof) -> None:
+    """Figures and misses, small enough to be kept beside the code. Raises StudyError."""
+    figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in proof.score.figures]
+    lines = [
+        f"# {len(proof.outcomes)} cases of laws, seeds {proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}",
+        f"# commit {commit()}, code of the diagnosis {' '.join(proof.engines)}",
+        f"# seal of the labels {proof.seal}",
+    ]
+    write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
+    misses = [_row(each) for each in proof.score.misses]
+    write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), rows_to_csv(misses, LawRow), overwrite=True)
+
+
+def law_lines(proof: LawProof) -> Iterator[str]:
+    """Misses first."""
+    yield f"{len(proof.score.misses)} misses in {len(proof.outcomes)} cases"
+    for miss in proof.score.misses:
+        truth = miss.kind if miss.truth is None else miss.truth.formula
+        yield f"  {miss.number:5d} {miss.concealed or 'nothing'} ({truth}): {_said(miss)}"
+    yield ""
+    for figure in proof.score.figures:
+        yield f"{figure.name:52s} {figure_text(figure)}"
+    if len(proof.engines) > 1:
+        yield f"The answers come from {len(proof.engines)} versions of the diagnosis: run the bank anew for a figure."
+    yield f"Seal of the labels (SHA-256 of labels.sha256): {proof.seal}"
+    yield f"Everything is in {proof.folder.path}"
+
+
+def law_summary(proof: LawProof) -> str:
+    """JSON."""
+    return json.dumps({"folder": str(proof.folder.path), **_facts(proof)}, indent=2)
+
+
+def _facts(proof: LawProof) -> dict[str, Any]:
+    return {
+        "of": "laws",
+        "seed": proof.plan.seed,
+        "cases": len(proof.outcomes),
+        "brief": proof.plan.brief,
+        "seal": proof.seal,
+        "engines": list(proof.engines),
+        "figures": [asdict(figure) for figure in proof.score.figures],
+        "misses": [miss.number for miss in proof.score.misses],
+    }
+
+
+def _said(of: LawOutcome) -> str:
+    laws = " and ".join(_written(law) for law in of.laws)
+    how = "" if of.named or not of.candidates else "candidate "
+    names = ", ".join(of.names)
+    near = f", {100 * of.errors[0]:.3g} % off" if of.errors else ""
+    return f"{of.verdict}: {names}{' and ' if names and laws else ''}{how}{laws or ('' if names else 'no law')}{near}"
+
+
+def _written(law: Law) -> str:
+    return f"{law.acts_on} {law.axis} = {law.text}"
+
+
+def _row(of: LawOutcome) -> LawRow:
+    numbers = {} if of.truth is None else of.truth.numbers
+    error, louder = of.errors or (None, None)
+    return LawRow(
+        of.number, of.seed, of.kind, of.concealed, " ".join(of.axes if of.truth is None else of.truth.axes),
+        " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), of.shows, of.verdict,
+        " and ".join(map(_written, of.named)), " ".join(of.names), " and ".join(map(_written, of.candidates)),
+        of.structured, _short(error), _short(louder), _short(of.left("retuned")), _short(of.left("after")),
+        _short(of.seconds), of.missed,
+    )  # fmt: skip
+
+
+def _short(value: float | None) -> float | None:
+    return None if value is None or value != value or value == float("inf") else round(value, 4)

@@ -1,0 +1,110 @@
+"""Forces that no catalogue names, compiled: one row per law, at one instant of the mechanism's steps."""
+
+from math import atan, pi, sin, sqrt, tanh
+
+from numba import njit
+
+from equalizer.signals.signal import FloatArray
+
+KIND, AXIS, OTHER, FACTOR, FIRST, SECOND, SIDE = range(7)
+"""Columns of a row: which law; the axis that it pushes; another axis; its numbers; +1 or -1 for a side."""
+COLUMNS = 7
+(
+    SPEED_POWER, PLACE_POWER, PLACE_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG, CONTACT,
+    EDGE_DRAG, GAIN_RIPPLE, PUMPED, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING, CROSS_DRAG, WHIRL, ALL_DRAG,
+) = range(19)  # fmt: skip
+"""Kinds: of the axis's own motion, then with more, then across; `LAW_KINDS` in `hidden_laws` says what each is."""
+
+
+@njit(cache=True, nogil=True)
+def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, kept: float, t: float) -> float:
+    """N, along the row's axis. kept: what a law with a memory remembers (`law_memory`)."""
+    kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER])
+    if kind >= CROSS_SQUARE:
+        return _across(row, q[j], v[j], q[k], v[k])
+    if kind >= GAIN_RIPPLE:
+        return _with_more(row, q[j], drive[j], kept, t)
+    return _along(row, q[j], v[j])
+
+
+@njit(cache=True, nogil=True)
+def _along(row: FloatArray, x: float, speed: float) -> float:
+    """By the axis's own place and speed."""
+    kind, first, side = int(row[KIND]), row[FIRST], row[SIDE]
+    if kind == SPEED_POWER:
+        force = abs(speed) ** first * (1.0 if speed > 0.0 else -1.0)
+    elif kind == PLACE_POWER:
+        force = abs(x) ** first * (1.0 if x > 0.0 else -1.0)
+    elif kind == PLACE_DRAG:
+        force = abs(x) ** first * speed
+    elif kind == SPEED_SPRING:
+        force = side * x * abs(speed) ** first
+    elif kind == ATTRACTION:
+        force = -side * ((first - side * x) ** -row[SECOND] - first ** -row[SECOND])
+    elif kind == SOFT_DRAG:
+        force = tanh(speed / first)
+    elif kind == SOFT_SPRING:
+        force = atan(x / first)
+    elif kind == FADING_DRAG:
+        force = speed / (1.0 + (speed / first) ** 2)
+    elif kind == CONTACT:
+        force = side * max(side * x - first, 0.0) ** row[SECOND]
+    else:
+        force = speed if side * x > first else 0.0
+    pushed: float = -row[FACTOR] * force
+    return pushed
+
+
+@njit(cache=True, nogil=True)
+def _with_more(row: FloatArray, x: float, drive: float, kept: float, t: float) -> float:
+    """By the command, the time, or what was before."""
+    kind, first, second = int(row[KIND]), row[FIRST], row[SECOND]
+    if kind == GAIN_RIPPLE:
+        force = -drive * sin(2.0 * pi * x / first + second)
+    elif kind == PUMPED:
+        force = x * sin(2.0 * pi * first * t + second)
+    elif kind == RELAXATION:
+        force = x - kept
+    else:
+        force = drive * kept
+    pushed: float = -row[FACTOR] * force
+    return pushed
+
+
+@njit(cache=True, nogil=True)
+def _across(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
+    """By another axis's motion."""
+    kind, side = int(row[KIND]), row[SIDE]
+    if kind == CROSS_SQUARE:
+        force = side * other_x * other_x
+    elif kind == CROSS_SPRING:
+        force = x * other_x * other_x
+    elif kind == CROSS_DRAG:
+        force = speed * abs(other_speed)
+    elif kind == WHIRL:
+        force = -side * other_speed
+    else:
+        force = speed * sqrt(speed * speed + other_speed * other_speed)
+    pushed: float = -row[FACTOR] * force
+    return pushed
+
+
+@njit(cache=True, nogil=True)
+def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, kept: float, step_s: float) -> float:
+    """At the end of a step."""
+    kind, j, now = int(row[KIND]), int(row[AXIS]), kept
+    if kind == RELAXATION:
+        now += (q[j] - kept) * step_s / row[FIRST]
+    elif kind == HEATING:
+        now += (drive[j] * drive[j] - kept) * step_s / row[FIRST]
+    return now
+
+
+@njit(cache=True, nogil=True)
+def law_forces(
+    rows: FloatArray, at: tuple[FloatArray, FloatArray, FloatArray], kept: FloatArray, t: float, out: FloatArray
+) -> None:
+    """Fills out (3,), N. at: places, speeds and drives, of which the first three count. kept: (laws,)"""
+    out[:] = 0.0
+    for number in range(rows.shape[0]):
+        out[int(rows[number, AXIS])] += law_force(rows[number], at[0], at[1], at[2], kept[number], t)

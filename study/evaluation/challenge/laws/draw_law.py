@@ -1,0 +1,149 @@
+"""A bank of devices with laws of no catalogue, nulls and decoys: what is drawn for which number.
+
+Of every twenty: twelve with a law, four with nothing missing, three with an effect of the catalogue, one with a linear
+mode. Laws take their turns.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.device import Device, whole_motion
+from study.evaluation.challenge.draw_bank import ALL_AXES, STEPS
+from study.evaluation.challenge.draw_case import EFFECTS, Case, Concealed, added, draw_case, recording_of
+from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_plan, multisine
+from study.evaluation.challenge.extras import with_extras
+from study.evaluation.challenge.laws.build_law import LawTruth, built
+from study.evaluation.challenge.laws.hidden_laws import LAW_KINDS, LAW_OF_NAME
+from study.evaluation.challenge.mechanism_kernel import Moved
+from study.evaluation.challenge.nominal import as_model, calibrated, retuned
+from study.evaluation.challenge.rig import Rig
+from study.evaluation.challenge.sensor import read
+
+LawBankKind = Literal["law", "nothing", "decoy", "mode"]
+COUNTS: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "mode": 1}
+TURN: tuple[LawBankKind, ...] = tuple(kind for kind, count in COUNTS.items() for _ in range(count))
+LOWEST = 0.35
+"""Strength of what is concealed."""
+MODE = "extra_mode"
+CATALOGUED = tuple(name for name in EFFECTS if name not in (*ALL_AXES, MODE, "hand_impedance"))
+ONE_AXIS = 0.75
+"""Part of the laws of one axis that are put into a device of one."""
+LOUD_N = 4.5
+"""Of a stretch that is kept for the test: half as much again as what laws are found in."""
+FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
+
+
+@dataclass(frozen=True, slots=True)
+class LawDraw:
+    number: int
+    seed: int
+    kind: LawBankKind
+    concealed: str
+    """A law's name, an effect's, or none."""
+    strength: float
+    model: Concealed
+    rig: Rig
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fresh:
+    """The device along commands that no recording has, without noise: what a found law is held against."""
+
+    level_n: float
+    command: FloatArray
+    """(samples, axes), N; and so the rest, SI:"""
+    moved: Moved
+    reading: FloatArray
+    """m/s^2, by its sensor's law alone,"""
+    lawful: FloatArray
+    """N: what its laws add to the forces."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LawCase:
+    case: Case
+    truth: LawTruth | None
+    fresh: tuple[Fresh, ...]
+    """Of devices with a law: in the range that was visited, then louder."""
+
+
+def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
+    """The same for the same seed and number. brief: short periods."""
+    turn, place = divmod(number, len(TURN))
+    order = np.random.default_rng([seed, 41, turn]).permutation(len(TURN))
+    kind = TURN[order[place]]
+    random = np.random.default_rng([seed, 42, number])
+    before = turn * COUNTS[kind] + sum(TURN[each] == kind for each in order[:place])
+    names = tuple(each.name for each in LAW_KINDS) if kind == "law" else CATALOGUED
+    which = int(np.random.default_rng([seed, 43, before // len(names)]).permutation(len(names))[before % len(names)])
+    concealed = {"law": names[which], "decoy": names[which], "mode": MODE, "nothing": ""}[kind]
+    two = (kind == "law" and LAW_OF_NAME[concealed].axes == 2) or random.random() > ONE_AXIS
+    axes = tuple(sorted(int(axis) for axis in random.choice(3, 2 if two else 1, replace=False)))
+    model = cast(Concealed, str(random.choice(["calibrated", "retuned"])))
+    rig = Rig(axes, 1000 if brief else 2000, 3, 1.0, STEPS, LOUD_N)
+    return LawDraw(number, seed + number, kind, concealed, float(random.uniform(LOWEST, 1.0)), model, rig)
+
+
+def law_case(each: LawDraw, name: str) -> LawCase:
+    """name: what recording and model call the device."""
+    if each.kind != "law":
+        effects = (each.concealed,) if each.concealed else ()
+        strengths = each.strength if effects else None
+        return LawCase(draw_case(each.seed, effects, each.model, strengths, name, each.rig), None, ())
+    random, rig = np.random.default_rng([each.seed, 44]), each.rig
+    bench, plan = draw_bench(random), draw_plan(random, rig)
+    bare = with_extras(Device(bench, steps=rig.steps), rig.extras, each.seed)
+    free = whole_motion(bare, plan.command)
+    device, moved, truth = _lawful(each, bare, (free, plan), random)
+    response, position = read(device.sensor, moved.acceleration, moved.position, RATE_HZ, random)
+    if each.model == "calibrated":
+        known, tolerance = calibrated(bench, random, rig.axes)
+    else:
+        known, tolerance = retuned(bench, response, plan, rig.axes)
+    model = as_model(name, known, tolerance, rig.axes)
+    recording = recording_of(name, plan, response, position, rig)
+    both = tuple((part.acceleration, part.position) for part in (free, moved))
+    case = Case(recording, model, (), _never, added(bare, device, (both[0], both[1]), rig))
+    return LawCase(case, truth, tuple(_fresh(device, rig, random, level) for level in (FRESH_N, LOUD_N)))
+
+
+def _lawful(
+    each: LawDraw, bare: Device, free: tuple[Moved, DrivePlan], random: np.random.Generator
+) -> tuple[Device, Moved, LawTruth]:
+    """As strong as drawn, or weaker by halves where the device would not stay in place."""
+    (moved, plan), axes = free, each.rig.axes
+    own = int(random.integers(len(axes)))
+    places = (axes[own], axes[(own + 1) % len(axes)])
+    state = random.bit_generator.state
+    for strength in (each.strength, each.strength / 2, each.strength / 4):
+        random.bit_generator.state = state
+        device, truth = built(bare, LAW_OF_NAME[each.concealed], (moved, plan.command), places, strength, random)
+        try:
+            there = whole_motion(device, plan.command)
+        except (ValueError, ZeroDivisionError):
+            continue
+        if np.abs(there.position).max() < 3 * np.abs(moved.position).max():
+            return device, there, truth
+    raise ValueError(f"the device runs away with the law '{each.concealed}', seed {each.seed}")
+
+
+def _never(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+    raise ValueError("a device with a law is not recorded again")
+
+
+def _fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float) -> Fresh:
+    command = np.zeros((FRESH_PERIOD * FRESH_PERIODS, 3))
+    for axis in rig.axes:
+        command[:, axis] = np.tile(multisine(random, level_n / len(rig.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS)
+    moved, axes = whole_motion(device, command), list(rig.axes)
+    driven = command if device.drive_law is None else device.drive_law(command)
+    read_as = moved.acceleration if device.sensor.law is None else device.sensor.law(moved.acceleration)
+    return Fresh(
+        level_n, command[:, axes], Moved(*(part[:, axes] for part in moved)), read_as[:, axes],
+        (moved.lawful + driven - command)[:, axes],
+    )  # fmt: skip

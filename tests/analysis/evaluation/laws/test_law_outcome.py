@@ -1,0 +1,89 @@
+"""Found laws are scored by structure and by what they say along fresh motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.document import diagnosis_from_json
+from analysis.evaluation.laws.law_error import FreshMotion, law_error
+from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
+from analysis.evaluation.laws.law_score import law_score
+from equalizer.laws.law import law_of
+
+RATE_HZ = 1000.0
+T = np.arange(4000) / RATE_HZ
+X = 0.01 * np.sin(2 * np.pi * 1.3 * T) + 0.002 * np.sin(2 * np.pi * 11 * T)
+V = np.gradient(X, 1 / RATE_HZ)
+COLUMNS = {"t": T, "y": X, "vy": V, "ay": np.gradient(V, 1 / RATE_HZ), "fy": np.cos(T)}
+DRAG = FreshMotion(COLUMNS, {"y": -3.0 * np.abs(V) ** 1.5 * np.sign(V)}, False, RATE_HZ)
+TRUTH = TrueLaw("drag of a power", "-k |v|^a sgn v", ("y",), ("force",), (("vy",),), False, {"k": 3.0, "a": 1.5})
+
+
+def said(expression, verdict="explained", acts_on="force", key="effects"):
+    law = {"expression": expression, "variables": sorted(law_of(expression, acts_on, "y").variables),
+           "acts_on": acts_on, "axis": "y"}  # fmt: skip
+    entry = {"effect": "discovered_law", "place": "mechanism", "axis": "y", "law": law}
+    effect = {**entry, "share": 1.0, "probability": 0.9, "parameters": {}, "rivals": []}
+    candidate = {**entry, "parameters": {}, "held_out_gain": 0.9, "share_of_black_box": 0.9, "why_not": "not proved"}
+    mismatch = [{"output": "ay", "input": "fy", "band_hz": [1, 2], "amplitude": None, "state": None, "share": 1.0,
+                 "p_value": 0.0}]  # fmt: skip
+    errors = {"before": 2.0, "retuned": 1.0, "after": 0.1, "noise": 0.1}
+    return diagnosis_from_json(
+        {"verdict": verdict, "mismatch": mismatch, "effects": [effect] if key == "effects" else [], "retuned": {},
+         "remainder": [], "fit": {"fit": errors, "test": errors}, "error": "free simulation",
+         "next_experiment": None, "candidates": [candidate] if key == "candidates" else []}
+    )  # fmt: skip
+
+
+def outcome(expression, errors=(0.01, 0.2), **how):
+    return LawOutcome(
+        1, 2, "law", TRUTH.law, ("y",), TRUTH, 10.0, said(expression, **how), {"retuned": {"ay": 9.0}}, 3.0, errors
+    )
+
+
+def test_the_same_law_is_right_and_near():
+    exact = law_of("-3.0*abs(vy)**1.5*sign(vy)", "force", "y")
+    assert law_error((exact,), DRAG) < 1e-9
+    assert law_error((law_of("-3.3*abs(vy)**1.5*sign(vy)", "force", "y"),), DRAG) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_what_the_model_fits_itself_counts_for_nothing():
+    both = law_of("-3.0*abs(vy)**1.5*sign(vy) + 2.0*vy - 5.0*y", "force", "y")
+    assert law_error((both,), DRAG) < 1e-6
+
+
+def test_another_axis_or_place_is_all_off():
+    for law in (law_of("-3.0*abs(vy)**1.5*sign(vy)", "force", "x"), law_of("0.9*ay", "response", "y")):
+        assert law_error((law,), DRAG) == pytest.approx(1.0)
+
+
+def test_a_law_that_is_no_number_is_all_off():
+    assert law_error((law_of("log(y)", "force", "y"),), DRAG) == float("inf")
+
+
+def test_structure_asks_for_variables_axis_place_and_memory():
+    right = outcome("-3.0*abs(vy)**1.5*sign(vy)")
+    assert right.structured
+    assert right.close
+    assert not right.close_louder
+    assert not right.missed
+    for wrong in ("-3.0*abs(vy)*y", "-3.0*lag(vy, 0.01)"):
+        assert not outcome(wrong).structured
+        assert outcome(wrong).wrongly_explained
+    assert not outcome("0.9*fy", acts_on="command").structured
+
+
+def test_a_candidate_is_no_wrong_explanation():
+    held = outcome("-3.0*abs(vy)*y", verdict="unexplained", key="candidates")
+    assert not held.wrongly_explained
+    assert held.missed
+
+
+def test_a_law_on_a_null_is_false():
+    null = replace(outcome("1.0*vy*abs(vy)"), kind="nothing", truth=None)
+    assert null.false_law
+    assert null.missed
+    figures = {each.name: each for each in law_score([null, outcome("-3.0*abs(vy)**1.5*sign(vy)")]).figures}
+    assert figures["a law named where nothing is missing"].hits == 1
+    assert figures["structure right and named"].value == 1.0

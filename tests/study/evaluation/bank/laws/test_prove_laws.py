@@ -1,0 +1,65 @@
+"""A bank of laws from start to end: sealed with a fresh motion, answered apart with the search for laws, revealed."""
+
+import json
+
+import pytest
+
+from study.errors import StudyError
+from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
+from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
+from study.evaluation.bank.laws.write_laws import law_lines, write_laws
+from study.evaluation.bank.proof_folder import SETTINGS, opened
+from study.evaluation.bank.proof_seals import label_at
+from study.evaluation.bank.prove import Wishes
+from study.evaluation.bank.seal_cases import BankPlan
+
+SEED = 30_313
+"""Its first device has a law."""
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory):
+    folder = opened(tmp_path_factory.mktemp("laws") / "bank", SEED, True, "laws")
+    seal_laws(folder, BankPlan(SEED, 1, brief=True), 1, lambda done: None)
+    return folder
+
+
+def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
+    place = next(sealed.open.iterdir())
+    asked = json.loads((place / SETTINGS).read_text())
+    assert asked["discovery"]
+    assert asked["without"] == []
+    assert sorted(each.name for each in place.iterdir()) == ["model.toml", "recording.h5", "settings.json"]
+
+
+def test_fresh_motion_lies_with_the_label(sealed):
+    label = label_at(sealed.label(0))
+    truth = label["truth"]
+    found = fresh_motions(fresh_file(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"])
+    assert len(found) == 2
+    assert set(truth["axes"]) == set(found[0].added)
+    assert len(found[0].columns["t"]) == len(found[0].added[truth["axes"][0]])
+
+
+def test_another_fresh_motion_breaks_the_seal(sealed, tmp_path):
+    copy = opened(tmp_path / "copy", SEED, True, "laws")
+    for name in ("labels.sha256", "sealed/00000.json"):
+        (copy.path / name).write_bytes((sealed.path / name).read_bytes())
+    fresh_file(copy, 0).write_bytes(b"other")
+    with pytest.raises(StudyError, match="seal"):
+        reveal_laws(copy, 1)
+
+
+def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
+    with pytest.raises(StudyError, match="another bank"):
+        opened(sealed.path, SEED, True)
+
+
+@pytest.mark.slow
+def test_no_law_is_named_that_is_not_there(tmp_path):
+    proof = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), Wishes(), lambda what, done, of: None)
+    write_laws(proof)
+    assert json.loads((proof.folder.path / "proof.json").read_text())["of"] == "laws"
+    assert next(law_lines(proof)).endswith("misses in 20 cases")
+    assert [each.number for each in proof.outcomes if each.said is None] == []
+    assert [each.number for each in proof.outcomes if each.false_law or each.wrongly_explained] == []

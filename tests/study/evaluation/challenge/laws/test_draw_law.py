@@ -1,0 +1,74 @@
+"""Devices with laws of no catalogue: drawn again alike, as large as was drawn, and doing what their formula says."""
+
+import numpy as np
+import pytest
+
+from study.evaluation.challenge.law_kernel import law_force
+from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, law_case
+from study.evaluation.challenge.laws.hidden_laws import LAW_KINDS, Sizes
+
+SEED = 7
+SIZES = Sizes(0.01, 0.2, 20.0)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The first device of one axis with a force of its own."""
+    number = next(n for n in range(len(TURN)) if _simple(draw_law(SEED, n, brief=True)))
+    return number, law_case(draw_law(SEED, number, brief=True), "first")
+
+
+def _simple(drawn):
+    kind = next((kind for kind in LAW_KINDS if kind.name == drawn.concealed), None)
+    return kind is not None and kind.code >= 0 and len(drawn.rig.axes) == 1 and not kind.memory
+
+
+def test_the_same_number_is_the_same_device(found):
+    number, case = found
+    again = law_case(draw_law(SEED, number, brief=True), "first")
+    assert again.truth == case.truth
+    assert np.array_equal(again.case.recording.response.samples, case.case.recording.response.samples)
+
+
+def test_a_turn_holds_what_it_says():
+    kinds = [draw_law(SEED, number).kind for number in range(len(TURN))]
+    assert {kind: kinds.count(kind) for kind in COUNTS} == COUNTS
+
+
+def test_every_law_takes_its_turn():
+    laws = [draw_law(SEED, number).concealed for number in range(3 * len(TURN))]
+    assert {kind.name for kind in LAW_KINDS} <= set(laws)
+
+
+def test_the_law_shows_and_fresh_motion_carries_its_force(found):
+    _, case = found
+    assert case.case.adds > 1
+    quiet, loud = (float(np.sqrt(np.mean(each.lawful**2))) for each in case.fresh)
+    assert 0 < quiet < loud
+
+
+@pytest.mark.parametrize("kind", [kind for kind in LAW_KINDS if kind.code >= 0], ids=lambda kind: kind.name)
+def test_a_force_hangs_on_the_variables_that_are_said(kind):
+    """And on no others: each is moved alone."""
+    random = np.random.default_rng(3)
+    first, second = kind.draw(random, SIZES)
+    row = np.array([kind.code, 0, 1, 1.0, first, second, 1.0])
+    state = {"x": 0.008, "y": 0.004, "vx": 0.15, "vy": 0.05, "fx": 1.0, "t": 0.37, "kept": 0.001}
+    moves = {"x": -0.0011, "y": 0.001, "vx": -0.07, "vy": 0.02, "fx": 0.4, "t": 0.11}
+
+    def force(at):
+        q, v, u = (np.array([at[a], at.get(b, 0.0), 0.0]) for a, b in (("x", "y"), ("vx", "vy"), ("fx", "fy")))
+        return law_force(row, q, v, u, at["kept"], at["t"])
+
+    needed = {name for name, by in moves.items() if force({**state, name: state[name] + by}) != force(state)}
+    if kind.name == "drag beyond a place":  # a step: nothing between the two places
+        needed |= {"x"}
+    assert needed == set(kind.variables[0].split())
+
+
+@pytest.mark.parametrize("kind", [kind for kind in LAW_KINDS if kind.change is not None], ids=lambda kind: kind.name)
+def test_what_changes_commands_and_readings_leaves_none_alone_at_zero(kind):
+    first, second = kind.draw(np.random.default_rng(4), SIZES)
+    zero, some = np.zeros(5), np.linspace(-3.0, 3.0, 5)
+    assert np.array_equal(kind.change(zero, some, first, second), zero)
+    assert np.abs(kind.change(some, some, first, second)).max() > 0
