@@ -13,3 +13,53 @@ threshold in some runs. The mark is set by peaks at the cap; comparing the mean 
 every guesser (they end near 2.7 N of 3 N). `psychophysics.thresholds.is_censored` has the measured operating
 characteristics.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.diagnose import DiagnosisSettings as DiagnosisSettings
+    from analysis.diagnosis.diagnose_values import diagnose_values as diagnose
+    from analysis.diagnosis.first_model.choose_structure import first_structure as first_structure
+    from analysis.diagnosis.result.findings import Findings as Findings
+    from analysis.figures.diagnosis_pictures import diagnosis_pictures as diagnosis_pictures
+    from analysis.figures.study_pictures import study_pictures as study_pictures
+    from analysis.look.overview import overview as overview
+    from analysis.psychophysics.study_analysis import StudyAnalysis as StudyAnalysis
+    from analysis.psychophysics.study_analysis import analyse_study as analyse_study
+
+_HOME = {
+    "DiagnosisSettings": "analysis.diagnosis.diagnose:DiagnosisSettings",
+    "Findings": "analysis.diagnosis.result.findings:Findings",
+    "StudyAnalysis": "analysis.psychophysics.study_analysis:StudyAnalysis",
+    "analyse_study": "analysis.psychophysics.study_analysis:analyse_study",
+    "diagnose": "analysis.diagnosis.diagnose_values:diagnose_values",
+    "diagnosis_pictures": "analysis.figures.diagnosis_pictures:diagnosis_pictures",
+    "first_structure": "analysis.diagnosis.first_model.choose_structure:first_structure",
+    "overview": "analysis.look.overview:overview",
+    "study_pictures": "analysis.figures.study_pictures:study_pictures",
+}
+"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+
+__all__ = [
+    "DiagnosisSettings",
+    "Findings",
+    "StudyAnalysis",
+    "analyse_study",
+    "diagnose",
+    "diagnosis_pictures",
+    "first_structure",
+    "overview",
+    "study_pictures",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, own = _HOME[name].partition(":")
+    return getattr(import_module(module), own)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -3,3 +3,62 @@
 Read in this order: `signals.signal` and `signals.recording` (the two values everything is about), `signals.lockin`,
 `plant` (models of the device, the vocabulary of effects), `tracking.equalizer` (the port a stimulus passes through).
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from equalizer.effects.catalogue import EFFECTS as EFFECTS
+    from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model as fit_mechanical_model
+    from equalizer.identification.state_space.identify_recordings import identify_recordings as identify
+    from equalizer.plant.identified_model import IdentifiedModel as IdentifiedModel
+    from equalizer.plant.mechanical_model import MechanicalModel as MechanicalModel
+    from equalizer.signals.recording import Recording as Recording
+    from equalizer.signals.recording import Segment as Segment
+    from equalizer.signals.signal import Signal as Signal
+    from equalizer.tracking.feedforward.feedforward import feedforward as equalize
+    from equalizer.tracking.lqr.lqr import stored_gains as stored_gains
+    from equalizer.tracking.lqr.lqr import track as track
+    from equalizer.tracking.lqr.tracking_problem import TrackingProblem as TrackingProblem
+
+_HOME = {
+    "EFFECTS": "equalizer.effects.catalogue:EFFECTS",
+    "IdentifiedModel": "equalizer.plant.identified_model:IdentifiedModel",
+    "MechanicalModel": "equalizer.plant.mechanical_model:MechanicalModel",
+    "Recording": "equalizer.signals.recording:Recording",
+    "Segment": "equalizer.signals.recording:Segment",
+    "Signal": "equalizer.signals.signal:Signal",
+    "TrackingProblem": "equalizer.tracking.lqr.tracking_problem:TrackingProblem",
+    "equalize": "equalizer.tracking.feedforward.feedforward:feedforward",
+    "fit_mechanical_model": "equalizer.identification.mechanical.mechanical_fit:fit_mechanical_model",
+    "identify": "equalizer.identification.state_space.identify_recordings:identify_recordings",
+    "stored_gains": "equalizer.tracking.lqr.lqr:stored_gains",
+    "track": "equalizer.tracking.lqr.lqr:track",
+}
+"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+
+__all__ = [
+    "EFFECTS",
+    "IdentifiedModel",
+    "MechanicalModel",
+    "Recording",
+    "Segment",
+    "Signal",
+    "TrackingProblem",
+    "equalize",
+    "fit_mechanical_model",
+    "identify",
+    "stored_gains",
+    "track",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, own = _HOME[name].partition(":")
+    return getattr(import_module(module), own)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

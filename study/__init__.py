@@ -14,3 +14,74 @@ spoiled must be void although it was answered. An answer whose measurement was l
 2026-11-21. A display may know nothing about level, frequency or correctness: its views have no field for them.
 2026-11-21. A simulated participant is told what it feels through the port `Hand`; a person's hand needs no telling.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from study.errors import StudyError as StudyError
+    from study.store.formats.identified_model_file import read_identified_model as read_identified_model
+    from study.store.formats.identified_model_file import write_identified_model as write_identified_model
+    from study.store.formats.mechanical_model_file import read_mechanical_model as read_mechanical_model
+    from study.store.formats.mechanical_model_file import write_mechanical_model as write_mechanical_model
+    from study.store.formats.protocol_files import read_protocol as read_protocol
+    from study.store.formats.recording_file import read_recording as read_recording
+    from study.store.formats.recording_file import write_recording as write_recording
+    from study.store.formats.trials_file import read_trials as read_trials
+    from study.workflows.recording.import_recording import ImportPlan as ImportPlan
+    from study.workflows.recording.import_recording import import_recording as import_recording
+    from study.workflows.recording.record_device import RecordingPlan as RecordingPlan
+    from study.workflows.recording.record_device import record_device as record_device
+    from study.workflows.results.analyze_data import analyze_data as analyze_data
+    from study.workflows.session.rehearse_study import Rehearsal as Rehearsal
+    from study.workflows.session.rehearse_study import rehearse_study as rehearse_study
+
+_HOME = {
+    "ImportPlan": "study.workflows.recording.import_recording:ImportPlan",
+    "RecordingPlan": "study.workflows.recording.record_device:RecordingPlan",
+    "Rehearsal": "study.workflows.session.rehearse_study:Rehearsal",
+    "StudyError": "study.errors:StudyError",
+    "analyze_data": "study.workflows.results.analyze_data:analyze_data",
+    "import_recording": "study.workflows.recording.import_recording:import_recording",
+    "read_identified_model": "study.store.formats.identified_model_file:read_identified_model",
+    "read_mechanical_model": "study.store.formats.mechanical_model_file:read_mechanical_model",
+    "read_protocol": "study.store.formats.protocol_files:read_protocol",
+    "read_recording": "study.store.formats.recording_file:read_recording",
+    "read_trials": "study.store.formats.trials_file:read_trials",
+    "record_device": "study.workflows.recording.record_device:record_device",
+    "rehearse_study": "study.workflows.session.rehearse_study:rehearse_study",
+    "write_identified_model": "study.store.formats.identified_model_file:write_identified_model",
+    "write_mechanical_model": "study.store.formats.mechanical_model_file:write_mechanical_model",
+    "write_recording": "study.store.formats.recording_file:write_recording",
+}
+"""Module and name of what is exported; imported when it is asked for, because a module may take seconds."""
+
+__all__ = [
+    "ImportPlan",
+    "RecordingPlan",
+    "Rehearsal",
+    "StudyError",
+    "analyze_data",
+    "import_recording",
+    "read_identified_model",
+    "read_mechanical_model",
+    "read_protocol",
+    "read_recording",
+    "read_trials",
+    "record_device",
+    "rehearse_study",
+    "write_identified_model",
+    "write_mechanical_model",
+    "write_recording",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, own = _HOME[name].partition(":")
+    return getattr(import_module(module), own)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -59,6 +59,8 @@ GAINS = ("force_gain", "sensor_gain")
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisSettings:
+    """What a diagnosis considers, what it compares, and how long it may look."""
+
     without: tuple[str, ...] = ()
     """Effects that are not to be considered."""
     names: tuple[str, ...] = ()

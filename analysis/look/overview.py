@@ -25,6 +25,7 @@ from analysis.look.levels import SegmentLevel, level_checks, segment_levels
 from analysis.look.plausibility import offsets, units
 from analysis.look.repeats import Repeats, repeat_checks, repeats
 from equalizer.signals.recording import Recording
+from equalizer.signals.summary import Summarised, Summary
 
 RESOLUTION = "resolution"
 COARSE, ROUGH, UNSEEN = 3.0, 30.0, 1000.0
@@ -69,8 +70,8 @@ class ChannelSummary:
     missing: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Overview:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class Overview(Summarised):
     name: str
     recording: Recording
     channels: tuple[Channel, ...]
@@ -85,6 +86,22 @@ class Overview:
     repeats: Repeats
     checks: tuple[Check, ...]
     """Wrong ones first, then what should be noticed, then what is fine."""
+
+    def summary(self) -> Summary:
+        noticed = [check for check in self.checks if check.level != "fine"]
+        return Summary(
+            f"{self.name}: {len(self.channels)} channels",
+            (
+                *(
+                    (
+                        f"{each.role} {each.name}",
+                        f"{each.lowest:.4g} to {each.highest:.4g} {each.unit}, rms {each.rms:.3g}",
+                    )
+                    for each in self.summaries
+                ),
+                *((check.level, check.seen) for check in noticed),
+            ),
+        )
 
 
 def overview(name: str, recording: Recording) -> Overview:

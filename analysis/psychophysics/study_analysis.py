@@ -17,6 +17,7 @@ from analysis.psychophysics.study_warnings import side_warnings, study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 from analysis.psychophysics.thresholds import Threshold, threshold_of
 from analysis.wording import f_text, p_text
+from equalizer.signals.summary import Summarised, Summary
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.practice import PracticeState, practice_over, practice_passed, right_of_last
 from protocols.trial import Phase, Trial
@@ -71,8 +72,10 @@ def _practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True, slots=True)
-class StudyAnalysis:
+@dataclass(frozen=True, repr=False, slots=True)
+class StudyAnalysis(Summarised):
+    """Thresholds and statistics of one study's trials, of one population."""
+
     protocol: StudyProtocol
     population: Population | None
     """None when there is no trial at all."""
@@ -94,6 +97,21 @@ class StudyAnalysis:
     detection_table: ThresholdTable
     catches: tuple[CatchTally, ...]
     practice: tuple[PracticeRun, ...]
+
+    def summary(self) -> Summary:
+        table = self.table
+        return Summary(
+            f"{len(table.subjects)} participants, {len(self.runs)} runs, {len(self.trials)} trials",
+            (
+                *((name, _mean_text(values)) for name, values in table.groups().items()),
+                *(("warning", warning) for warning in self.warnings),
+            ),
+        )
+
+
+def _mean_text(values: Sequence[float | None]) -> str:
+    known = [value for value in values if value is not None]
+    return f"mean threshold {sum(known) / len(known):.3g} N of {len(known)}" if known else "no threshold"
 
 
 def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnalysis:

@@ -8,6 +8,7 @@ import numpy as np
 
 from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.summary import Summarised, Summary, span_text
 from equalizer.signals.units import UnknownUnitError, parse_unit
 
 
@@ -19,8 +20,8 @@ class IdentifiedModelError(ValueError):
         self.problems = problems
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class IdentifiedModel:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class IdentifiedModel(Summarised):
     """Sampled as recordings are: y[k] is taken just before u[k] is written, so D is zero for a causal device.
 
     Raises IdentifiedModelError when built from what cannot be. An unstable model can be built: see `spectral_radius`.
@@ -85,6 +86,20 @@ class IdentifiedModel:
     def spectral_radius(self) -> float:
         """Below 1 the model is stable."""
         return float(np.abs(np.linalg.eigvals(self.A)).max()) if self.order else 0.0
+
+    def summary(self) -> Summary:
+        low_hz, high_hz = self.band_hz
+        return Summary(
+            "Identified state-space model",
+            (
+                ("order", str(len(self.A))),
+                ("from", ", ".join(self.input_channels)),
+                ("to", ", ".join(self.output_channels)),
+                ("band", span_text(low_hz, high_hz, "Hz")),
+                ("sample rate", f"{self.sample_rate_hz:g} Hz"),
+                ("spectral radius", f"{self.spectral_radius:.6f}"),
+            ),
+        )
 
 
 def _problems(model: IdentifiedModel) -> Iterator[str]:

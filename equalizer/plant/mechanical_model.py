@@ -13,6 +13,7 @@ import numpy as np
 from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.summary import Summarised, Summary
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
 
 DERIVATIVE_OF_QUANTITY = {
@@ -76,8 +77,8 @@ class ModelEffect:
     """Of a discovered law, whose numbers stand in it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MechanicalModel:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class MechanicalModel(Summarised):
     """Raises MechanicalModelError when built from what cannot be."""
 
     name: str
@@ -126,6 +127,17 @@ class MechanicalModel:
     @property
     def outputs(self) -> int:
         return int(self.output.shape[0])
+
+    def summary(self) -> Summary:
+        return Summary(
+            f"Mechanical model {self.name}",
+            (
+                ("coordinates", str(len(self.mass))),
+                ("commands", str(self.input.shape[1])),
+                ("responses", f"{len(self.output)}, {self.quantity}"),
+                ("effects", ", ".join(effect.kind for effect in self.effects) or "none"),
+            ),
+        )
 
 
 def with_units_of(

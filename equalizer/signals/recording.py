@@ -10,6 +10,7 @@ from enum import Enum
 from typing import Any
 
 from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.summary import Summarised, Summary
 
 
 class Hold(Enum):
@@ -40,8 +41,8 @@ class Segment:
     role: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class Recording(Summarised):
     """One recording of a device. All signals share rate and length."""
 
     device: str
@@ -68,3 +69,18 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.response)
+
+    def summary(self) -> Summary:
+        signals = {"command": self.command, "response": self.response, "position": self.position}
+        return Summary(
+            f"Recording of {self.device or 'a device'}",
+            (
+                ("length", f"{len(self)} samples at {self.sample_rate_hz:g} Hz"),
+                *((name, _channels_text(signal)) for name, signal in signals.items() if signal is not None),
+                ("segments", str(len(self.segments))),
+            ),
+        )
+
+
+def _channels_text(signal: Signal) -> str:
+    return ", ".join(f"{name} [{unit}]" for name, unit in zip(signal.channels, signal.units, strict=True))

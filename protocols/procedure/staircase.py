@@ -44,6 +44,7 @@ class StaircaseState:
 
 
 def begin(rule: StaircaseRule) -> StaircaseState:
+    """The state before the first answer of a run, at the rule's first level."""
     return StaircaseState(level_db=to_db(rule.start_n))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from analysis.diagnosis.document import Diagnosis, Mismatch
+from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
@@ -11,10 +11,12 @@ from analysis.diagnosis.next_experiment.proposed_experiment import Proposal
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.unit_wording import error_text
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.summary import Summarised, Summary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,8 +92,10 @@ class Reached:
         return min(max((self.linear**2 - self.named**2) / room, 0.0), 1.0) if room > 0 else 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Findings:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class Findings(Summarised):
+    """What a diagnosis found: what is written (`diagnosis`), the improved model, and what figures and page show."""
+
     diagnosis: Diagnosis
     explanation: Explanation
     given: MechanicalModel
@@ -131,3 +135,21 @@ class Findings:
     """Seconds by "fit", "choose", "test"."""
     own_errors: FloatArray | None = None
     """(t,): standard errors of the changes of the model's own numbers, as `tuning` counts them; NaN = not computed."""
+
+    def summary(self) -> Summary:
+        errors = self.diagnosis.fit.test
+        left = {"as given": errors.before, "re-tuned": errors.retuned, "with the effects": errors.after}
+        return Summary(
+            f"Diagnosis: {self.diagnosis.verdict.replace('_', ' ')}",
+            (
+                *(("missing", effect_text(effect)) for effect in self.diagnosis.effects),
+                *(("candidate", f"{each.effect} {each.axis or ''}".strip()) for each in self.diagnosis.candidates[:3]),
+                *((f"held-out error {stage}", error_text(value)) for stage, value in left.items()),
+                ("noise alone", error_text(errors.noise)),
+            ),
+        )
+
+
+def effect_text(effect: NamedEffect) -> str:
+    numbers = ", ".join(f"{name} {each.value:.4g} {each.unit}".strip() for name, each in effect.parameters.items())
+    return f"{effect.effect} {effect.axis or ''}: {numbers}"

@@ -28,6 +28,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.summary import Summarised, Summary
 
 STEPS = 3
 
@@ -76,8 +77,8 @@ SAMPLED_BEFORE_WRITTEN = 1.0
 """A response is read just before its row's command is written, so a device answers one sample later at the earliest."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Identified:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class Identified(Summarised):
     """A model and how well it fits what was measured."""
 
     model: IdentifiedModel
@@ -109,6 +110,18 @@ class Identified:
         """Time constant."""
         radius = self.model.spectral_radius
         return float(-1 / (np.log(radius) * self.model.sample_rate_hz)) if radius > 0 else 0.0
+
+    def summary(self) -> Summary:
+        expected = "not known" if self.expected_error is None else f"{100 * self.expected_error:.3g} % (95 %)"
+        return Summary(
+            "Identified device",
+            (
+                *self.model.summary().rows,
+                ("expected error", expected),
+                ("cost per unknown (noise alone: 1)", f"{self.cost:.3g}"),
+                *(("remark", remark) for remark in self.remarks),
+            ),
+        )
 
 
 def identify(

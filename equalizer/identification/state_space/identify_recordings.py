@@ -37,14 +37,19 @@ class IdentifiedRecordings:
 
 
 def identify_recordings(
-    recordings: tuple[Recording, ...],
-    settings: IdentificationSettings,
+    recordings: Recording | Sequence[Recording],
+    settings: IdentificationSettings | None = None,
     smooth: bool | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> IdentifiedRecordings:
-    """smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, for they would
+    """The state-space model of the device that the recordings are of, and how well it fits what was measured.
+
+    smooth: local averages over neighbouring lines, taken about the model where a pole was relaxed, for they would
     blunt what it stands for; None: where the lines scatter more than their noise. `on_progress` is told the share
-    done. Raises TransferEstimateError, IdentificationRefused."""
+    done. Raises TransferEstimateError, IdentificationRefused.
+    """
+    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    settings = settings or IdentificationSettings()
     estimate = transfer_estimate(recordings)
     looked_twice = _looked_twice(recordings)
     if not looked_twice:

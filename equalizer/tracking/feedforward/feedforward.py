@@ -10,6 +10,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.summary import Summarised, Summary
 from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
 from equalizer.tracking.feedforward.periodic_inverse import check_wanted
 from equalizer.tracking.lqr.constrained import CapSettings, TrackingLoss, constrained_track
@@ -35,8 +36,8 @@ class FeedforwardSettings:
     """Above the cap: False refuses, True solves anew under it and states the loss."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Feedforward:
+@dataclass(frozen=True, repr=False, slots=True, eq=False)
+class Feedforward(Summarised):
     forces: Signal
     """(N, m)"""
     wanted: FloatArray
@@ -49,6 +50,18 @@ class Feedforward:
     """Share of what was wanted that lies outside the band, 0 to 1, of its root mean square"""
     peaks: Peaks
     loss: TrackingLoss | None = None
+
+    def summary(self) -> Summary:
+        highest_n = float(np.abs(self.forces.samples).max(initial=0.0))
+        return Summary(
+            "Forces for wanted accelerations",
+            (
+                ("length", f"{len(self.wanted)} samples at {self.forces.sample_rate_hz:g} Hz"),
+                ("predicted error in the band", f"{100 * self.error:.3g} %"),
+                ("outside the band, not played", f"{100 * self.left_out:.3g} %"),
+                ("highest force", f"{highest_n:.3g} N"),
+            ),
+        )
 
 
 def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSettings | None = None) -> Feedforward:

@@ -12,6 +12,7 @@ from analysis.diagnosis.data.force_driven import all_force_driven
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of, require_something
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.played_errors import PlayedError, played_error
+from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.first_model.plain_form import plain_form
 from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
@@ -30,7 +31,7 @@ from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
     nothing_to_diagnose,
 )
-from study.workflows.diagnosis.fitted_first import FirstModel, first_model_of, fitted_model
+from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
 from study.workflows.worker_threads import worker_threads
 
 SHORT = "too short"

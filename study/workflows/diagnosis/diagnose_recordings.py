@@ -13,6 +13,7 @@ from analysis.diagnosis.balance.weigh import Balance
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.errors.choose_measure import Compared
+from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
@@ -31,7 +32,7 @@ from study.workflows.diagnosis.diagnosis_input import (
     read_input,
 )
 from study.workflows.diagnosis.effect_file import read_entry
-from study.workflows.diagnosis.fitted_first import FirstModel, first_model_of, fitted_model
+from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
 from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 from study.workflows.worker_threads import worker_threads

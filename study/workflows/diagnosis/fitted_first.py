@@ -1,120 +1,37 @@
-"""The model that a diagnosis starts from where none was given: fitted to the recordings first."""
+"""The model that a diagnosis starts from where none was given, with refusals as a person reads them."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
-import numpy as np
-
-from analysis.diagnosis.balance.balances import balances_of
-from analysis.diagnosis.balance.motion import NoMotionError
-from analysis.diagnosis.balance.weigh import Balance
-from analysis.diagnosis.data.carried_weight import weighted
-from analysis.diagnosis.data.measured_motion import time_unit
-from analysis.diagnosis.first_model.model_of_balance import plain_model
-from analysis.diagnosis.first_model.model_structures import StructureRefused, balanced, structure_of
-from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
+from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.first_model import fitted_first
+from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.types import Progress, TimeBudget
-from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
-from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
-from equalizer.identification.mechanical.open_tolerance import opened
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
-from equalizer.signals.recording import Recording
+from equalizer.plant.mechanical_model import MechanicalModel
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose
 
-RIGID_SAID = (
-    "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
-    "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
-)
-BALANCE_SAID = (
-    "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
-    "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
-)
-
-
-UNTIMED_SAID = (
-    "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
-    "The mass in the file is a floor that no force shows; damping and mass are not known."
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FirstModel:
-    """What a diagnosis starts from where no model was given."""
-
-    model: MechanicalModel
-    remarks: tuple[str, ...]
-    """What must be known of it."""
-    balances: tuple[Balance, ...] | None = None
-    """None = not weighed."""
+GIVE_ONE = "Give a model of the device alone with --model, or a recording that carries one."
 
 
 def first_model_of(
     found: DiagnosisInput, without: Sequence[str], time_left: TimeBudget, on_progress: Progress
 ) -> FirstModel:
-    """From the force balance where that names laws along the motion of one body per command; else by a fit to spectra,
-    which takes longer. Raises StudyError where the recordings do not carry one."""
-    _require_no_weight(found)
-    on_progress("weighing laws in the force balance", 0.0)
-    balances = balances_of(found.recordings, frozenset(without), time_left)
-    if any(time_unit(each) != "s" for each in found.recordings) and (still := _massless(found.recordings)) is not None:
-        return FirstModel(still, (UNTIMED_SAID,), balances)
-    model = plain_model(balances, found.recordings[0], "fitted to these recordings")
-    if model is not None:
-        return FirstModel(model, (BALANCE_SAID,), balances)
-    on_progress("fitting a linear model, as none was given", 0.5)
-    model, remarks = fitted_model(
-        found, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
-    )
-    return FirstModel(model, remarks, balances)
-
-
-def _massless(recordings: Sequence[Recording]) -> MechanicalModel | None:
-    """None where no motion was measured along the commands."""
-    try:
-        return structure_of(balanced(recordings), "massless").model
-    except (StructureRefused, NoMotionError):
-        return None
+    """As in `analysis`. Raises StudyError."""
+    with _refused():
+        return fitted_first.first_model_of(found.recordings, without, time_left, on_progress)
 
 
 def fitted_model(
     found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """A linear one, and what must be known of it. Raises StudyError where the recordings do not carry one."""
-    _require_no_weight(found)
-    if wants_rigid_model(found.recordings) and (rigid := _rigid(found.recordings, whose)) is not None:
-        return rigid, (RIGID_SAID,)
+    """As in `analysis`. Raises StudyError."""
+    with _refused():
+        return fitted_first.fitted_model(found.recordings, on_progress, whose)
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
     try:
-        fit = fit_mechanical_model(found.recordings, on_progress=on_progress, name=f"fitted to {whose}")
-    except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        if (rigid := _rigid(found.recordings, whose)) is not None:
-            return rigid, (RIGID_SAID,)
-        raise nothing_to_diagnose(
-            (f"no model was given, and none can be fitted: {refusal}",),
-            "Give a model with --model, or a recording that carries one.",
-        ) from refusal
-    tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
-    said = (
-        f"No model was given. A linear one was fitted to {whose} first, with an error of "
-        f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
-        "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
-        "is not named."
-    )
-    return opened(fit.model), (said, *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks))
-
-
-def _require_no_weight(found: DiagnosisInput) -> None:
-    if weighted(found.recordings):
-        raise nothing_to_diagnose(
-            ("a recording was made with a weight on, and a model that is fitted to it would hold the weight",),
-            "Give a model of the device without it with --model.",
-        )
-
-
-def _rigid(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
-    """None where the recordings do not carry one."""
-    if not can_be_rigid(recordings):
-        return None
-    try:
-        return rigid_model(recordings, f"fitted to {whose}")
-    except (MechanicalModelError, np.linalg.LinAlgError):
-        return None
+        yield
+    except NothingToDiagnose as refusal:
+        raise nothing_to_diagnose(refusal.problems, GIVE_ONE) from refusal

@@ -28,6 +28,8 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class ImportPlan:
+    """Foreign files, what maps them to a recording, and where that is written."""
+
     files: tuple[Path, ...]
     """Or one folder, whose map is found."""
     map: str | None

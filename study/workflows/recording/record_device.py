@@ -27,6 +27,8 @@ NOMINAL_RATE_HZ = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class RecordingPlan:
+    """What is recorded, of which device, where in its workspace, and where it is written."""
+
     protocol: RecordingProtocol
     device: str
     place_m: tuple[float, float, float]

@@ -24,6 +24,8 @@ DEVICE = "simulated"
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
+    """A study of simulated participants: its protocol, how many, and where their sessions are written."""
+
     protocol: StudyProtocol
     protocol_text: str
     subjects: int

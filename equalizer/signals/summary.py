@@ -1,0 +1,41 @@
+"""How results print: a title and a few rows, in a terminal and in a notebook."""
+
+from dataclasses import dataclass
+from html import escape
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    title: str
+    rows: tuple[tuple[str, str], ...]
+    """What it is, and its value with its unit."""
+
+    def __str__(self) -> str:
+        width = max((len(name) for name, _ in self.rows), default=0)
+        return "\n".join((self.title, *(f"  {name:<{width}}  {value}" for name, value in self.rows)))
+
+    @property
+    def html(self) -> str:
+        rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in self.rows)
+        return f"<table><caption>{escape(self.title)}</caption>{rows}</table>"
+
+
+class Summarised:
+    """A result that prints as its summary, for its fields hold arrays of any length."""
+
+    __slots__ = ()
+
+    def summary(self) -> Summary:
+        raise TypeError(f"{type(self).__name__} has no summary")
+
+    def __repr__(self) -> str:
+        return str(self.summary())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return self.summary().html
+
+
+def span_text(low: float, high: float, unit: str) -> str:
+    """ "0.3 to 45 Hz"."""
+    return f"{low:.4g} to {high:.4g} {unit}"
