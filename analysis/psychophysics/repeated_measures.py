@@ -1,10 +1,12 @@
-"""Analysis of variance within participants, with Greenhouse and Geisser's correction.
+"""Analysis of variance within participants, with the corrections of Greenhouse and Geisser and of Huynh and Feldt.
 
 Every participant takes every frequency, so each is compared with themselves: differences between people leave the
 error term. Participants with a gap cannot take part in this analysis.
 
 Source: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
-Psychol. Methods 8 (2003), 434-447 (generalized eta squared).
+Psychol. Methods 8 (2003), 434-447 (generalized eta squared); H. Huynh, L. S. Feldt, J. Educ. Stat. 1 (1976), 69-82;
+J. W. Mauchly, Ann. Math. Stat. 11 (1940), 204-209, with the second-order term of T. W. Anderson, An Introduction to
+Multivariate Statistical Analysis (2003), section 10.7.
 """
 
 import math
@@ -12,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2, friedmanchisquare
 from scipy.stats import f as f_distribution
-from scipy.stats import friedmanchisquare
 
 from analysis.psychophysics.anova import no_spread
 from equalizer.signals.signal import FloatArray
@@ -79,6 +81,12 @@ class RepeatedMeasures:
     partial_eta_squared: float | None
     generalized_eta_squared: float | None
     notes: tuple[str, ...]
+    epsilon_huynh_feldt: float | None = None
+    """At most 1. Less conservative than Greenhouse-Geisser's."""
+    p_huynh_feldt: float | None = None
+    mauchly_w: float | None = None
+    """1 under sphericity. None where there are too few participants for it."""
+    mauchly_p: float | None = None
 
 
 def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
@@ -110,6 +118,31 @@ def greenhouse_geisser(rows: FloatArray) -> float:
     return min(1.0, max(1.0 / (k - 1), epsilon))
 
 
+def huynh_feldt(epsilon: float, participants: int, conditions: int) -> float:
+    """From Greenhouse and Geisser's epsilon; may exceed 1, which means 1."""
+    n, df = participants, conditions - 1
+    return (n * df * epsilon - 2.0) / (df * (n - 1.0 - df * epsilon))
+
+
+def mauchly(rows: FloatArray) -> tuple[float, float] | None:
+    """W and p of Mauchly's test of sphericity. None where the covariance of the contrasts has no full rank."""
+    n, k = rows.shape
+    p = k - 1
+    if p < 2 or n - 1 < p:
+        return None
+    contrasts = np.linalg.qr(np.column_stack([np.ones(k), np.eye(k)[:, 1:]]))[0][:, 1:]
+    values = np.linalg.eigvalsh(np.cov(rows @ contrasts, rowvar=False))
+    if values[0] <= 0:
+        return None
+    w = float(np.exp(np.log(values).sum() - p * np.log(values.mean())))
+    df = p * (p + 1) // 2 - 1
+    scale = (n - 1) - (2 * p**2 + p + 2) / (6 * p)
+    chi_squared = -scale * math.log(w)
+    second = (p + 2) * (p - 1) * (p - 2) * (2 * p**3 + 6 * p**2 + 3 * p + 2) / (288 * p**2 * scale**2)
+    first = float(chi2.sf(chi_squared, df))
+    return w, min(1.0, first + second * (float(chi2.sf(chi_squared, df + 4)) - first))
+
+
 def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
     n, k = rows.shape
     by_condition = rows.mean(axis=0) - rows.mean()
@@ -125,6 +158,8 @@ def _computed(
     df_conditions, df_error = k - 1, (n - 1) * (k - 1)
     f = (ss_conditions / df_conditions) / (ss_error / df_error)
     epsilon = greenhouse_geisser(rows)
+    corrected = min(1.0, huynh_feldt(epsilon, n, k)) if n - 1 > df_conditions * epsilon else 1.0
+    sphericity = mauchly(rows)
     return RepeatedMeasures(
         participants=n,
         left_out=left_out,
@@ -142,6 +177,10 @@ def _computed(
         partial_eta_squared=ss_conditions / (ss_conditions + ss_error),
         generalized_eta_squared=ss_conditions / (ss_conditions + ss_participants + ss_error),
         notes=tuple(notes),
+        epsilon_huynh_feldt=corrected,
+        p_huynh_feldt=float(f_distribution.sf(f, corrected * df_conditions, corrected * df_error)),
+        mauchly_w=sphericity[0] if sphericity else None,
+        mauchly_p=sphericity[1] if sphericity else None,
     )
 
 

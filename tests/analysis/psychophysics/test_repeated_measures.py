@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from statsmodels.stats.anova import AnovaRM
 
-from analysis.psychophysics.repeated_measures import greenhouse_geisser, repeated_measures
+from analysis.psychophysics.repeated_measures import greenhouse_geisser, huynh_feldt, mauchly, repeated_measures
 
 DRUGS = ((30, 28, 16, 34), (14, 18, 10, 22), (24, 20, 18, 30), (38, 34, 20, 44), (26, 28, 14, 30))
 REACTIONS = ((1, 3, 4), (2, 2, 3), (2, 5, 6), (3, 4, 4), (3, 5, 6))
@@ -92,3 +92,16 @@ def test_too_little_data_is_said_in_a_sentence(values, note):
 
 def test_a_result_is_json():
     assert json.loads(json.dumps(asdict(analysed(DRUGS)), allow_nan=False))["participants"] == 5
+
+
+def test_huynh_feldt_and_mauchly_of_the_ncss_manual():
+    assert huynh_feldt(greenhouse_geisser(np.array(DRUGS, float)), 5, 4) == pytest.approx(1.0789, abs=1e-4)
+    found = analysed(DRUGS)
+    assert found.epsilon_huynh_feldt == 1.0
+    assert found.p_huynh_feldt == pytest.approx(found.p_uncorrected)
+    assert found.mauchly_w == pytest.approx(0.186495, abs=1e-6)
+    assert found.mauchly_p == pytest.approx(0.496, abs=1e-3)
+
+
+def test_mauchly_needs_more_people_than_contrasts():
+    assert mauchly(np.array(DRUGS[:3], float)) is None

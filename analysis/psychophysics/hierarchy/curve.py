@@ -1,0 +1,69 @@
+"""Psychometric curves of one-interval identification: sensitivity against the level, with two derivatives.
+
+An unbiased attentive participant answers right with the probability 1/2 + F(t)/2, so the evidence for the direction
+shown has the mean q(t) with Phi(q) = 1/2 + F(t)/2 (half of d'). Three shapes of F, each over levels in dB:
+
+    Weibull (over newtons)   1 - F = exp(-exp(t))
+    logistic                 1 - F = 1 / (1 + exp(t))
+    Gauss                    1 - F = Phi(-t)
+
+t = t0 + slope ln(10)/20 (level - threshold), where t0 makes F(t0) the target of the staircase: 79.37 % right.
+
+Source: F. A. Wichmann, N. J. Hill, Percept. Psychophys. 63 (2001), 1293-1313; N. A. Macmillan, C. D. Creelman,
+Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
+"""
+
+import math
+from enum import StrEnum
+from statistics import NormalDist
+
+import numpy as np
+from scipy.special import erfcx, log_ndtr, ndtri_exp
+
+from equalizer.signals.signal import FloatArray
+
+TARGET = 0.5 ** (1 / 3)
+"""Share of right answers at a threshold: where one wrong and three right answers in a row are equally likely."""
+NEPER_PER_DB = math.log(10.0) / 20.0
+SUREST = 30.0
+"""t beyond which no answer of an attentive participant is wrong: exp(-exp(30)) is 0 in floating point."""
+
+
+class Family(StrEnum):
+    WEIBULL = "weibull"
+    LOGISTIC = "logistic"
+    GAUSS = "gauss"
+
+
+_SHARE = 2.0 * TARGET - 1.0
+AT_THRESHOLD = {
+    Family.WEIBULL: math.log(-math.log(1.0 - _SHARE)),
+    Family.LOGISTIC: math.log(_SHARE / (1.0 - _SHARE)),
+    Family.GAUSS: NormalDist().inv_cdf(_SHARE),
+}
+"""t0 of each family."""
+USUAL_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
+"""Equally steep at the threshold: a Weibull slope of 2 over newtons, where a search begins."""
+
+
+def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """q(t) and its first two derivatives, each in the shape of t."""
+    log_rest, h1, h2 = _log_survival(np.minimum(t, SUREST), family)
+    # Phi(-q) = (1 - F) / 2. With w the logarithm of that: dq/dw = -M, M the Mills ratio Phi(-q) / phi(q).
+    q = -ndtri_exp(log_rest - math.log(2.0))
+    mills = math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2.0))
+    return q, -mills * h1, mills * (q * mills - 1.0) * h1**2 - mills * h2
+
+
+def _log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """log(1 - F) and its first two derivatives."""
+    match family:
+        case Family.WEIBULL:
+            log_rest = -np.exp(t)
+            return log_rest, log_rest, log_rest
+        case Family.LOGISTIC:
+            p = 1.0 / (1.0 + np.exp(-t))
+            return -np.logaddexp(0.0, t), -p, -p * (1.0 - p)
+        case Family.GAUSS:
+            m = 1.0 / (math.sqrt(math.pi / 2) * erfcx(t / math.sqrt(2.0)))
+            return log_ndtr(-t), -m, -m * (m - t)

@@ -1,0 +1,62 @@
+"""Whether the fitted curves describe the answers: predicted against observed shares of right answers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, sensitivity
+from analysis.psychophysics.hierarchy.fit import HierarchicalFit
+from equalizer.signals.signal import FloatArray
+
+BINS = 8
+"""Of predicted shares, equally many trials each: some 400 trials in a study of ten."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShareBin:
+    trials: int
+    predicted: float
+    observed: float
+    z: float
+    """(observed - predicted) over its binomial standard error."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoodnessOfFit:
+    """Without a p-value: levels follow answers, and each person's numbers were fitted to them, so the lowest bins come
+    out some standard errors too low although the model is right. Look for departures with a shape."""
+
+    bins: tuple[ShareBin, ...]
+
+
+def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
+    share, cells = predicted_shares(fit), fit.answers
+    trials = cells.right + cells.wrong
+    order = np.argsort(share, kind="stable")
+    place = np.minimum((np.cumsum(trials[order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
+    bins = []
+    for index in range(BINS):
+        chosen = order[place == index]
+        if len(chosen):
+            n, right, p = trials[chosen], cells.right[chosen], share[chosen]
+            expected, spread = float(n @ p), float(np.sqrt(n @ (p * (1.0 - p))))
+            bins.append(
+                ShareBin(
+                    int(n.sum()),
+                    expected / float(n.sum()),
+                    float(right.sum() / n.sum()),
+                    (float(right.sum()) - expected) / spread,
+                )
+            )
+    return GoodnessOfFit(tuple(bins))
+
+
+def predicted_shares(fit: HierarchicalFit) -> FloatArray:
+    """Probability of a right answer in each cell (m,), with the person's own threshold, slope and criterion."""
+    cells, k = fit.answers, fit.layout.k
+    person = cells.person
+    pace = np.exp(fit.latent[person, k]) * NEPER_PER_DB
+    t = AT_THRESHOLD[fit.family] + pace * (cells.level_db - fit.latent[:, :k].ravel()[cells.run])
+    sure: FloatArray = ndtr(sensitivity(t, fit.family)[0] - cells.side * fit.latent[person, k + 1])
+    return fit.lapse + (1.0 - 2.0 * fit.lapse) * sure

@@ -1,0 +1,159 @@
+"""What the fitted model says of people: the person is the unit that was drawn, so persons carry the uncertainty.
+
+Each person's influence on the means is n A^-1 s_i, with A the curvature of the fit and s_i the person's score. Mean
+plus influence is a person's pseudo-threshold in dB: with the thresholds known exactly it would be the threshold itself,
+and what follows the textbook's analysis within participants. Its standard errors are the cluster-robust ones (sandwich)
+with n / (n - 1), so unequal spreads and a family that does not fit widen the intervals as they should.
+
+Source: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986), 13-22; G. Kauermann, R. J. Carroll, J. Am. Stat. Assoc. 96
+(2001), 1387-1396 (few clusters, t with n - 1 degrees of freedom).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from analysis.psychophysics.hierarchy.fit import HierarchicalFit, Objective, Prior, search
+from equalizer.signals.signal import FloatArray
+
+BOUND_ROOT, BOUND_STEPS = 0.03, 8
+"""A bound is found when its likelihood root, some 1.8, is met this closely: 95 % is then 94.8 to 95.2 %. The steps end
+a search on a likelihood that is no line at all, on the safe side."""
+FAR_DB = 40.0
+"""A bound further from the estimate than this is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class MedianThreshold:
+    """The median participant's threshold at one frequency, in dB re 1 N."""
+
+    frequency_hz: float
+    db: float
+    lower_db: float
+    upper_db: float | None
+    """None where the median is above the cap: then lower_db is a one-sided bound, and no size is known."""
+    above_cap: bool
+
+    @property
+    def newton(self) -> float:
+        return float(10.0 ** (self.db / 20.0))
+
+    @property
+    def lower_n(self) -> float:
+        return float(10.0 ** (self.lower_db / 20.0))
+
+    @property
+    def upper_n(self) -> float | None:
+        return None if self.upper_db is None else float(10.0 ** (self.upper_db / 20.0))
+
+
+@dataclass(frozen=True, slots=True)
+class DirectionLimit:
+    """Frequency at which the median participant's threshold reaches the cap."""
+
+    frequency_hz: float | None
+    """None where that lies outside of what was played, or is reached more than once."""
+    lower_hz: float | None
+    """None: below the lowest frequency played."""
+    upper_hz: float | None
+    """None: above the highest frequency played."""
+    words: str
+
+
+def pseudo_thresholds(fit: HierarchicalFit) -> FloatArray:
+    """(n, k) in dB: their mean is the estimate, their spread its uncertainty."""
+    centred = fit.scores - fit.scores.mean(axis=0)
+    influence = fit.answers.persons * np.linalg.solve(fit.curvature, centred.T).T
+    pseudo: FloatArray = fit.means_db + influence[:, : fit.layout.k]
+    return pseudo
+
+
+def median_thresholds(
+    fit: HierarchicalFit, cap_db: float, confidence: float, prior: Prior | None = None
+) -> tuple[MedianThreshold, ...]:
+    """Two-sided intervals below the cap, one-sided profile bounds above it."""
+    pseudo, n = pseudo_thresholds(fit), fit.answers.persons
+    half = student.ppf(0.5 + confidence / 2, n - 1) * pseudo.std(axis=0, ddof=1) / math.sqrt(n)
+    medians = []
+    for place, frequency_hz in enumerate(fit.answers.frequencies_hz):
+        db = float(fit.means_db[place])
+        if db > cap_db:
+            bound = lower_bound(fit, place, confidence, prior or Prior())
+            medians.append(MedianThreshold(frequency_hz, db, bound, None, True))
+        else:
+            medians.append(MedianThreshold(frequency_hz, db, db - float(half[place]), db + float(half[place]), False))
+    return tuple(medians)
+
+
+def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prior) -> float:
+    """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's."""
+    objective = Objective(fit.answers, fit.family, prior)
+    best = objective(fit.numbers)[0]
+    wanted = float(student.ppf(confidence, fit.answers.persons - 1))
+    begin = fit.numbers.copy()
+
+    def root(below_db: float) -> float:
+        """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
+        at = begin.copy()
+        at[place] = fit.numbers[place] - below_db
+        found = search(objective, at, held=place)
+        begin[:] = found.x
+        return math.sqrt(max(0.0, 2.0 * (float(found.fun) - best)))
+
+    near, near_root, far = 0.0, 0.0, 2.0
+    while (far_root := root(far)) < wanted:
+        near, near_root, far = far, far_root, 2.0 * far
+        if far > FAR_DB:
+            return -math.inf
+    for _ in range(BOUND_STEPS):
+        middle = near + (far - near) * (wanted - near_root) / (far_root - near_root)
+        if abs((middle_root := root(middle)) - wanted) < BOUND_ROOT:
+            return float(fit.numbers[place] - middle)
+        if middle_root < wanted:
+            near, near_root = middle, middle_root
+        else:
+            far, far_root = middle, middle_root
+    return float(fit.numbers[place] - far)
+
+
+def direction_limit(
+    frequencies_hz: tuple[float, ...], pseudo: FloatArray, cap_db: float, confidence: float
+) -> DirectionLimit:
+    """From pseudo-thresholds (n, k). Between the frequencies played: straight lines over the logarithm of frequency.
+
+    The interval holds every frequency whose median threshold may be the cap: its own interval contains the cap.
+    """
+    grid = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
+    weights = np.array([np.interp(np.log(grid), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
+    lines = pseudo @ weights
+    n = len(pseudo)
+    middle = lines.mean(axis=0)
+    half = student.ppf(0.5 + confidence / 2, n - 1) * lines.std(axis=0, ddof=1) / math.sqrt(n)
+    crossings = np.flatnonzero((middle[:-1] < cap_db) & (middle[1:] >= cap_db))
+    possible = np.flatnonzero((middle - half <= cap_db) & (middle + half >= cap_db))
+    lower = float(grid[possible[0]]) if len(possible) and possible[0] > 0 else None
+    upper = float(grid[possible[-1]]) if len(possible) and possible[-1] < len(grid) - 1 else None
+    if len(crossings) != 1 or middle[0] >= cap_db:
+        return DirectionLimit(None, lower, upper, _no_limit(middle, cap_db, len(crossings), frequencies_hz))
+    at = crossings[0]
+    share = (cap_db - middle[at]) / (middle[at + 1] - middle[at])
+    frequency = float(grid[at] * (grid[at + 1] / grid[at]) ** share)
+    return DirectionLimit(frequency, lower, upper, _LIMIT_WORDS)
+
+
+_LIMIT_WORDS = (
+    "A limit of this device, this cap and this task: a stronger device, another grip or another task has another. "
+    "Nothing is extrapolated beyond the frequencies played."
+)
+
+
+def _no_limit(middle: FloatArray, cap_db: float, crossings: int, frequencies_hz: tuple[float, ...]) -> str:
+    if crossings > 1:
+        reason = f"The median threshold crosses the cap {crossings} times."
+    elif middle[0] >= cap_db:
+        reason = f"The median threshold is above the cap already at {frequencies_hz[0]:g} Hz."
+    else:
+        reason = f"The median threshold stays below the cap up to {frequencies_hz[-1]:g} Hz, the highest played."
+    return f"{reason} {_LIMIT_WORDS}"

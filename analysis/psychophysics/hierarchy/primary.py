@@ -1,0 +1,107 @@
+"""The primary analysis of a study, from its answers to medians, contrasts, spreads and the direction limit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.psychophysics.group_contrasts import Contrast, contrasts
+from analysis.psychophysics.hierarchy.answers import Answers
+from analysis.psychophysics.hierarchy.curve import Family
+from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
+from analysis.psychophysics.hierarchy.goodness import GoodnessOfFit, goodness_of_fit
+from analysis.psychophysics.hierarchy.inference import (
+    DirectionLimit,
+    MedianThreshold,
+    direction_limit,
+    median_thresholds,
+    pseudo_thresholds,
+)
+from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
+from protocols.procedure.staircase import to_db
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class PersonEstimate:
+    """One person's numbers, drawn towards the others' where their own answers say little."""
+
+    subject: str
+    thresholds_n: tuple[float, ...]
+    """At each frequency; above the cap: no more than a guess that the answers do not contradict."""
+    above_cap: tuple[bool, ...]
+    slope: float
+    criterion: float
+    """c in units of d', positive for a tendency to answer 2."""
+
+
+@dataclass(frozen=True, slots=True)
+class PrimaryAnalysis:
+    family: Family
+    trials: int
+    frequencies_hz: tuple[float, ...]
+    confidence: float
+    medians: tuple[MedianThreshold, ...]
+    overall: RepeatedMeasures
+    """Over the pseudo-thresholds in dB."""
+    contrasts: tuple[Contrast, ...]
+    limit: DirectionLimit
+    persons: tuple[PersonEstimate, ...]
+    person_sd_db: float
+    """Between people, at all frequencies."""
+    frequency_sd_db: float
+    """Person x frequency: between people, beyond what they share over frequencies."""
+    slope: float
+    slope_log_sd: float
+    criterion_sd: float
+    lapse: float
+    goodness: GoodnessOfFit
+    converged: bool
+
+
+def primary_analysis(
+    answers: Answers | None, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
+) -> PrimaryAnalysis | None:
+    """None below two persons or two frequencies with answers: there is nothing to compare."""
+    if answers is None or answers.persons < 2:
+        return None
+    played = np.unique(answers.run % len(answers.frequencies_hz))
+    if len(played) < 2 or len(played) < len(answers.frequencies_hz):
+        return None
+    fit = fit_hierarchy(answers, family)
+    pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
+    numbers, k = fit.numbers, fit.layout.k
+    sds = np.exp(numbers[fit.layout.log_sds])
+    return PrimaryAnalysis(
+        family=family,
+        trials=answers.trials,
+        frequencies_hz=frequencies,
+        confidence=confidence,
+        medians=median_thresholds(fit, cap_db, confidence),
+        overall=repeated_measures(answers.subjects, pseudo.tolist()),
+        contrasts=contrasts(frequencies, pseudo, confidence),
+        limit=direction_limit(frequencies, pseudo, cap_db, confidence),
+        persons=_persons(fit, cap_db),
+        person_sd_db=float(sds[0]),
+        frequency_sd_db=float(sds[1]),
+        slope=float(np.exp(numbers[k + 2])),
+        slope_log_sd=float(sds[2]),
+        criterion_sd=float(sds[3]),
+        lapse=fit.lapse,
+        goodness=goodness_of_fit(fit),
+        converged=fit.converged,
+    )
+
+
+def _persons(fit: HierarchicalFit, cap_db: float) -> tuple[PersonEstimate, ...]:
+    k = fit.layout.k
+    return tuple(
+        PersonEstimate(
+            subject=subject,
+            thresholds_n=tuple(float(10.0 ** (db / 20.0)) for db in row[:k]),
+            above_cap=tuple(bool(db > cap_db) for db in row[:k]),
+            slope=float(np.exp(row[k])),
+            criterion=float(row[k + 1]),
+        )
+        for subject, row in zip(fit.answers.subjects, fit.latent, strict=True)
+    )

@@ -1,0 +1,90 @@
+"""Whole studies of simulated participants, as the analyses take them: answers counted, and reversal means."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.psychophysics.hierarchy.answers import Answers, tally
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, Family
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
+from equalizer.signals.signal import FloatArray
+from protocols.definition.staircase_rule import StaircaseRule
+
+FAMILIES = (Family.WEIBULL, Family.LOGISTIC, Family.GAUSS)
+
+
+@dataclass(frozen=True, slots=True)
+class Crowd:
+    """The people that studies are drawn from. Thresholds: level at which an attentive, unbiased answer is right in
+    79.37 %, normal in dB."""
+
+    frequencies_hz: tuple[float, ...]
+    medians_n: tuple[float, ...]
+    person_sd_db: float = 2.5
+    """Of what makes one person better or worse at all frequencies."""
+    frequency_sd_db: tuple[float, ...] | float = 1.7
+    """Of what differs from frequency to frequency, one for all or one each."""
+    slope: float | None = None
+    """Median; None: as steep as a Weibull slope of 2 over newtons."""
+    slope_log_sd: float = 0.25
+    lapse: float = 0.02
+    criterion_sd: float = 0.15
+    family: Family = Family.WEIBULL
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedStudy:
+    answers: Answers
+    threshold_n: FloatArray
+    """(people, frequencies): arithmetic mean of the averaged reversals in newtons; NaN without all reversals."""
+    threshold_db: FloatArray
+    """(people, frequencies): mean of the same levels in dB."""
+    cap_reversals: FloatArray
+    """(people, frequencies): averaged reversals that are peaks at the cap."""
+    trials: int
+    true_db: FloatArray
+    """(people, frequencies)."""
+
+
+def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> SimulatedStudy:
+    """The same seed gives the same study, on any machine and in any order of work."""
+    rng, k, packed = np.random.default_rng(seed), len(crowd.frequencies_hz), pack(rule)
+    own = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
+    true_db = 20.0 * np.log10(np.asarray(crowd.medians_n)) + crowd.person_sd_db * rng.standard_normal((people, 1))
+    true_db = true_db + own * rng.standard_normal((people, k))
+    slopes = (crowd.slope or USUAL_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
+    criteria = crowd.criterion_sd * rng.standard_normal(people)
+    seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
+    levels, sides, rights = (np.empty((people * k, MOST_TRIALS)) for _ in range(3))
+    counts, turns = np.zeros(people * k, dtype=np.intp), np.zeros(people * k, dtype=np.intp)
+    peaks = np.full((people * k, rule.reversals), np.nan)
+    t0, family = AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
+    for run in range(people * k):
+        person, place = divmod(run, k)
+        participant = Participant(
+            t0, slopes[person] * NEPER_PER_DB, true_db[person, place], crowd.lapse, criteria[person], family
+        )
+        track = Track(levels[run], sides[run], rights[run], peaks[run])
+        counts[run], turns[run] = play_run(packed, participant, int(seeds[person, place]), track)
+    played = np.arange(MOST_TRIALS) < counts[:, None]
+    answers = tally(
+        tuple(f"S{number + 1:03d}" for number in range(people)),
+        crowd.frequencies_hz,
+        np.repeat(np.arange(people * k), counts),
+        levels[played],
+        sides[played],
+        rights[played].astype(np.bool_),
+    )
+    averaged = peaks[:, -rule.averaged_reversals :]
+    whole = np.where(turns == rule.reversals, 1.0, math.nan)
+    newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
+    shape = (people, k)
+    return SimulatedStudy(
+        answers=answers,
+        threshold_n=(newtons.mean(axis=1) * whole).reshape(shape),
+        threshold_db=(averaged.mean(axis=1) * whole).reshape(shape),
+        cap_reversals=(averaged >= packed.cap_db - 1e-9).sum(axis=1).reshape(shape).astype(np.float64),
+        trials=int(counts.sum()),
+        true_db=true_db,
+    )

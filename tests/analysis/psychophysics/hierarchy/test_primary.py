@@ -1,0 +1,118 @@
+"""The primary analysis finds what was planted, near the cap too, and finds nothing where nothing is."""
+
+import numpy as np
+import pytest
+
+from analysis.psychophysics.hierarchy.answers import count_answers
+from analysis.psychophysics.hierarchy.curve import Family
+from analysis.psychophysics.hierarchy.fit import fit_hierarchy
+from analysis.psychophysics.hierarchy.inference import direction_limit, pseudo_thresholds
+from analysis.psychophysics.hierarchy.primary import primary_analysis
+from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
+from tests.analysis.conftest import PUBLISHED, simulated_run
+
+HZ = (5.0, 15.0, 25.0, 35.0, 45.0)
+NEAR_CAP = Crowd(HZ, (0.35, 0.6, 0.85, 3.0, 4.0))
+
+
+def studies(crowd, count, people=10):
+    return [simulate_study(crowd, PUBLISHED, people, (77, number)) for number in range(count)]
+
+
+def test_a_contrast_towards_the_cap_is_not_lost():
+    """Where reversal means come out 5 dB too small (3 N at 35 Hz, 4 N at 45 Hz)."""
+    true = 20 * np.log10(4.0 / 0.35)
+    fitted, means = [], []
+    for study in studies(NEAR_CAP, 8):
+        fit = fit_hierarchy(study.answers)
+        fitted.append(fit.means_db[4] - fit.means_db[0])
+        means.append(np.mean(study.threshold_db[:, 4] - study.threshold_db[:, 0]))
+    assert np.mean(means) - true < -3.5
+    assert np.mean(fitted) - true == pytest.approx(0.0, abs=1.6)  # standard error 0.5 dB
+
+
+@pytest.mark.parametrize("family", list(Family))
+def test_medians_are_recovered_whatever_the_shape_of_the_curves(family):
+    crowd = Crowd((5.0, 35.0), (0.5, 1.6), family=family, lapse=0.03)
+    errors = [fit_hierarchy(s.answers).means_db - s.true_db.mean(axis=0) for s in studies(crowd, 5)]
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.8
+
+
+def test_spreads_slope_and_criterion_are_recovered():
+    crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.7, 0.9), person_sd_db=3.0, frequency_sd_db=1.5, criterion_sd=0.4)
+    (study,) = studies(crowd, 1, people=40)
+    found = primary_analysis(study.answers, 3.0)
+    assert found.person_sd_db == pytest.approx(3.0, rel=0.4)
+    assert found.frequency_sd_db == pytest.approx(1.5, rel=0.4)
+    assert found.slope == pytest.approx(2.0, rel=0.25)
+    assert found.criterion_sd == pytest.approx(0.4, rel=0.4)
+    assert 0.0 < found.lapse < 0.05
+    assert max(abs(b.observed - b.predicted) for b in found.goodness.bins) < 0.08
+    assert sum(b.trials for b in found.goodness.bins) == found.trials
+
+
+def test_pseudo_thresholds_average_to_the_estimate():
+    (study,) = studies(NEAR_CAP, 1)
+    fit = fit_hierarchy(study.answers)
+    np.testing.assert_allclose(pseudo_thresholds(fit).mean(axis=0), fit.means_db, atol=1e-9)
+
+
+def test_above_the_cap_there_is_a_bound_and_no_size():
+    (study,) = studies(Crowd((5.0, 45.0), (0.5, 8.0)), 1)
+    low, high = primary_analysis(study.answers, 3.0).medians
+    assert low.upper_db is not None and low.lower_db < low.db < low.upper_db
+    assert high.above_cap and high.upper_db is None and high.upper_n is None
+    assert high.lower_db < 20 * np.log10(8.0)
+    assert high.lower_n > 2.0
+
+
+def test_guessers_leave_everything_finite():
+    (study,) = studies(Crowd((5.0, 45.0), (0.5, 1e4)), 1, people=5)
+    found = primary_analysis(study.answers, 3.0)
+    assert found.converged
+    assert np.isfinite([m.db for m in found.medians]).all()
+    assert found.medians[1].above_cap
+
+
+def test_flat_thresholds_are_equal_and_equivalent():
+    crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.5, 0.5), frequency_sd_db=0.5)
+    (study,) = studies(crowd, 1, people=24)
+    found = primary_analysis(study.answers, 3.0)
+    assert found.overall.p_huynh_feldt > 0.01
+    assert all(c.p_equivalence < 0.05 for c in found.contrasts)
+
+
+def test_answers_at_the_cap_count_and_unfinished_runs_too():
+    rng = np.random.default_rng(1)
+    trials = [
+        trial
+        for subject in ("a", "b", "c")
+        for place, true in enumerate((0.6, 9.0))
+        for trial in simulated_run(true, rng, subject=subject, run=place, frequency_hz=5.0 + 40 * place)[:50]
+    ]
+    answers = count_answers(trials, (5.0, 45.0))
+    assert answers.trials == len(trials)
+    assert (answers.level_db > 20 * np.log10(2.999)).any()
+    assert primary_analysis(answers, 3.0).medians[1].above_cap
+
+
+def test_one_person_or_no_answer_gives_no_group():
+    trials = simulated_run(1.0, np.random.default_rng(0), frequency_hz=5.0)
+    assert primary_analysis(count_answers(trials, (5.0,)), 3.0) is None
+    assert count_answers([], (5.0,)) is None
+    assert primary_analysis(None, 3.0) is None
+
+
+def test_the_direction_limit_lies_where_the_line_meets_the_cap():
+    rng = np.random.default_rng(4)
+    pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 0.3 * rng.standard_normal((10, 5))
+    found = direction_limit(HZ, pseudo, 10.0, 0.95)
+    assert found.frequency_hz == pytest.approx((35 * 45) ** 0.5, rel=0.02)
+    assert 35.0 < found.lower_hz < found.frequency_hz < found.upper_hz < 45.0
+
+
+def test_no_limit_is_said_beyond_what_was_played():
+    low = direction_limit(HZ, np.full((10, 5), 2.0) + np.arange(10)[:, None], 30.0, 0.95)
+    high = direction_limit(HZ, np.full((10, 5), 20.0) + np.arange(10)[:, None], 9.0, 0.95)
+    assert low.frequency_hz is None and "stays below the cap" in low.words
+    assert high.frequency_hz is None and "already at 5 Hz" in high.words

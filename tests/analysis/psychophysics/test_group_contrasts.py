@@ -1,0 +1,44 @@
+"""Contrasts within participants against statsmodels, scipy and values worked by hand."""
+
+import numpy as np
+import pytest
+from scipy.stats import ttest_rel
+from statsmodels.stats.multitest import multipletests
+from statsmodels.stats.weightstats import ttost_paired
+
+from analysis.psychophysics.group_contrasts import contrasts, holm
+
+HZ = (5.0, 15.0, 25.0, 35.0)
+VALUES = np.array([0.0, 0.3, 1.0, 5.0]) + np.random.default_rng(3).normal(0, [1, 1, 1, 6], (10, 4))
+
+
+def test_differences_agree_with_the_paired_t_test():
+    for place, found in enumerate(contrasts(HZ, VALUES, 0.95), start=1):
+        peer = ttest_rel(VALUES[:, place], VALUES[:, 0])
+        interval = peer.confidence_interval(0.95)
+        assert found.p == pytest.approx(peer.pvalue, rel=1e-10)
+        assert (found.lower_db, found.upper_db) == pytest.approx((interval.low, interval.high), rel=1e-10)
+        assert found.effect_size == pytest.approx(peer.statistic / np.sqrt(10))
+
+
+def test_equivalence_and_holm_agree_with_statsmodels():
+    found = contrasts(HZ, VALUES, 0.95)
+    for place, contrast in enumerate(found[:2], start=1):
+        assert contrast.p_equivalence == pytest.approx(ttost_paired(VALUES[:, place], VALUES[:, 0], -2, 2)[0])
+    assert found[2].p_equivalence is None  # 35 Hz: not asked
+    peer = multipletests([c.p for c in found], method="holm")[1]
+    assert [c.p_holm for c in found] == pytest.approx(list(peer))
+    assert holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
+
+
+def test_unequal_spread_is_found_and_equal_spread_is_not():
+    found = contrasts(HZ, VALUES, 0.95)
+    assert found[2].p_spread < 0.01
+    assert found[0].p_spread > 0.05
+
+
+def test_a_gap_leaves_out_the_person_for_that_contrast_alone():
+    values = VALUES.copy()
+    values[0, 1] = np.nan
+    assert [c.participants for c in contrasts(HZ, values, 0.95)] == [9, 10, 10]
+    assert contrasts(HZ, values[:1], 0.95) == ()
