@@ -30,6 +30,7 @@ ANSWER_COHERENCE = 0.5  # coherence that must stand out twice as far, or the rec
 
 # How samples are split, and how well a model is trusted (`observed`). By hand.
 MODEL_FLOOR = 0.002  # share of a channel's rms that counts as noise; principle: no model is exact
+LEVELS_TO_STRATIFY = 2  # principle: with more than one, the end of the time would hold one alone
 LEVELS_TO_HOLD_ONE_BACK = 3  # principle: a level to choose by lies between two that are fitted to
 CHOOSE_SHARE = 0.25  # of the fitting time, from its end, where no level can be kept back to choose by
 TEST_SHARE = 0.25  # of the whole time, from its end, where no segment has a role

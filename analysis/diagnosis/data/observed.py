@@ -4,7 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.settings import CHOOSE_SHARE, LEVELS_TO_HOLD_ONE_BACK, MODEL_FLOOR, TEST_SHARE
+from analysis.diagnosis.settings import (
+    CHOOSE_SHARE,
+    LEVELS_TO_HOLD_ONE_BACK,
+    LEVELS_TO_STRATIFY,
+    MODEL_FLOOR,
+    TEST_SHARE,
+)
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
@@ -66,8 +72,10 @@ def measured_of(recording: Recording, responses: int) -> tuple[FloatArray, Mask]
 def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> tuple[Mask, Mask, Mask]:
     """Samples to fit, to choose and to test by: (length,) each. tested: another recording is there to test by.
 
-    What is marked as test stays sealed. Of the rest, the middle level of three or more is kept back to choose by, else
-    the last quarter of the time.
+    What is marked as test stays sealed. Where nothing is, the end of each segment is, whole periods of it, so that
+    every level is tested by; of a single level, the end of the time. Of the rest, the middle level of three or more is
+    kept back to choose by, for laws differ in how they grow with the level, and further periods of a level that was
+    fitted to show only noise; else the last quarter of the time is.
     """
     inside = [s for s in segments if s.kind != "rest"]
     test = _covered([s for s in inside if s.role == "test"], length)
@@ -76,8 +84,7 @@ def roles(segments: tuple[Segment, ...], length: int, tested: bool = False) -> t
     if inside and all(s.role == "test" for s in inside):
         fit[:] = False
     elif not test.any() and not tested:
-        places = np.flatnonzero(fit)
-        test[places[int((1 - TEST_SHARE) * len(places)) :]] = True
+        test = _ends(fitted, length)
         fit &= ~test
     choose = _middle_level(fitted, length) & fit
     if not choose.any():
@@ -99,8 +106,28 @@ def _covered(segments: list[Segment], length: int) -> Mask:
     return mask
 
 
+def _ends(segments: list[Segment], length: int) -> Mask:
+    """The last quarter of each segment, or of the time where there is one level or none."""
+    mask = np.zeros(length, dtype=np.bool_)
+    if len(_levels(segments)) < LEVELS_TO_STRATIFY:
+        places = np.flatnonzero(_covered(segments, length)) if segments else np.arange(length)
+        mask[places[int((1 - TEST_SHARE) * len(places)) :]] = True
+        return mask
+    for segment in segments:
+        count = segment.stop - segment.start
+        kept = int((1 - TEST_SHARE) * count)
+        if segment.period and count >= 2 * segment.period:
+            kept = min(-(-kept // segment.period), count // segment.period - 1) * segment.period
+        mask[segment.start + kept : segment.stop] = True
+    return mask
+
+
+def _levels(segments: list[Segment]) -> list[float]:
+    return sorted({segment.amplitude for segment in segments if segment.amplitude > 0})
+
+
 def _middle_level(segments: list[Segment], length: int) -> Mask:
-    levels = sorted({segment.amplitude for segment in segments if segment.amplitude > 0})
+    levels = _levels(segments)
     if len(levels) < LEVELS_TO_HOLD_ONE_BACK:
         return np.zeros(length, dtype=np.bool_)
     middle = levels[len(levels) // 2]

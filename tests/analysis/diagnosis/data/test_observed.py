@@ -60,6 +60,23 @@ def test_the_middle_of_three_levels_is_kept_back_to_choose_by():
     assert fit.sum() == 200 and test.sum() == 100
 
 
+def test_each_level_is_fitted_to_and_tested_by_where_nothing_is_marked():
+    levels = [at(0, 400, "", 0.5), at(400, 800, "", 1.5), at(800, 1200, "", 3.0)]
+    fit, choose, test = roles(tuple(levels), 1200)
+    assert [int(test[k : k + 400].sum()) for k in (0, 400, 800)] == [100, 100, 100]
+    assert [int(fit[k : k + 400].sum()) for k in (0, 400, 800)] == [300, 0, 300]
+    assert choose[400:700].all()
+
+
+def test_of_what_repeats_whole_periods_are_tested_by():
+    for periods, tested in ((5, 1), (4, 1), (8, 2), (2, 1)):
+        long = 100 * periods
+        levels = [Segment(k * long, (k + 1) * long, "multisine", 1.0 + k, 100) for k in range(2)]
+        _, _, test = roles(tuple(levels), 2 * long)
+        assert [int(test[k * long : (k + 1) * long].sum()) for k in range(2)] == [100 * tested, 100 * tested]
+        assert test[long - 100 * tested : long].all()
+
+
 def test_of_two_levels_none_is_kept_back():
     assert counts([at(0, 400, level=1.0), at(400, 800, level=2.0), at(900, 1000, "test")]) == (600, 200, 100)
 

@@ -26,10 +26,11 @@ def three_levels() -> Recording:
     )
 
 
-def test_the_middle_level_is_chosen_by():
+def test_the_middle_level_is_chosen_by_and_every_level_is_tested_by():
     (one,) = observed_parts([three_levels()], 1)
-    assert one.choose[LONG : 2 * LONG].all()
-    assert not one.choose[:LONG].any()
+    assert np.flatnonzero(one.choose)[[0, -1]].tolist() == [LONG, LONG + 3 * LONG // 4 - 1]
+    assert [int(one.test[k * LONG : (k + 1) * LONG].sum()) for k in range(3)] == [LONG // 4] * 3
+    assert one.fit[:LONG].any() and one.fit[2 * LONG :].any()
 
 
 def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
