@@ -34,7 +34,7 @@ SEED ?= 95000
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank docs clean \
+.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank docs site clean \
 	types imports compiled $(TESTED)
 
 help: ## Show what can be made
@@ -96,6 +96,11 @@ $(VENV)/.installed-prove: $(VENV)/.installed
 	@echo "Installing the second physics engine"
 	@$(PIP) install --quiet -c constraints.txt -e '.[prove]'
 	@touch $@
+
+site: $(VENV)/.installed ## Set up, then build the pages of docs/ and the reference of the Python interface in build/site
+	$(PIP) install -q -c constraints.txt -e ".[site]"
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build -q -f docs/site/mkdocs.yml
+	@echo "The site: build/site/index.html"
 
 clean: ## Remove the environment and all caches
 	rm -rf $(VENV) .venv-peers .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

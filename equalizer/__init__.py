@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from equalizer.effects.catalogue import EFFECTS as EFFECTS
     from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model as fit_mechanical_model
     from equalizer.identification.state_space.identify_recordings import identify_recordings as identify
+    from equalizer.identification.state_space.settings import IdentificationSettings as IdentificationSettings
     from equalizer.plant.identified_model import IdentifiedModel as IdentifiedModel
     from equalizer.plant.mechanical_model import MechanicalModel as MechanicalModel
     from equalizer.signals.recording import Recording as Recording
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "EFFECTS": "equalizer.effects.catalogue:EFFECTS",
+    "IdentificationSettings": "equalizer.identification.state_space.settings:IdentificationSettings",
     "IdentifiedModel": "equalizer.plant.identified_model:IdentifiedModel",
     "MechanicalModel": "equalizer.plant.mechanical_model:MechanicalModel",
     "Recording": "equalizer.signals.recording:Recording",
@@ -39,6 +41,7 @@ _HOME = {
 
 __all__ = [
     "EFFECTS",
+    "IdentificationSettings",
     "IdentifiedModel",
     "MechanicalModel",
     "Recording",

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from study.store.formats.mechanical_model_file import read_mechanical_model as read_mechanical_model
     from study.store.formats.mechanical_model_file import write_mechanical_model as write_mechanical_model
     from study.store.formats.protocol_files import read_protocol as read_protocol
+    from study.store.formats.protocol_files import read_study_protocol as read_study_protocol
     from study.store.formats.recording_file import read_recording as read_recording
     from study.store.formats.recording_file import write_recording as write_recording
     from study.store.formats.trials_file import read_trials as read_trials
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from study.workflows.results.analyze_data import analyze_data as analyze_data
     from study.workflows.session.rehearse_study import Rehearsal as Rehearsal
     from study.workflows.session.rehearse_study import rehearse_study as rehearse_study
+    from study.workflows.session.simulate_session import simulate_session as simulate_session
 
 _HOME = {
     "ImportPlan": "study.workflows.recording.import_recording:ImportPlan",
@@ -47,9 +49,11 @@ _HOME = {
     "read_mechanical_model": "study.store.formats.mechanical_model_file:read_mechanical_model",
     "read_protocol": "study.store.formats.protocol_files:read_protocol",
     "read_recording": "study.store.formats.recording_file:read_recording",
+    "read_study_protocol": "study.store.formats.protocol_files:read_study_protocol",
     "read_trials": "study.store.formats.trials_file:read_trials",
     "record_device": "study.workflows.recording.record_device:record_device",
     "rehearse_study": "study.workflows.session.rehearse_study:rehearse_study",
+    "simulate_session": "study.workflows.session.simulate_session:simulate_session",
     "write_identified_model": "study.store.formats.identified_model_file:write_identified_model",
     "write_mechanical_model": "study.store.formats.mechanical_model_file:write_mechanical_model",
     "write_recording": "study.store.formats.recording_file:write_recording",
@@ -67,9 +71,11 @@ __all__ = [
     "read_mechanical_model",
     "read_protocol",
     "read_recording",
+    "read_study_protocol",
     "read_trials",
     "record_device",
     "rehearse_study",
+    "simulate_session",
     "write_identified_model",
     "write_mechanical_model",
     "write_recording",

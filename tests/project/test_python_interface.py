@@ -1,12 +1,15 @@
 """What `import protocols`, `equalizer`, `analysis` and `study` offer, and what that costs."""
 
+import re
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
 PACKAGES = ("protocols", "equalizer", "analysis", "study")
+ROOT = Path(__file__).parents[2]
 HEAVY = ("numpy", "scipy", "numba", "pandas", "matplotlib", "h5py", "pydantic", "textual")
 
 
@@ -19,6 +22,13 @@ def test_every_exported_name_is_there_and_described(name):
         found = getattr(package, exported)
         described = isinstance(found, dict) or (found.__doc__ and not found.__doc__.startswith(f"{found.__name__}("))
         assert described, f"{name}.{exported} says nothing of itself"
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_the_reference_describes_every_exported_name(name):
+    page = (ROOT / "docs" / "api" / f"{name}.md").read_text("utf-8")
+    homes = [home.replace(":", ".") for home in import_module(name)._HOME.values()]
+    assert sorted(re.findall(r"^::: (\S+)$", page, re.MULTILINE)) == sorted(homes)
 
 
 @pytest.mark.parametrize("name", PACKAGES)

@@ -156,7 +156,7 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
             spread[name] += (value - at[name]) ** 2
     units = _units(claim.effect, at, said)
     return {
-        name: Estimate(value, units.get(name, "1"), _interval(value, float(np.sqrt(spread[name]))))
+        name: Estimate(value, units.get(name) or "1", _interval(value, float(np.sqrt(spread[name]))))
         for name, value in at.items()
         if np.isfinite(value)
     }

@@ -11,6 +11,8 @@ and cost nothing there; without it they settle anywhere up to the unit circle, a
 
 @dataclass(frozen=True, slots=True)
 class IdentificationSettings:
+    """Band and order of a model, and how it is looked for."""
+
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     """Number of states; even, because poles are fitted in pairs."""

@@ -65,8 +65,12 @@ class Feedforward(Summarised):
 
 
 def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSettings | None = None) -> Feedforward:
-    """Raises ForceLimitError above the cap, TrackingError where nothing is wanted in the band, ValueError for a signal
-    that is not the model's."""
+    """The forces that make the model accelerate as wanted, within the band that it was identified in.
+
+    Finite-horizon LQR tracking from rest, which equals the least squares of the block-Toeplitz response with a weight
+    on the forces. wanted: (N, p), with the model's rate and output channels. Raises ForceLimitError above the cap,
+    TrackingError where nothing is wanted in the band, ValueError for a signal that is not the model's.
+    """
     settings = settings or FeedforwardSettings()
     check_wanted(model, wanted)
     problem = augmented(model, TrackingWeights(settings.weight))

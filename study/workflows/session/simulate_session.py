@@ -1,0 +1,48 @@
+"""A whole session of a simulated participant on the simulated device, by one call."""
+
+from pathlib import Path
+
+from protocols.definition.study_protocol import StudyProtocol
+from study.devices.clock import VirtualClock
+from study.errors import StudyError
+from study.store.formats.protocol_files import ProtocolFile
+from study.store.sessions.archive import SessionFolder
+from study.workflows.results.session_results import write_tables
+from study.workflows.session.conduct_session import conduct_new
+from study.workflows.session.open_session import SessionPlan
+from study.workflows.session.simulated_participant import simulated_participant
+
+
+def simulate_session(
+    protocol: ProtocolFile[StudyProtocol],
+    data: Path,
+    observer: str = "ideal",
+    subject: str = "ideal1",
+    seed: int = 1,
+    model: Path | None = None,
+) -> SessionFolder:
+    """Run it in virtual time, and write its log and its tables.
+
+    observer: one of the names of `hapteq study --observer`; subject: the code that the session is filed under; model:
+    an identified model that equalizes the stimuli. The same seed gives the same session. Raises StudyError.
+    """
+    plan = SessionPlan(
+        protocol=protocol.protocol,
+        protocol_text=protocol.text,
+        protocol_locked=protocol.locked,
+        subject=subject,
+        observer=observer,
+        seed=seed,
+        data=data,
+        model=model,
+    )
+    conducted = conduct_new(plan, "simulated", simulated_participant(observer, seed, VirtualClock()))
+    write_tables(conducted.folder)
+    if conducted.left:
+        raise StudyError(
+            "The simulated participant did not finish",
+            f"{conducted.folder.name}: {conducted.left}.",
+            "Change what stops it in the protocol, and simulate another session.",
+            saved="Everything until then is in the folder.",
+        )
+    return conducted.folder
