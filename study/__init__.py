@@ -5,7 +5,7 @@ beside each other, then `session`, which is pure, then `errors`.
 
 Read in this order: `session.events` (the facts), `session.state` (their fold), `session.machine` (what is next),
 `workflows.run_session` and `workflows.present_trial` (doing it), `devices.device` (the port) and `devices.govern`
-(what keeps the force within its limits), `store.event_log` (on the disk before anybody acts on it).
+(what keeps the force within its limits), `store.event_log` (on the disk before it is acted on).
 
 Decisions:
 

@@ -50,7 +50,7 @@ class DeviceError(StudyError):
 
 
 class LeftError(StudyError):
-    """Somebody pressed Ctrl-C or closed the terminal, and what was done so far is safe."""
+    """Ctrl-C was pressed or the terminal closed, and what was done so far is safe."""
 
     exit_code = ExitCode.INTERRUPTED
 

@@ -42,7 +42,7 @@ def recompute_runs(trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = 
     """All runs of one phase, in the order in which they first occur.
 
     Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
-    staircase: whoever asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.study_analysis`).
+    staircase: a caller who asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.study_analysis`).
 
     Raises InconsistentTrialsError naming subject, session, run and trial where a level is not the one that the
     answers before it lead to, or where a row is missing, doubled or too many.
@@ -99,7 +99,7 @@ def _fold(counted: tuple[Trial, ...], rule: StaircaseRule) -> StaircaseState:
 
 
 def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
-    """A test trial that was renamed would be missed by nobody: below the cap it shows."""
+    """A test trial that was renamed shows below the cap."""
     if not math.isclose(trial.level_n, rule.cap_n, rel_tol=LEVEL_TOLERANCE):
         raise InconsistentTrialsError(
             f"{_place(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the cap "

@@ -121,7 +121,7 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
 
 
 def _beside(analysis: StudyAnalysis) -> list[Section]:
-    """Detection, catch trials, practice: each only where somebody took it."""
+    """Detection, catch trials, practice: each only where it was taken."""
     sections = []
     if analysis.detection:
         felt = "Which of two intervals held a vibration, at whatever direction: the level from which it is felt at all."

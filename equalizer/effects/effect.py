@@ -34,7 +34,7 @@ class Parameter:
     none: float | None
     """Where all numbers that have such a value are at it, the effect is not there; None: it does not matter."""
     scale: Literal["log", "linear", "signed"] = "log"
-    """signed: either sign, and nobody knows the size beforehand; a fit moves it by a share of its start."""
+    """signed: either sign, and the size is not known beforehand; a fit moves it by a share of its start."""
     step: float = 0.01
     """How far a fit moves it to see what it does: relative, but in its own unit on a linear scale."""
     fixed: bool = False

@@ -38,7 +38,7 @@ class RealClock:
 
 
 class VirtualClock:
-    """Time that passes only when somebody sleeps. Whoever must act meanwhile (a device) listens."""
+    """Time that passes only when the program sleeps. What must act meanwhile (a device) listens."""
 
     virtual = True
 

@@ -144,7 +144,7 @@ class Device(Protocol):
         """Fade out, wait until the device is still, and say what happened. To be called after a fault as well.
 
         Does not raise for a lost device, so that the trial can be logged as void; the next `hold` or `play` does.
-        After FORCE_LEFT the force may still be on: whoever hears of it says so to the person at the handle.
+        After FORCE_LEFT the force may still be on: the program says so to the person at the handle.
         """
         ...
 

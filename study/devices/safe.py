@@ -123,7 +123,7 @@ class SafeDevice:
         self._closed = True
         atexit.unregister(self._close_at_exit)
         if not self._runner.force_off:
-            # Closing never raises and may be the last thing a program does: whoever holds the handle must hear it.
+            # Closing never raises and may be the last thing a program does: the person at the handle must hear it.
             with contextlib.suppress(OSError):
                 sys.stderr.writelines([f"{Fault.FORCE_LEFT.value}\n"])
 

@@ -1,4 +1,4 @@
-"""A map for a file of which nothing is known but its arrays: to be completed by whoever recorded it."""
+"""A map for a file of which nothing is known but its arrays: to be completed by the person who recorded it."""
 
 import json
 import re

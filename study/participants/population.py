@@ -2,7 +2,7 @@
 
 All numbers are ours. They are chosen so that a study of ten looks like the published figure 2 in its main lines:
 lowest at 5 Hz, a significant rise at 35 Hz, some who never find the direction there and end at the cap, 45 Hz much
-like 35 Hz. Nobody's published threshold is copied.
+like 35 Hz. No published threshold is copied.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Leave when somebody says so from outside, or when the terminal is gone: the device must not stay with nobody."""
+"""Leave when that is asked from outside, or when the terminal is gone: the device must not stay unattended."""
 
 import asyncio
 import os

@@ -1,6 +1,6 @@
 """What the screens around a session ask for. The application hears these and lets the engine do it.
 
-Values: nobody changes one after posting it (Textual itself writes its own fields into a message, so they cannot be
+Values: none is changed after it was posted (Textual itself writes its own fields into a message, so they cannot be
 frozen).
 """
 

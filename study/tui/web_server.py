@@ -27,7 +27,7 @@ TOKEN_BYTES = 32
 
 
 class ScreenServer(Server):
-    """Starts `command` for whoever opens the page. A closed page ends it, as a closed terminal would."""
+    """Starts `command` for each visitor of the page. A closed page ends it, as a closed terminal would."""
 
     def __init__(self, command: Sequence[str], host: str, port: int, say: Callable[[str], None]) -> None:
         super().__init__(

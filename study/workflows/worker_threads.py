@@ -1,4 +1,4 @@
-"""Work in parallel that somebody may leave at any time: compiled code lets other threads run meanwhile."""
+"""Work in parallel that may be left at any time: compiled code lets other threads run meanwhile."""
 
 import os
 import threading
@@ -28,7 +28,7 @@ class _Job(Generic[Result]):
 
 
 class WorkerThreads:
-    """Daemons: whoever leaves does not wait for work that is half done, and neither does the end of the program. A
+    """Daemons: leaving does not wait for work that is half done, and neither does the end of the program. A
     pool of `concurrent.futures` would be waited for."""
 
     def __init__(self, workers: int) -> None:

@@ -21,7 +21,7 @@ class Controlled:
 
 
 def controlled(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> Controlled:
-    """answers: None = refused or broken down, which names nothing. Raises KeyError for a claim nobody knows."""
+    """answers: None = refused or broken down, which names nothing. Raises KeyError for an unknown claim."""
     return Controlled(name, claim, CLAIMS[claim](answers), tuple(map(_words, answers)))
 
 

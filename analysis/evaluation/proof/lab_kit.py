@@ -1,4 +1,4 @@
-"""A blind test on a device that somebody changes on purpose: what is changed, what ought to be said, how it counts."""
+"""A blind test on a device that is changed on purpose: what is changed, what ought to be said, how it counts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.proof.share import Figure, share
 
 NOTHING, MISSING = "nothing", "missing"
-"""A change that is none; a verdict that nobody gave."""
+"""A change that is none; a verdict that was not given."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ class Answers:
 
 
 def count_answers(trials: Iterable[Trial], frequencies_hz: Iterable[float]) -> Answers | None:
-    """All answers that count, of the test phase, at these frequencies: nothing is censored, nobody is dropped.
+    """All answers that count, of the test phase, at these frequencies: nothing is censored, no participant is dropped.
 
     None where there is no such answer. Answers of an unfinished run count too: where a run stops depends on the answers
     before, never on the threshold itself.

@@ -10,7 +10,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 SLOW = 0.02
-"""Share of the rms velocity below which nobody knows which way an axis slides."""
+"""Share of the rms velocity below which the direction of sliding is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""A linear mechanical model for whoever has none: masses, dampers and springs at the driven axes, and as many
+"""A linear mechanical model where none is given: masses, dampers and springs at the driven axes, and as many
 oscillators on them as the recordings ask for."""
 
 from collections.abc import Callable, Sequence

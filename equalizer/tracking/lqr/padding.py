@@ -30,7 +30,7 @@ class Padding:
 
 
 CAUSAL = Padding(before_s=0.0)
-"""Nothing before the first row: for a start that nobody knew of, and where the rows alone are played."""
+"""Nothing before the first row: for a start that was not known, and where the rows alone are played."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -60,7 +60,7 @@ class Glances:
 
 
 LEISURELY_S = 0.003
-"""Between two pumps of a simulated rig: nobody feels it, so it need not wake for each tick."""
+"""Between two pumps of a simulated rig: no hand feels it, so it need not wake for each tick."""
 
 LATE_S = 0.1
 """A real rig's loop that did not turn for so long counts as hanging. A busy computer is late by some 10 ms."""
@@ -122,7 +122,7 @@ class RealtimeDrive:
                 self._runner.give_up(TimeoutError("its loop gave no sign of life"))
 
     def refresh(self) -> bool:
-        """Before somebody looks: whether what the runner saw last is of now. Waits for the loop while all is still."""
+        """Before a look: whether what the runner saw last is of now. Waits for the loop while all is still."""
         if self._runner.moving:
             return True
         return self._thread.is_alive() and not self._closing and self._glances.ask()
@@ -141,7 +141,7 @@ class RealtimeDrive:
         self._thread.join(JOIN_S)
 
     def pump(self, now_s: float) -> None:
-        """Run what is due. After a gap nobody watched (a stopped process, a suspended machine) let go at once."""
+        """Run what is due. After a gap that was not watched (a stopped process, a suspended machine) let go at once."""
         with self._lock:
             if not self._governor.moving:
                 self._awake.clear()

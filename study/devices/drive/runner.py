@@ -118,7 +118,7 @@ class CompiledRunner:
         self._parts = parts(rig.sense, rig.advance)
         self._rig = rig
         self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
-        # Of its own: how often somebody looks must not change what is recorded.
+        # Of its own: how often it is looked at must not change what is recorded.
         self._glance_noise = ~rig.noise
         self._seen: Seen | None = None
         self._governor = governor
@@ -139,7 +139,7 @@ class CompiledRunner:
         try:
             rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
             self._seen = Seen(reading, rig.buttons())
-        except Exception:  # noqa: BLE001 - whoever looks hears that there is no reading
+        except Exception:  # noqa: BLE001 - a look hears that there is no reading
             self._seen = None
 
     def run(self, ticks: int) -> None:

@@ -1,6 +1,6 @@
 """Ticks of a rig that is driven from Python, and what is done when its driver hangs or fails.
 
-A call into a driver cannot be broken off. So whoever gives up first says that the rig is `gone` and has a thread of
+A call into a driver cannot be broken off. So the side that gives up first marks the rig as `gone` and has a thread of
 its own write zero; and the loop, whenever its call returns, writes zero once more: a late write leaves no force.
 """
 
@@ -87,7 +87,7 @@ class SteppedRunner:
             return
         try:
             self._seen = Seen(self._read(), self._rig.buttons())
-        except Exception:  # noqa: BLE001 - whoever looks hears that there is no reading; the next tick says why
+        except Exception:  # noqa: BLE001 - a look hears that there is no reading; the next tick says why
             self._seen = None
 
     def run(self, ticks: int) -> None:
@@ -158,7 +158,7 @@ class SteppedRunner:
         return reading
 
     def _silence(self, fault: Fault) -> None:
-        """Zero force first, then the governor is still: nobody shall hear that all is over before it is."""
+        """Zero force first, then the governor is still: it must not be said that all is over before it is."""
         written = False
         try:
             written = self._zero.run(ZERO_PATIENCE_S) and not self._writing  # what still hangs may come after the zero
@@ -171,7 +171,7 @@ class SteppedRunner:
             self._deciding = False
 
     def _once_more(self) -> None:
-        """Somebody gave up while this thread was in the driver: whatever it wrote is taken back."""
+        """The caller gave up while this thread was in the driver: whatever it wrote is taken back."""
         self.force_off = False
         try:
             self._rig.write(np.zeros(3))

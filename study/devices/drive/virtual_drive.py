@@ -1,4 +1,4 @@
-"""Ticks in virtual time: those that became due are run whenever somebody sleeps."""
+"""Ticks in virtual time: those that became due are run whenever the program sleeps."""
 
 from collections.abc import Callable
 
@@ -31,7 +31,7 @@ class VirtualDrive:
         """Nothing can hang: ticks run in the caller's own thread."""
 
     def refresh(self) -> bool:
-        """Before somebody looks: whether what the runner saw last is of now."""
+        """Before a look: whether what the runner saw last is of now."""
         if not (self._runner.moving or self._closed):
             self._runner.glance()
         return not self._closed

@@ -113,7 +113,7 @@ class Governor:
         self.state[cells.FORCE : cells.FORCE + 3] = 0.0
 
     def miss(self, ticks: int) -> None:
-        """So many ticks went by unattended: the device held its last force, and nobody read its sensors."""
+        """So many ticks went by unattended: the device held its last force, and its sensors were not read."""
         nothing = np.full(READING_SIZE, np.nan)
         for _ in range(ticks):
             govern.record(self.state, self.buffer, nothing)

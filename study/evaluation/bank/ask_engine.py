@@ -18,7 +18,7 @@ PATIENCE_S = 1200.0
 """For one case; it takes seconds to a minute."""
 GLANCE_S = 0.5
 TRIES = 2
-"""A process that died may have been killed by somebody."""
+"""A process that died may have been killed from outside."""
 
 
 class Engine:
@@ -54,7 +54,7 @@ class Engine:
             impatience.cancel()
 
     def end(self) -> None:
-        """For good: whoever is asking at this moment hears no answer."""
+        """For good: a caller that is waiting at this moment gets no answer."""
         with self._beginning:
             self.ended = True
             if self._process is not None:
@@ -151,7 +151,7 @@ def _given_up(place: Path) -> None:
 
 
 def forget_recording(place: Path) -> None:
-    """Megabytes each; the label keeps their hash, and the seed gives them again. Kept where nobody answered."""
+    """Megabytes each; the label keeps their hash, and the seed gives them again. Kept where no answer came."""
     if is_answered(place):
         with suppress(OSError):
             (place / RECORDING).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""How large a bench is: which of its axes are driven and read, how long, and how much of what nobody knows is in it."""
+"""How large a bench is: which of its axes are driven and read, how long, and how much unknown physics is in it."""
 
 from dataclasses import dataclass
 

@@ -18,7 +18,7 @@ CORRECT = "Correct it before it is sealed; from then on nothing in it may be cha
 
 
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
-    """Each change so many times, and nothing twice as often, in a drawn order. seed: None draws one that nobody knows.
+    """Each change so many times, and nothing twice as often, in a drawn order. seed: None draws a secret one.
     Raises AlreadyThereError, CannotWriteError."""
     every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
     order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))

@@ -1,7 +1,7 @@
 """The log of a session in words: one plain sentence per fact.
 
-Nothing about health is in them, and no direction of a trial that does not count (yet): it may come again, and whoever
-reads this may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
+Nothing about health is in them, and no direction of a trial that does not count (yet): it may come again, and a reader
+may sit beside the participant. Runs and trials count from 1 here, as on the participant's screen.
 """
 
 from collections.abc import Iterable

@@ -35,7 +35,7 @@ class FormFilled:
     """Of the form, as its protocol states it."""
     ethics_id: str
     passed: bool
-    """False: consent was not given, or somebody may not take part. Always true for the other forms."""
+    """False: consent was not given, or a person may not take part. Always true for the other forms."""
     answers: dict[str, str]
     monotonic_s: Seconds | None = None
     event: Literal["form_filled"] = "form_filled"

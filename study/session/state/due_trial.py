@@ -57,7 +57,7 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
     draws = 0 if same_stimulus_again(opened) else place.attempt
     draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
     label, direction = label_of(draw.direction, labels_are_swapped(protocol, opened)), draw.direction
-    if run.phase is Phase.DETECTION:  # the answer is an interval; the direction matters to nobody
+    if run.phase is Phase.DETECTION:  # the answer is an interval; the direction does not matter
         label = draw.direction
         direction = detection_direction(opened.seed, run.index, place.trial, draws)
     phase, level_db = run.phase, place.staircase.level_db

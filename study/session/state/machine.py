@@ -19,7 +19,7 @@ class FillIn:
 
 @dataclass(frozen=True, slots=True)
 class CheckDevice:
-    """Before anybody holds the handle."""
+    """Before a person holds the handle."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ def progress(state: SessionState) -> Progress:
     expected = [_usual_trials(state, run) for run in state.runs]
     done = sum(expected[: state.run])
     if not state.finished:
-        # A long run must not seem to end: nobody should count on its next trial being the last.
+        # A long run must not seem to end: its next trial must not seem to be the last.
         done += min(state.trial, 0.95 * expected[state.run])
     share = done / sum(expected)
     return Progress(share_done=share, minutes_left=_minutes_left(state, sum(expected) - done))

@@ -152,7 +152,7 @@ def dose_now(sitting: SittingState) -> Dose:
 def exposed(
     sitting: SittingState, frequency_hz: float, amplitude_mps2: float | None, seconds: float | None
 ) -> SittingState:
-    """seconds: None where nobody counted them (an older log); that adds nothing."""
+    """seconds: None where they were not counted (an older log); that adds nothing."""
     if not seconds:
         return sitting
     return replace(sitting, dose=add(sitting.dose, frequency_hz, amplitude_mps2, seconds))

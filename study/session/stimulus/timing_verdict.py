@@ -1,6 +1,6 @@
 """Whether a computer keeps the time of a device: the limits, and the verdict that follows from a measurement.
 
-A real device waits for nobody: a loop that wakes up later than one tick has missed it. A simulated device waits for its
+A real device does not wait: a loop that wakes up later than one tick has missed it. A simulated device waits for its
 computer, so that lateness is a warning there and no fault. A verdict never says fine of what is too late for the device
 at hand, nor of what would be too late for a real one.
 """

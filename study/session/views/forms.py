@@ -40,7 +40,7 @@ def judge_form(protocol: StudyProtocol, kind: FormKind, reply: FormReply) -> For
             # Of a person who does not take part only that is kept.
             return FormOutcome(agreed, answers if agreed else {})
         case FormKind.EXCLUSION:
-            # Which question it was is about somebody's health, and no study needs it.
+            # Which question it was is about the person's health, and no study needs it.
             return FormOutcome(all(answer == "no" for answer in answers.values()), {})
         case FormKind.SETUP:
             return FormOutcome(True, answers, _reminder(protocol.setup, answers))

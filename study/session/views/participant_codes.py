@@ -14,7 +14,7 @@ def is_code(text: str) -> bool:
 
 
 def code_problem(text: str) -> str:
-    """What is wrong with a code, as a sentence for whoever types it; empty where nothing is."""
+    """What is wrong with a code, as a sentence for the person who types it; empty where nothing is."""
     if is_code(text):
         return ""
     if not text.strip():
@@ -23,7 +23,7 @@ def code_problem(text: str) -> str:
 
 
 def next_code(taken: tuple[str, ...]) -> str:
-    """A code that nobody has, in the manner of the latest of those taken (latest first); P01 where there is none."""
+    """A free code, in the manner of the latest of those taken (latest first); P01 where there is none."""
     for code in taken:
         match = _NUMBERED.fullmatch(code)
         if match is None:

@@ -237,7 +237,7 @@ class Unanswered:
     asked: bool = False
     """The participant asked for the trial again, and so is there."""
     pause: bool = False
-    """Asked for a pause: hands free at once, and nothing is played until somebody goes on."""
+    """Asked for a pause: hands free at once, and nothing is played until it goes on."""
     cause: VoidCause = VoidCause.FAULT
     """Why no answer came, where `leave`, `asked` and `pause` do not tell."""
 

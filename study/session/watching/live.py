@@ -1,4 +1,4 @@
-"""What a running session tells whoever watches it beside its log: how it is right now. Values only, replaced often."""
+"""What a running session tells a viewer beside its log: how it is right now. Values only, replaced often."""
 
 from dataclasses import dataclass
 from typing import Literal

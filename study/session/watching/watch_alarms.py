@@ -1,4 +1,4 @@
-"""What somebody who watches a session must hear of. Each alarm is one small function of the situation."""
+"""What a person who watches a session must hear of. Each alarm is one small function of the situation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -69,7 +69,7 @@ def alarms_of(now: Situation, before: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
         alarm if alarm.event or alarm.kind not in known else replace(alarm, since=known[alarm.kind].since)
         for alarm in found
     ]
-    # The end of a sitting is news for a while; for whoever saw it happen it stays.
+    # The end of a sitting is news for a while; for a viewer who saw it happen it stays.
     return tuple(
         a for a in lasting if a.kind not in _ENDS or a.kind in known or now.seconds_since(a.since) < JUST_NOW_S
     )

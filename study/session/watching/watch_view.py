@@ -1,7 +1,7 @@
-"""What somebody who watches a running session may see. Values only, light to import, without a seed.
+"""What a person who watches a running session may see. Values only, light to import, without a seed.
 
 The direction of a trial is not in here before its answer is in: an experimenter who knows it can give it away.
-Numbers of runs, trials and attempts count from 0, as in the files; whoever shows them adds one.
+Numbers of runs, trials and attempts count from 0, as in the files; a screen that shows them adds one.
 """
 
 from dataclasses import dataclass
@@ -126,7 +126,7 @@ class Alarm:
     since: str
     """UTC. The same alarm keeps its time as long as it lasts."""
     urgent: bool = True
-    """Rings until somebody has seen it; others ring once."""
+    """Rings until it was seen; others ring once."""
     event: bool = False
     """Something that happened, each time anew; others are states that come and go."""
 
@@ -172,7 +172,7 @@ class WatchView:
     gate_radius_mm: float
     """0 where there is no gate."""
     live: Live | None
-    """None where nobody has told for some seconds."""
+    """None where nothing was told for some seconds."""
     alarms: tuple[Alarm, ...]
 
     @property

@@ -1,4 +1,4 @@
-"""A session as somebody follows it: its state, and the facts that decide nothing (notes, remarks, how it ended)."""
+"""A session as it is followed: its state, and the facts that decide nothing (notes, remarks, how it ended)."""
 
 from dataclasses import dataclass, replace
 
@@ -30,7 +30,7 @@ class Watched:
     notes: tuple[NoteLine, ...]
     """Oldest first."""
     left: str
-    """Why the sitting was ended; empty while nobody ended it."""
+    """Why the sitting was ended; empty while it was not ended."""
     sitting_utc: str
     """When the present sitting was opened."""
     notes_before: int

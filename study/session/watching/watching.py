@@ -28,7 +28,7 @@ class Beside:
 
     live: Live | None = None
     writer: bool | None = None
-    """Whether a program holds the session; None where nobody asked."""
+    """Whether a program holds the session; None where that was not asked."""
     problem: str = ""
     """Why the log cannot be followed any further; empty where it can."""
 

@@ -113,14 +113,14 @@ def read_opening(path: Path) -> Event | None:
 
 
 def readable_events(path: Path) -> tuple[Event, ...]:
-    """The events before the first damage, for whoever wants to look at a log that cannot be used. Raises nothing."""
+    """The events before the first damage, for a look at a log that cannot be used. Raises nothing."""
     chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
             chain, event = read_chained(chain, line)
             events.append(parse_event(event))
     except (OSError, ValueError):
-        pass  # here the damage begins; whoever reads this knows of it
+        pass  # here the damage begins; the caller knows of it
     return tuple(events)
 
 
@@ -158,7 +158,7 @@ def _own(descriptor: int, path: Path) -> None:
 
 @contextlib.contextmanager
 def nobody_writes(path: Path) -> Iterator[None]:
-    """Hold the lock of a log that is to be erased, where there is one. Raises StudyError while somebody writes it."""
+    """Hold the lock of a log that is to be erased, where there is one. Raises StudyError while it is being written."""
     if not path.exists():
         yield
         return

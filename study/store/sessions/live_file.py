@@ -1,4 +1,4 @@
-"""`live.json`: how a running session is right now, for whoever watches it. Replaced whole, several times a second."""
+"""`live.json`: how a running session is right now, for those who watch it. Replaced whole, several times a second."""
 
 import json
 import math
@@ -22,9 +22,9 @@ _LARGEST_BYTES = 1 << 16
 
 
 def write_live(folder: Path, live: Live) -> None:
-    """At most some four times a second. Never raises: a session must not end because nobody can watch it.
+    """At most some four times a second. Never raises: a session must not end because it cannot be watched.
 
-    One writer: whoever holds the session's lock.
+    One writer: the holder of the session's lock.
     """
     values = {name: _finite(value) for name, value in asdict(live).items()}
     text = json.dumps({"format": LIVE_FORMAT, "version": LIVE_VERSION, **values}, allow_nan=False)

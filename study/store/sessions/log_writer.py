@@ -1,4 +1,4 @@
-"""Whether somebody writes a log right now, as the operating system knows it: its lock dies with its holder."""
+"""Whether a log is being written right now, as the operating system knows it: its lock dies with its holder."""
 
 from pathlib import Path
 

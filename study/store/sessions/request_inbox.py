@@ -1,6 +1,6 @@
 """What reaches a running session from beside it: one small file per request, in a folder of the session.
 
-Whoever asks writes a file under a name of its own and renames it into place; the session looks, reads, removes.
+A program that asks writes a file under a name of its own and renames it into place; the session looks, reads, removes.
 A name begins with what is asked, so that a stop is a stop even where its content cannot be read.
 """
 
@@ -53,7 +53,7 @@ class RequestInbox:
         part = self._folder / f".{name}.part"
         try:
             self._make_folder()
-            # No fsync: a request is for now, and nobody wants it after a power cut.
+            # No fsync: a request is for now, and is not wanted after a power cut.
             write_private(part, f"{json.dumps(document)}\n".encode())
             part.replace(self._folder / name)
         except OSError as problem:
@@ -69,7 +69,7 @@ class RequestInbox:
         return (self._folder / name).exists()
 
     def take_back(self, name: str) -> bool:
-        """Remove a request that nobody took. False where it was taken after all."""
+        """Remove a request that was not taken. False where it was taken after all."""
         try:
             (self._folder / name).unlink()
         except OSError:
@@ -77,7 +77,7 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """At the start of a sitting: yesterday's stop must not end today's. Notes that nobody took any more are kept:
+        """At the start of a sitting: yesterday's stop must not end today's. Notes that were not taken are kept:
         they are still for the log. Never raises."""
         try:
             self._make_folder()
@@ -121,7 +121,7 @@ class RequestInbox:
             self._passed_over.add(name)
 
     def _set_aside(self, name: str) -> None:
-        """Under a hidden name, for whoever wants to know what it was."""
+        """Under a hidden name, for a later look at what it was."""
         try:
             (self._folder / name).rename(self._folder / f".unusable-{name}")
         except OSError:

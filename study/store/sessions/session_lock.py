@@ -17,7 +17,7 @@ PATIENCE_S = 20.0
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the session's lock. Raises StudyError at once where somebody else does."""
+    """Hold the session's lock. Raises StudyError at once where another program does."""
     lock = FileLock(folder / LOCK_NAME, mode=PRIVATE_FILE)
     try:
         lock.acquire(timeout=0)

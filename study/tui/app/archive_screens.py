@@ -101,9 +101,9 @@ class ArchiveScreens:
         """The engine works through one at a time; so does this screen, which is taken off when it is over."""
         from study.tui.screens.diagnosing import DiagnosingScreen
 
-        def stopped(somebody: bool | None) -> None:
+        def stopped(stopped_here: bool | None) -> None:
             self._diagnosing = None
-            if somebody:
+            if stopped_here:
                 self._send(LetGo())
 
         self._send(Diagnose(wanted.sources, wanted.model, wanted.out, wanted.clean))

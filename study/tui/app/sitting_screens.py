@@ -143,7 +143,7 @@ class SittingScreens:
 
         self._shown = screen_for(ask, self._keys)
         await self._app.push_screen(self._shown, partial(self._dismissed, ask.number))
-        # Typed ahead, before anybody can have read what is asked here.
+        # Typed ahead, before what is asked here can have been read.
         self._forget_earlier()
 
     async def _trial_screen(self) -> TrialScreen:
@@ -176,7 +176,7 @@ class SittingScreens:
         self._number = 0
 
     def _drop(self) -> None:
-        """Take off what was asked before, and whatever somebody opened over it (help, commands)."""
+        """Take off what was asked before, and whatever was opened over it (help, commands)."""
         self._number = 0
         if self._trial is not None:
             self._trial.saved()  # the engine goes on only when the answer is on the disk

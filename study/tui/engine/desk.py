@@ -64,9 +64,9 @@ class Desk:
         self.opened: SessionFolder | None = None
 
     def perform(self, command: Command) -> None:
-        """Raises StudyError where it cannot be done, KeyboardInterrupt where somebody let go."""
+        """Raises StudyError where it cannot be done, KeyboardInterrupt where the user let go."""
         self.opened = None
-        # From here on a signal interrupts. What came before found nobody to interrupt.
+        # From here on a signal interrupts. What came before interrupted nothing.
         if self._link.taken_is_let_go:
             raise KeyboardInterrupt
         match command:
@@ -172,7 +172,7 @@ def _looked_up(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Sessio
 
 
 def _diagnosis(path: Path) -> Diagnosis:
-    # Compilers and solvers are loaded when somebody asks for what needs them.
+    # Compilers and solvers are loaded when they are needed.
     from study.workflows.views.view_diagnosis import diagnosis_view
 
     return Diagnosis(diagnosis_view(path))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from study.tui.engine.desk import Desk
 
 NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
-"""Loaded while somebody still types a code, so that beginning is quick."""
+"""Loaded while a code is still typed, so that beginning is quick."""
 
 NEEDED_AT_THE_END = ("study.workflows.results.analyze_data",)
 """Statistics and plots: loaded after them, if there is still time, so that the results are quick."""

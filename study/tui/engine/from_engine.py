@@ -44,7 +44,7 @@ class LookUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """Nobody waits for the reply of this number any more."""
+    """The reply of this number is waited for no more."""
 
     number: int
 
@@ -142,7 +142,7 @@ class Withdrawn:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """What was asked for could not be done, or not to its end: also of a sitting that somebody left."""
+    """What was asked for could not be done, or not to its end: also of a sitting that was left."""
 
     error: ErrorText
     path: str = ""

@@ -37,7 +37,7 @@ LOOK_EVERY_S = 0.1
 UNSHOWN_S = 1.0
 """A wait for the handle that is no longer than this shows nothing of its own."""
 SILENT_AFTER_S = 0.5
-"""A screen without a heartbeat for so long is suspended, dead or hung: nobody could stop what plays."""
+"""A screen without a heartbeat for so long is suspended, dead or hung: what plays could not be stopped."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
@@ -167,7 +167,7 @@ class RemoteDisplay:
         self._link.send(Trouble(sentence))
 
     def _ask(self, call: Call, shown: Any) -> Any:
-        """While nothing plays: a screen may be suspended for as long as anybody likes."""
+        """While nothing plays: a screen may be suspended for any time."""
         number = self._show(call, shown)
         while (reply := self._reply(number)) is None:
             pass

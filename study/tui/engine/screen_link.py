@@ -55,7 +55,7 @@ class ScreenLink:
 
     @property
     def taken_is_let_go(self) -> bool:
-        """Whether somebody let go after the command that was taken last had been sent."""
+        """Whether the user let go after the command that was taken last had been sent."""
         return self._taken <= self._let_go_up_to
 
     def reply(self, patience_s: float) -> Reply | None:

@@ -8,7 +8,7 @@ from study.session.watching.requests import Request
 
 @dataclass(frozen=True, slots=True)
 class SessionOrder:
-    """A new session, as somebody asks for it."""
+    """A new session, as it is asked for."""
 
     protocol: str
     """A shipped protocol's name, or a file."""
@@ -62,7 +62,7 @@ class Analyze:
 
 @dataclass(frozen=True, slots=True)
 class Withdraw:
-    """Erase all sessions of this session's participant. Whoever sends it has asked twice."""
+    """Erase all sessions of this session's participant. The sender has asked twice."""
 
     session: str
 

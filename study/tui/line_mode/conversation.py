@@ -26,7 +26,7 @@ class Line:
 
 
 class WaitOver(Enum):
-    """Why nobody's line came."""
+    """Why no line came."""
 
     INPUT_ENDED = "the input ended"
     CUT_SHORT = "the stimulus ended early"
@@ -85,7 +85,7 @@ class Conversation:
         return line
 
     def overheard(self) -> Line | None:
-        """A line that somebody typed meanwhile, without waiting for it. From a pipe never: the writer planned its
+        """A line that was typed meanwhile, without waiting for it. From a pipe never: the writer planned its
         lines for the questions that follow."""
         if not self._lines.interactive:
             return None

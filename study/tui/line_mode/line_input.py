@@ -1,4 +1,4 @@
-"""Lines from a terminal or a pipe, with a limit of time, so that whoever waits can do something meanwhile."""
+"""Lines from a terminal or a pipe, with a limit of time, so that a waiting program can do something meanwhile."""
 
 import os
 import select

@@ -1,4 +1,4 @@
-"""After a void trial: nothing is played until somebody says that he is there."""
+"""After a void trial: nothing is played until the participant is back."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""Before the experimenter's view opens where a participant may look on: nobody opens it by one wrong key."""
+"""Before the experimenter's view opens where a participant may look on: no single wrong key opens it."""
 
 from __future__ import annotations
 

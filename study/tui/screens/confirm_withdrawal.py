@@ -1,4 +1,4 @@
-"""The consent taken back during a sitting, asked for with a word: nobody erases a session by one wrong key."""
+"""The consent taken back during a sitting, asked for with a word: no single wrong key erases a session."""
 
 from typing import ClassVar
 

@@ -24,7 +24,7 @@ suggest is fitted, and compared with its rivals on data that no fit has seen.
 
 
 class DiagnosingScreen(Screen[bool]):
-    """Returns true where somebody stopped it."""
+    """Returns true where it was stopped."""
 
     HELP = HELP
     CSS = """

@@ -1,4 +1,4 @@
-"""A note for the log, by whoever is there; or that something happened to the participant."""
+"""A note for the log, by the person at the screen; or that something happened to the participant."""
 
 from typing import ClassVar, cast
 
@@ -28,7 +28,7 @@ class NoteScreen(ModalScreen[NoteAsked | None]):
 - Write what should be known about this session later. No names: the log is kept with the data.
 - **Tab** goes on to who writes it, and whether something happened to the participant.
 - **Ctrl+S** or the button writes it into the log; **Esc** leaves without writing.
-- If somebody was hurt, leave the handle alone and look after the participant first.
+- If a person was hurt, leave the handle alone and look after the participant first.
 """
     DEFAULT_CSS = """
     NoteScreen { align: center middle; }

@@ -1,4 +1,4 @@
-"""A pause: nothing is played until somebody decides how to go on. Notes are taken here."""
+"""A pause: nothing is played until it is decided how to go on. Notes are taken here."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""While the device is being prepared: what is going on, and for how long. No bar, because nobody knows the end."""
+"""While the device is being prepared: what is going on, and for how long. No bar, because the end is not known."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ TICK_S = 0.5
 HELP = """\
 # Preparing
 
-The program gets the device ready. Nothing moves, and nobody needs to do anything. The first time on a computer this
+The program gets the device ready. Nothing moves, and there is nothing to do. The first time on a computer this
 takes longer, because the simulated device is compiled.
 
 **Ctrl+Q** leaves; a session that was begun can be resumed.

@@ -122,7 +122,7 @@ class TrialScreen(Screen[None]):
         self._wanted = None
 
     def disarm(self) -> None:
-        """Nobody waits for a reply any more."""
+        """No reply is waited for any more."""
         self._armed_s = None
         self._drop_limit()
         if not self._taken:
@@ -140,7 +140,7 @@ class TrialScreen(Screen[None]):
         self._say(self._verdict_sentence())
 
     def show_trouble(self, sentence: str) -> None:
-        """Stays until the next trial is over: between two trials nobody could read it."""
+        """Stays until the next trial is over: between two trials there is no time to read it."""
         self._trouble = sentence
         self._trouble_is_old = False
         if self._composed:

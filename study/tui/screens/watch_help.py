@@ -22,7 +22,7 @@ what the handle did along the direction, *off* across it. ↺ marks a reversal, 
 (shown in a wider window).
 * **Runs**: *rev.* counts reversals, *n* trials.
 * **A(8)**: today's vibration dose after ISO 5349-1, and the limit of this protocol.
-* **Catch**: trials at full force that anybody should get right; errors in them are lapses of attention.
+* **Catch**: trials at full force that every participant should get right; errors in them are lapses of attention.
 
 The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
 """

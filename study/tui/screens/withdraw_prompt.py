@@ -1,4 +1,4 @@
-"""Withdrawal, asked for with the code itself: nobody erases a participant by one wrong key."""
+"""Withdrawal, asked for with the code itself: no single wrong key erases a participant."""
 
 from typing import ClassVar
 
@@ -17,7 +17,7 @@ HELP = """\
 
 A participant takes the consent back. All sessions of this code in this data folder are erased for good: answers,
 recordings, tables and figures, and the analysis of the folder, which was made from them too. A tombstone with the
-session's name stays, so that nobody gets the code again.
+session's name stays, so that the code is not given again.
 
 Type the code and press Enter to erase. **Esc** leaves everything as it is.
 

@@ -36,7 +36,7 @@ Key = tuple[str, str]
 
 
 class AlarmBook:
-    """Which alarms somebody has seen, and when the bell rings. Values in, values out; the time is given."""
+    """Which alarms were seen, and when the bell rings. Values in, values out; the time is given."""
 
     def __init__(self) -> None:
         self._alarms: tuple[Alarm, ...] = ()
@@ -112,7 +112,7 @@ class WatchScreen(Screen[None]):
     view: reactive[WatchView | None] = reactive(None)
 
     class Left(Message):
-        """Whoever watched wants to leave; the session goes on."""
+        """The viewer wants to leave; the session goes on."""
 
     def __init__(
         self, source: WatchSource, ask: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
@@ -199,12 +199,12 @@ class WatchScreen(Screen[None]):
             self._guide(GUIDE, said=False)
 
     def _alarms_of_the_view(self) -> tuple[Alarm, ...]:
-        """Nobody needs to be alarmed by the end that was asked for here."""
+        """No alarm for the end that was asked for here."""
         alarms = self.view.alarms if self.view is not None else ()
         return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
 
     def _own_alarms(self, now_s: float) -> list[Alarm]:
-        """Of what the log cannot tell: that nobody reads it any more, that a stop was not heard."""
+        """Of what the log cannot tell: that it is read no more, that a stop was not heard."""
         since = self.view.utc if self.view is not None else ""
         alarms = []
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:

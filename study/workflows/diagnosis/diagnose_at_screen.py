@@ -1,4 +1,4 @@
-"""A diagnosis that somebody started on the screen, and may stop there."""
+"""A diagnosis that was started on the screen, and may stop there."""
 
 from collections.abc import Callable
 from itertools import count

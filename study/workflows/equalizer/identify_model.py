@@ -141,7 +141,7 @@ def _at_place(
         "hand": sorted({str(recording.meta.get("hand", "")) for recording in recordings}),
         "feedback": recordings[0].meta.get("feedback"),
         "input": "excitation" if plan.with_spring else "command",
-        # None: whoever compensates these effects adds them whole, for nothing of them is in the model.
+        # None: compensation of these effects adds them whole, for nothing of them is in the model.
         "amplitude_n": _amplitude_n(recordings) if physics is None else None,
         "freed_of": [] if physics is None else freed_of(physics),
     }

@@ -78,7 +78,7 @@ def _validated(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
 
 
 def _unknown(content: FileContent) -> tuple[str, str]:
-    """The best that can be said of a file that nobody knows."""
+    """The best that can be said of a file of no known kind."""
     if content.is_folder:
         return "folder", "this folder is not a session: it holds no events.jsonl"
     if content.hdf5_format is not None:

@@ -47,7 +47,7 @@ class WrittenRecording:
 
 
 def _unsaid(notice: str) -> None:
-    """For whoever knows that nobody is near the device."""
+    """For a caller that knows that no person is near the device."""
 
 
 def record_device(
@@ -146,7 +146,7 @@ def _meta(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bo
         "place_m": list(plan.place_m),
         "hand": protocol.hand,
         "feedback": spring_facts(protocol.spring, device.info.effective_mass_kg),
-        # As mounted: what is off by the mounting's tolerance is not known to whoever records.
+        # As mounted: what is off by the mounting's tolerance is not known when it is recorded.
         "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
         "interrupted": interrupted,
         "segments": [segment_facts(take) for take in done],

@@ -36,7 +36,7 @@ def segment_facts(take: Take) -> dict[str, Any]:
 
 
 def warnings_of(take: Take) -> list[str]:
-    """Sentences for whoever recorded."""
+    """Sentences for the person who recorded."""
     health, what = take.health, _what(take)
     found = []
     if take.played_n < take.requested_n:

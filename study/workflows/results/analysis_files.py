@@ -9,7 +9,7 @@ from study.store.disk.real_folder import is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 
 ANALYSIS_NAME = "analysis"
-"""Where an analysis goes, in the folder that was analysed, if nobody says otherwise."""
+"""Where an analysis goes, in the folder that was analysed, unless stated otherwise."""
 
 OURS = ("thresholds", "delivered", "ellipsoids", "staircases-*")
 """Names of figures, so that those of an earlier analysis (of a participant who withdrew since) do not stay."""

@@ -53,7 +53,7 @@ class Conducted:
     fault: Fault
     """What was wrong with the device, if that was why."""
     withdrawn: bool = False
-    """The participant takes the consent back: whoever conducted this erases the data."""
+    """The participant takes the consent back: the caller erases the data."""
 
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> Conducted:

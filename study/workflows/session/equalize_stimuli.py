@@ -171,7 +171,7 @@ def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
 
 
 def _check_axes(model: IdentifiedModel, path: Path) -> None:
-    """Other names may be anybody's; ours in another order would send forces along the wrong axes."""
+    """Other names may mean anything; ours in another order would send forces along the wrong axes."""
     for names, ours in zip((model.input_channels, model.output_channels), AXES, strict=True):
         if set(names) == set(ours) and names != ours:
             raise _refused(

@@ -25,7 +25,7 @@ from study.workflows.session.participant_number import participant_number
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What is decided before anybody sits down."""
+    """What is decided before a person sits down."""
 
     protocol: StudyProtocol
     protocol_text: str

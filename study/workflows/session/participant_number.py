@@ -1,4 +1,4 @@
-"""Which participant of a protocol somebody is: chooses the row of a balanced order, and who has swapped labels."""
+"""Which participant of a protocol a person is: chooses the row of a balanced order, and who has swapped labels."""
 
 import re
 import tomllib

@@ -1,4 +1,4 @@
-"""From what somebody asks for to a plan: the protocol read, the code checked, the seed drawn."""
+"""From what is asked for to a plan: the protocol read, the code checked, the seed drawn."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from study.workflows.session.participant_number import begun_in
 
 
 def check_code(data: Path, subject: str, simulated: bool) -> None:
-    """Raises WrongUseError where the code belongs to somebody else."""
+    """Raises WrongUseError where the code belongs to another person."""
     for folder in _folders(data, subject):
         if folder.withdrawn:
             raise WrongUseError(
@@ -53,7 +53,7 @@ def _can_go_on(folder: SessionFolder, protocol: str) -> bool:
 class SittingPlan:
     session: SessionPlan
     notes: tuple[str, ...]
-    """Worth knowing before anybody begins."""
+    """Worth knowing before the session begins."""
 
 
 def plan_sitting(

@@ -73,7 +73,7 @@ def does_not_take_part(state: SessionState) -> StudyError:
 
 
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
-    """As often as somebody wants to check again. Going on in spite of a finding is their decision, and is logged."""
+    """As often as it is to be checked again. Going on in spite of a finding is their decision, and is logged."""
     sitting.attendant.begin("preparing")
     device, clock = sitting.device, sitting.clock
     safety = state.protocol.safety

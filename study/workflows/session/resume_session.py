@@ -46,7 +46,7 @@ def resumed_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> 
     close_to_others(folder.path, inside=True)  # an earlier version left its files to everyone
     with locked(folder.path):
         log = EventLog.reopen(folder.log)
-        # Yesterday's stop must not end today's sitting; from now on somebody hears. Nor does yesterday's live state
+        # Yesterday's stop must not end today's sitting; from now on requests are heard. Nor does yesterday's live state
         # say anything of today, whatever its time is.
         RequestInbox(folder.path).clear()
         remove_live(folder.path)

@@ -27,7 +27,7 @@ from study.workflows.trial.sitting import Sitting, record, tell, write_notes
 from study.workflows.trial.take_pause import take_pause
 
 VOID_TRIALS_IN_A_ROW = 3
-"""After so many presentations that nobody asked to repeat were void, the sitting ends: nobody is there, or the device
+"""After so many void presentations that were not asked for, the sitting ends: the participant is gone, or the device
 is not well. A stimulus must not shake an empty chair all night."""
 
 
@@ -43,7 +43,7 @@ class SessionEnd:
 
 
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
-    """Run until the session is finished or somebody leaves.
+    """Run until the session is finished or left.
 
     KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and leaves as LeftError. Any StudyError
     on the way leaves with the number of answers that are on disk, and how to go on.
@@ -59,7 +59,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     except BaseException:
         sitting.device.stop()
         raise
-    # Whoever leaves here by Ctrl-C leaves what is over already.
+    # Ctrl-C leaves here what is over already.
     with contextlib.suppress(KeyboardInterrupt):
         outcome = end.state.sitting.turned_away if end.state.closed else ""
         sitting.display.goodbye(Goodbye(not end.left, end.state.answers, end.left, outcome))

@@ -31,7 +31,7 @@ GLANCE_S = 0.1
 """How often a waiting participant gives the device a sign of life."""
 
 PATIENCE_S = 60.0
-"""How long a handle may stay away: nobody will come and move a simulated one."""
+"""How long a handle may stay away: no person will move a simulated one."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 

@@ -1,4 +1,4 @@
-"""A simulated participant as somebody who can sit down: display, hand and virtual time in one."""
+"""A simulated participant as a person who can sit down: display, hand and virtual time in one."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from study.workflows.session.simulated_display import SimulatedDisplay
 def simulated_participant(
     name: str, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
-    """By the name that the command line and the log use. Raises StudyError for a name that nobody has."""
+    """By the name that the command line and the log use. Raises StudyError for an unknown name."""
     return seated(observer_named(name, seed), seed, clock, on_question)
 
 

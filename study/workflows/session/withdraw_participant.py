@@ -110,7 +110,7 @@ def still_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
 
 
 def _hold(folder: SessionFolder, held: ExitStack) -> None:
-    """Nobody writes the session while it is erased. A link that was put in its place since is not followed."""
+    """The session is not written while it is erased. A link that was put in its place since is not followed."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
     lock = folder.path / LOCK_NAME

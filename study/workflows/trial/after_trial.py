@@ -15,14 +15,14 @@ class AfterTrial:
     leave: str = ""
     """Why the sitting ends here; empty where it goes on."""
     void: str = ""
-    """Why the trial is void, where nobody asked for that; empty where it counts."""
+    """Why the trial is void, where that was not asked for; empty where it counts."""
     pause: str = ""
-    """Who asked for a pause; empty where nobody did."""
+    """Who asked for a pause; empty where it was not asked for."""
     fault: Fault = Fault.NONE
 
 
 def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
-    """Nothing was presented, or nothing that counts: somebody leaves, wants a pause, or is not there."""
+    """Nothing was presented, or nothing that counts: the participant leaves, wants a pause, or is not there."""
     if reply.leave:
         return AfterTrial(state, leave=reply.reason)
     if reply.pause:
@@ -31,5 +31,5 @@ def cut_short(state: SessionState, reply: Unanswered) -> AfterTrial:
 
 
 def reason_to_leave(fault: Fault) -> str:
-    """After these faults a device cannot go on until it is opened again, and somebody must hear of it at once."""
+    """After these faults a device cannot go on until it is opened again, and that must be said at once."""
     return fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""

@@ -1,4 +1,4 @@
-"""Who looks after everything while somebody waits: the device's sign of life, requests, buttons, the live state."""
+"""What goes on while the session waits: the device's sign of life, requests, buttons, the live state."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked, Wh
 from study.workflows.trial.requests_port import Requests
 
 LIVE_EVERY_S = 0.25
-"""Often enough for whoever watches, and no burden on the disk."""
+"""Often enough for a viewer, and no burden on the disk."""
 
 PLAYING = ("trial", "demo")
 
@@ -67,7 +67,7 @@ class Attendant:
         return self._activity not in PLAYING or self._device.fault() is Fault.NONE
 
     def listen(self) -> None:
-        """Take what was asked for. A stop takes the force away at once, whoever waits for whatever."""
+        """Take what was asked for. A stop takes the force away at once, whatever is waited for."""
         for request in self._requests.take():
             match request:
                 case StopAsked(who=who):

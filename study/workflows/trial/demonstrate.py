@@ -13,7 +13,7 @@ from study.workflows.trial.sitting import Sitting, record
 
 
 def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
-    """Until enough was felt, or somebody leaves or wants a pause. Then it can be gone through again."""
+    """Until enough was felt, or the participant leaves or wants a pause. Then it can be gone through again."""
     felt_so_far: tuple[tuple[int, int], ...] = ()
     vibration = 1
     while True:

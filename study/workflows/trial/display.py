@@ -1,4 +1,4 @@
-"""The display port: how a session talks with whoever answers. A line-mode prompt, a screen, or a simulation.
+"""The display port: how a session talks with the participant. A line-mode prompt, a screen, or a simulation.
 
 Any method may raise KeyboardInterrupt to leave: the force is off at once, and the session can be resumed.
 """
@@ -75,11 +75,11 @@ class Display(Protocol):
         ...
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        """Nothing is played until somebody decides how to go on. LEAVE where `sign_of_life` ended the wait."""
+        """Nothing is played until it is decided how to go on. LEAVE where `sign_of_life` ended the wait."""
         ...
 
     def await_return(self, reason: str) -> None:
-        """After a void trial: nothing is played until somebody is there."""
+        """After a void trial: nothing is played until the participant is there."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None: ...

@@ -27,7 +27,7 @@ def question_of(state: SessionState, present: Present) -> Question:
     run = state.runs[present.run]
     alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
     return Question(
-        phase=run.phase,  # a catch trial is one of the test run's, as far as anybody can see
+        phase=run.phase,  # a catch trial is one of the test run's, as far as the screen tells
         run_number=1 + alike.index(present.run),
         runs_in_phase=len(alike),
         trial_number=present.trial + 1,

@@ -32,7 +32,7 @@ class Sitting:
 
 
 def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
-    """First the fold, which refuses what cannot be; then the disk; only then may anybody act on it."""
+    """First the fold, which refuses what cannot be; then the disk; only then may it be acted on."""
     event = replace(event, monotonic_s=sitting.clock.now_s())
     after = apply(state, event)
     sitting.log.append(event)

@@ -1,4 +1,4 @@
-"""A pause: nothing is played until somebody decides how to go on."""
+"""A pause: nothing is played until it is decided how to go on."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> AfterTheBr
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), glance)
     state = write_notes(state, sitting)
-    # Whoever asked for a pause during the pause has had it: cleared only after the last look.
+    # A pause that was asked for during the pause is over: cleared only after the last look.
     attendant.pause_asked = None
     paused_s = sitting.clock.now_s() - started_s
     state = record(state, PauseTaken(utc=sitting.clock.utc(), who=who, paused_s=paused_s), sitting)

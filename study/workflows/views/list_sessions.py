@@ -39,7 +39,7 @@ def _says_study(path: Path) -> bool:
 
 
 def protocol_line(name: str, data: Path) -> ProtocolLine | None:
-    """None for a protocol of another kind. A bad one is offered with its problem, so that nobody misses it."""
+    """None for a protocol of another kind. A bad one is offered with its problem, so that it is not missed."""
     try:
         file = read_protocol(name, data)
     except ProtocolRefusedError as refused:

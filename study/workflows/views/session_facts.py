@@ -1,4 +1,4 @@
-"""What is to know about a session at a glance: (what, value), in the order in which somebody asks."""
+"""What is to know about a session at a glance: (what, value), in the order in which it is asked."""
 
 from equalizer.plant.model_quality import NOT_STORED
 from study.session.facts.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled

@@ -43,7 +43,7 @@ def session_line(folder: SessionFolder) -> SessionLine:
 
 
 def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
-    """`running` where somebody writes it right now; the lock is looked at for some microseconds."""
+    """`running` where it is being written right now; the lock is looked at for some microseconds."""
     if line.standing == "unfinished" and somebody_writes(folder.log):
         return replace(line, standing="running")
     return line

@@ -1,4 +1,4 @@
-"""The fact is on the disk before anybody acts on it: the order of disk and device, as they were really called."""
+"""The fact is on the disk before it is acted on: the order of disk and device, as they were really called."""
 
 import os
 from dataclasses import dataclass, field, replace
