@@ -4,11 +4,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from analysis.psychophysics.anova import OneWayAnova, one_way
 from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
 from analysis.psychophysics.detection import detection_thresholds
 from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
+from analysis.psychophysics.group_contrasts import Contrast, contrasts
+from analysis.psychophysics.hierarchy.answers import count_answers
+from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PrimaryAnalysis, primary_analysis
 from analysis.psychophysics.population import Population, split_by_population
 from analysis.psychophysics.repeated_measures import Friedman, RepeatedMeasures, friedman, repeated_measures
 from analysis.psychophysics.repeated_trials import repeat_warning
@@ -16,6 +21,7 @@ from analysis.psychophysics.runs import Run, recompute_runs
 from analysis.psychophysics.study_warnings import side_warnings, study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 from analysis.psychophysics.thresholds import Threshold, threshold_of
+from analysis.psychophysics.two_analyses import analyses_compared, declared_words
 from analysis.wording import f_text, p_text
 from equalizer.signals.summary import Summarised, Summary
 from protocols.definition.study_protocol import StudyProtocol
@@ -69,9 +75,6 @@ def _practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
     )
 
 
-CONFIDENCE = 0.95
-
-
 @dataclass(frozen=True, repr=False, slots=True)
 class StudyAnalysis(Summarised):
     """Thresholds and statistics of one study's trials, of one population."""
@@ -91,6 +94,14 @@ class StudyAnalysis(Summarised):
     ranks: Friedman
     difference: str
     """What separates the published one-way analysis from the one within participants, here."""
+    primary: PrimaryAnalysis | None
+    """The hierarchical model of all answers. None below two participants with answers at every frequency."""
+    mean_contrasts: tuple[Contrast, ...]
+    """Reversal means in dB against the lowest frequency, within participants."""
+    declared: str
+    """What the protocol declared before the data, in words."""
+    compared: str
+    """Where the published and the primary analysis differ, in words."""
     warnings: tuple[str, ...]
     detection: tuple[Threshold, ...]
     """One per detection run."""
@@ -120,13 +131,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
     with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
     """
-    parts = split_by_population(trials)
-    if len(parts) > 1:
-        raise ValueError(
-            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; "
-            "analyse each kind by itself"
-        )
-    rule = protocol.staircase
+    population, rule = _one_population(trials), protocol.staircase
     runs = recompute_runs(trials, rule)
     rows = tuple(threshold_of(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
@@ -136,18 +141,25 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
     catches = catch_tallies(trials)
     anova = one_way(table.groups())
     within = repeated_measures(table.subjects, table.values)
+    comparisons = compare_all(anova, CONFIDENCE)
+    primary = primary_analysis(count_answers(tested, table.frequencies_hz), rule.cap_n)
+    means = _mean_contrasts(rows, protocol)
     return StudyAnalysis(
         protocol=protocol,
-        population=next(iter(parts), None),
+        population=population,
         trials=tested,
         runs=runs,
         thresholds=rows,
         table=table,
         anova=anova,
-        comparisons=compare_all(anova, CONFIDENCE),
+        comparisons=comparisons,
         within=within,
         ranks=friedman(table.values),
         difference=design_difference(anova, within),
+        primary=primary,
+        mean_contrasts=means,
+        declared=declared_words(protocol.analysis),
+        compared=analyses_compared(primary, means, comparisons, table),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
             *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested))]),
@@ -158,6 +170,23 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         catches=catches,
         practice=practice_runs(trials, protocol),
     )
+
+
+def _one_population(trials: Sequence[Trial]) -> Population | None:
+    parts = split_by_population(trials)
+    if len(parts) > 1:
+        raise ValueError(
+            f"trials of {' and '.join(kind.value for kind in parts)} cannot enter one analysis; "
+            "analyse each kind by itself"
+        )
+    return next(iter(parts), None)
+
+
+def _mean_contrasts(rows: Sequence[Threshold], protocol: StudyProtocol) -> tuple[Contrast, ...]:
+    table = threshold_table(rows, protocol.stimulus.frequencies_hz, "threshold_db")
+    if not table.subjects or not table.frequencies_hz:
+        return ()
+    return contrasts(table.frequencies_hz, np.array(table.values, dtype=np.float64), CONFIDENCE)
 
 
 def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
@@ -178,6 +207,10 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "within_participants": asdict(analysis.within),
         "friedman": asdict(analysis.ranks),
         "difference": analysis.difference,
+        "primary": asdict(analysis.primary) if analysis.primary else None,
+        "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
+        "declared": asdict(analysis.protocol.analysis),
+        "compared": analysis.compared,
         "warnings": list(analysis.warnings),
     }
 

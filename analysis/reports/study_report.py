@@ -8,6 +8,7 @@ from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
+from analysis.reports.primary_tables import primary_section
 from analysis.reports.side_tables import (
     catch_table,
     delivery_tables,
@@ -113,11 +114,12 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
         tables=(threshold_table_text(analysis), group_table(analysis)),
     )
     comparison = Section(
-        "Comparison of the frequencies",
+        "Comparison of the frequencies, as published",
         paragraphs=(analysis.difference,),
         tables=(one_way_table(analysis), *pairs, within_table(analysis)),
     )
-    return [thresholds, comparison]
+    words = (analysis.declared, analysis.compared)
+    return [thresholds, primary_section(analysis.primary, words, analysis.mean_contrasts), comparison]
 
 
 def _beside(analysis: StudyAnalysis) -> list[Section]:

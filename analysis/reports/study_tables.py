@@ -106,6 +106,9 @@ def within_table(analysis: StudyAnalysis) -> Table:
         f = f"F = {number(within.f)}"
         corrected = f"{within.epsilon * within.df_conditions:.2f}, {within.epsilon * within.df_error:.2f}"
         rows.append((f"Greenhouse-Geisser, ε = {number(within.epsilon)}", corrected, f, p_value(within.p)))
+        huynh = within.epsilon_huynh_feldt or 1.0
+        corrected = f"{huynh * within.df_conditions:.2f}, {huynh * within.df_error:.2f}"
+        rows.append((f"Huynh-Feldt, ε = {number(huynh)}", corrected, f, p_value(within.p_huynh_feldt)))
         rows.append(
             ("Without correction", f"{within.df_conditions}, {within.df_error}", f, p_value(within.p_uncorrected))
         )
@@ -113,6 +116,8 @@ def within_table(analysis: StudyAnalysis) -> Table:
             f"Effect size{_without(analysis)}: partial η² = {number(within.partial_eta_squared)}, generalized η² = "
             f"{number(within.generalized_eta_squared)}."
         )
+    if within.mauchly_w is not None:
+        effects.append(f"Sphericity (Mauchly): W = {number(within.mauchly_w)}, p = {p_value(within.mauchly_p)}.")
     if ranks.p is not None:
         rows.append(("Friedman (ranks)", count(ranks.df), f"χ² = {number(ranks.chi_squared)}", p_value(ranks.p)))
         effects.append(f"Agreement of the rankings: Kendall's W = {number(ranks.kendall_w)}.")

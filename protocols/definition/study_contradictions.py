@@ -64,4 +64,8 @@ def _names(protocol: StudyProtocol) -> list[Problem]:
         problems.append(Problem("trial.device_buttons", f"is {list(buttons)}", "two different button numbers, or none"))
     if len({question.key for question in protocol.debrief}) < len(protocol.debrief):
         problems.append(Problem("debrief", "uses a key twice", "a key of its own for every question"))
+    contrast, played = protocol.analysis.contrast_hz, protocol.stimulus.frequencies_hz
+    if contrast and (len(set(contrast)) != 2 or not set(contrast) <= set(played)):
+        allowed = "two different ones of stimulus.frequencies_hz, or none"
+        problems.append(Problem("analysis.contrast_hz", f"is {list(contrast)}", allowed))
     return problems

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from protocols.definition.apparatus import SafetySettings, SpringSettings, TestDirections
+from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.field_types import Name, Source, StimulusFrequency, Title
 from protocols.definition.preparation import (
@@ -236,6 +237,7 @@ class StudyProtocol:
     catch: CatchSettings = Field(default_factory=CatchSettings)
     gate: GateSettings = Field(default_factory=GateSettings)
     limits: SittingLimits = Field(default_factory=SittingLimits)
+    analysis: AnalysisSettings = Field(default_factory=AnalysisSettings)
     debrief: Annotated[
         tuple[DebriefQuestion, ...], Field(max_length=20, description="Asked after the last run. Default: nothing.")
     ] = ()

@@ -4,6 +4,7 @@ import hashlib
 import json
 from typing import Any
 
+from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.plausibility import UNTOUCHED
 from protocols.definition.preparation import ConsentSettings, DemoSettings, PracticeSettings, SetupSettings
@@ -22,6 +23,7 @@ TABLES_SINCE = {
     "catch": CatchSettings(),
     "gate": GateSettings(),
     "limits": SittingLimits(),
+    "analysis": AnalysisSettings(),
     "debrief": (),
 }
 """Tables that came after the first locks and sessions, as they are where no file writes them: then they do not count,

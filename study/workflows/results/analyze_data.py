@@ -10,6 +10,7 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
+from analysis.reports.primary_tables import limit_words
 from analysis.reports.study_report import render_study_report
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -66,7 +67,7 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
     """Thresholds as lines: one per frequency, with mean and number of participants."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
-        lines = _lines(analysis.table, "threshold")
+        lines = [*_lines(analysis.table, "threshold"), *_primary_lines(analysis)]
     if any(row.complete for row in analysis.detection):
         lines += _lines(analysis.detection_table, "felt from")
     return lines
@@ -80,6 +81,18 @@ def _lines(table: ThresholdTable, heading: str) -> list[str]:
         mean = f"{sum(values) / len(values):.3f} N" if values else "-"
         lines.append(f"{frequency_hz:7g} Hz  {mean:>10}  {censored:>10}  {len(values):>12}")
     return lines
+
+
+def _primary_lines(analysis: StudyAnalysis) -> list[str]:
+    """The medians of the hierarchical model, beside the means above."""
+    if analysis.primary is None:
+        return []
+    lines = [f"{'frequency':>10}  {'median':>10}  {'95 % interval, all answers in one model':>10}"]
+    for median in analysis.primary.medians:
+        size = f"{median.newton:.3f} N" if median.upper_n is not None else "above cap"
+        end = f"{median.lower_n:.3f} to {median.upper_n:.3f} N" if median.upper_n else f"above {median.lower_n:.3f} N"
+        lines.append(f"{median.frequency_hz:7g} Hz  {size:>10}  {end}")
+    return [*lines, limit_words(analysis.primary), analysis.compared]
 
 
 def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
@@ -156,6 +169,7 @@ def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:
     """What the report's last section shows."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
+        "locked before the data": collected.locked,
         "device": ", ".join(collected.devices) or "none",
         "participants": ", ".join(collected.observers) or "people",
         "sessions": ", ".join(folder.name for folder in collected.sessions) or "none",

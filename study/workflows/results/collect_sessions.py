@@ -33,6 +33,8 @@ class Collected:
     """What did not enter, and why, in sentences."""
     qualities: tuple[tuple[str, str], ...]
     """Of the models that stimuli went through: (sessions, sentence), by what was measured; none for plain forces."""
+    locked: str
+    """Whether the protocol was locked when its sessions began."""
     finished: tuple[str, ...]
     """What was written now, because the program was killed before it was done, in sentences."""
 
@@ -73,8 +75,16 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
         left_out=tuple(left_out),
         qualities=_qualities(entering),
+        locked=_locked([state for _, state in entering]),
         finished=_finish(whole),
     )
+
+
+def _locked(states: Sequence[SessionState]) -> str:
+    locked = sum(state.opened.protocol_locked for state in states)
+    if not locked:
+        return "no: what the protocol declares was not fixed by a lock"
+    return "yes" if locked == len(states) else f"for {locked} of {len(states)} sessions"
 
 
 def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[tuple[str, str], ...]:

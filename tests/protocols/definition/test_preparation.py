@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import PracticeSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
@@ -74,6 +75,13 @@ def test_one_button_cannot_answer_twice(small_text):
         load_protocol(text, "mine.toml")
 
 
+def test_the_primary_contrast_is_between_two_frequencies_that_are_played(small_text):
+    table = '[analysis]\nprimary = "hierarchical"\ncontrast_hz = {}\n'
+    assert load_protocol(f"{small_text}\n{table.format('[]')}", "mine.toml").analysis.primary == "hierarchical"
+    with pytest.raises(ProtocolError, match=r"analysis\.contrast_hz"):
+        load_protocol(f"{small_text}\n{table.format('[45.0, 1.0]')}", "mine.toml")
+
+
 def test_tables_that_nobody_writes_leave_an_old_fingerprint_alone(small_protocol):
     """The fingerprint of this very protocol before any of these tables existed."""
     assert protocol_hash(small_protocol) == "3dbd332b83f609b7a013ed32f20036f1da9285a990ec04a93c54899674a16b9a"
@@ -86,6 +94,8 @@ def test_a_table_that_is_used_counts(small_protocol, table, threshold):
 
 
 def _other(table, threshold):
+    if table == "analysis":
+        return AnalysisSettings(primary="hierarchical")
     if table == "detection":
         return DetectionSettings(frequencies_hz=(25.0,))
     if table == "catch":

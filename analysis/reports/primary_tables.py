@@ -1,0 +1,150 @@
+"""The tables of the primary analysis in a study report."""
+
+from collections.abc import Sequence
+
+from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
+from analysis.psychophysics.hierarchy.inference import MedianThreshold
+from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.reports.page import Section, Table
+from analysis.wording import NONE, number, p_text, p_value, signed
+
+MEANING = (
+    "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
+    "frequency; slopes and likings for one answer differ by person. An answer at the cap is an answer like any other, "
+    "so nothing is censored and no participant is left out; levels that follow the answers do not bias the "
+    "likelihood. Threshold: the level at which an attentive answer without a liking for one direction is right in "
+    "79.37 %."
+)
+
+
+def primary_section(primary: PrimaryAnalysis | None, words: Sequence[str], means: Sequence[Contrast]) -> Section:
+    """words: what was declared, and where the analyses differ."""
+    if primary is None:
+        return Section("All answers in one model", paragraphs=tuple(words))
+    return Section(
+        "All answers in one model",
+        paragraphs=(MEANING, *words, _overall(primary), limit_words(primary)),
+        tables=(
+            _medians(primary),
+            _contrasts("Differences by the model (dB)", primary.contrasts, primary.medians),
+            *([_contrasts("Differences by reversal means (dB)", means, ())] if means else []),
+            _persons(primary),
+            _goodness(primary),
+        ),
+    )
+
+
+def _overall(primary: PrimaryAnalysis) -> str:
+    overall = primary.overall
+    test = (
+        f"Frequencies differ: F = {number(overall.f)}, Huynh-Feldt epsilon {number(overall.epsilon_huynh_feldt)}, "
+        f"{p_text(overall.p_huynh_feldt)}. "
+        if overall.f is not None
+        else ""
+    )
+    return (
+        f"{test}People differ by {number(primary.person_sd_db, 1)} dB (standard deviation) at all frequencies, and by "
+        f"{number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. Median slope "
+        f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, likings for "
+        f"one answer {number(primary.criterion_sd)} (standard deviation, in units of d')."
+        + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
+    )
+
+
+def limit_words(primary: PrimaryAnalysis) -> str:
+    limit = primary.limit
+    low, high = primary.frequencies_hz[0], primary.frequencies_hz[-1]
+    lower = f"{limit.lower_hz:.1f} Hz" if limit.lower_hz is not None else f"below {low:g} Hz"
+    upper = f"{limit.upper_hz:.1f} Hz" if limit.upper_hz is not None else f"above {high:g} Hz"
+    if limit.frequency_hz is None:
+        return f"Direction limit: none within {low:g} to {high:g} Hz. {limit.words}"
+    percent = f"{100 * primary.confidence:g} %"
+    return (
+        f"Direction limit: the median participant's threshold reaches the cap at {limit.frequency_hz:.1f} Hz "
+        f"({percent} interval: {lower} to {upper}). {limit.words}"
+    )
+
+
+def _medians(primary: PrimaryAnalysis) -> Table:
+    rows = []
+    for median in primary.medians:
+        shown, db = _interval(median.lower_n, median.upper_n), _interval(median.lower_db, median.upper_db, 1)
+        size = "above the cap" if median.above_cap else number(median.newton)
+        rows.append(
+            (f"{median.frequency_hz:g} Hz", size, shown, NONE if median.above_cap else number(median.db, 1), db)
+        )
+    percent = f"{100 * primary.confidence:g} %"
+    return Table(
+        caption="Median participant",
+        header=("Frequency", "Threshold (N)", f"{percent} interval (N)", "dB re 1 N", f"{percent} interval (dB)"),
+        rows=tuple(rows),
+        notes=("Above the cap: no size, a one-sided bound by profile likelihood.",),
+    )
+
+
+def _interval(lower: float, upper: float | None, digits: int = 2) -> str:
+    return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
+
+
+def _contrasts(caption: str, rows: Sequence[Contrast], medians: Sequence[MedianThreshold]) -> Table:
+    above = {median.frequency_hz for median in medians if median.above_cap}
+    return Table(
+        caption=caption,
+        header=("Contrast", "n", "Difference", "95 % interval", "p", "p (Holm)", "d_z", "p equivalent", "p spread"),
+        rows=tuple(
+            (
+                f"{c.frequency_hz:g} − {c.against_hz:g} Hz{' *' * (c.frequency_hz in above)}",
+                str(c.participants),
+                signed(c.difference_db, 1),
+                f"{signed(c.lower_db, 1)} to {signed(c.upper_db, 1)}",
+                p_value(c.p),
+                p_value(c.p_holm),
+                number(c.effect_size),
+                p_value(c.p_equivalence),
+                p_value(c.p_spread),
+            )
+            for c in rows
+        ),
+        notes=(
+            f"Within participants, t with n − 1 degrees of freedom. Equivalent: two one-sided tests within "
+            f"±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally much at both.",
+            *(("* The median is above the cap: only the lower end of the interval is known.",) if above else ()),
+        ),
+    )
+
+
+def _persons(primary: PrimaryAnalysis) -> Table:
+    return Table(
+        caption="People, as the model sees them (N)",
+        header=("Participant", *(f"{f:g} Hz" for f in primary.frequencies_hz), "Slope", "Criterion"),
+        rows=tuple(
+            (
+                person.subject,
+                *(
+                    "above the cap" if above else number(value)
+                    for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
+                ),
+                number(person.slope),
+                signed(person.criterion),
+            )
+            for person in primary.persons
+        ),
+        notes=("Drawn towards the other people's where a person's own answers say little.",),
+        folded=True,
+    )
+
+
+def _goodness(primary: PrimaryAnalysis) -> Table:
+    return Table(
+        caption="Predicted and observed shares of right answers",
+        header=("Trials", "Predicted", "Observed", "z"),
+        rows=tuple(
+            (str(b.trials), f"{100 * b.predicted:.1f} %", f"{100 * b.observed:.1f} %", signed(b.z, 1))
+            for b in primary.goodness.bins
+        ),
+        notes=(
+            "Levels follow answers and persons were fitted to theirs, so single shares are off by up to three standard "
+            "errors where all is well. Look for departures with a shape.",
+        ),
+        folded=True,
+    )

@@ -1,0 +1,35 @@
+"""What an analysis promises before data come in: the part of a preregistration that a program can hold."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from protocols.definition.staircase_rule import STRICT
+
+
+@dataclass(frozen=True, config=STRICT)
+class AnalysisSettings:
+    """Declared before the data. Fixed, with all else, by `hapteq protocol lock`."""
+
+    primary: Annotated[
+        Literal["undeclared", "hierarchical", "published"],
+        Field(
+            description="Which analysis decides. 'hierarchical': one psychometric model of all answers; 'published': "
+            "one-way analysis of reversal means with Tukey's intervals. Default: undeclared, and the report says so."
+        ),
+    ] = "undeclared"
+    contrast_hz: Annotated[
+        tuple[float, ...],
+        Field(
+            max_length=2,
+            description="The primary contrast: the first frequency minus the second. Default: none declared.",
+        ),
+    ] = ()
+    participants: Annotated[
+        int, Field(ge=0, le=10_000, description="Planned sample size. Default 0: none declared.")
+    ] = 0
+    exclusions: Annotated[
+        tuple[str, ...],
+        Field(max_length=20, description="Whose data are left out, and why, in sentences. Default: none declared."),
+    ] = ()

@@ -1,0 +1,68 @@
+"""The published and the primary analysis beside each other, in words, in the page and in the document."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from analysis.psychophysics.study_analysis import analyse_study, anova_document
+from analysis.psychophysics.two_analyses import analyses_compared, declared_words
+from analysis.reports.study_report import render_study_report
+from protocols.definition.declared_analysis import AnalysisSettings
+
+
+@pytest.fixture(scope="module")
+def analysis(simulate_study, protocol):
+    """Medians of 2.4 N at 35 Hz and 6 N at 45 Hz under a cap of 3 N."""
+    return analyse_study(simulate_study(), protocol)
+
+
+def test_what_the_cap_hides_is_said(analysis):
+    by_model, by_means = analysis.primary.contrasts[3], analysis.mean_contrasts[3]
+    assert by_model.difference_db > by_means.difference_db + 3.0
+    assert "are apart: at " in analysis.compared
+    assert "45 Hz" in analysis.compared
+    assert "their interval covers 3 %" in analysis.compared
+
+
+def test_far_below_the_cap_the_two_agree(simulate_study, protocol):
+    low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
+    assert "agree within 1 dB" in low.compared
+    assert "covers 3 %" not in low.compared
+
+
+def test_one_participant_leaves_the_published_analysis_alone(simulate_study, protocol):
+    alone = analyse_study(simulate_study(subjects=1), protocol)
+    assert alone.primary is None
+    assert "stands alone" in alone.compared
+    assert analyses_compared(None, (), alone.comparisons, alone.table) == alone.compared
+
+
+def test_what_was_declared_and_what_was_not_is_said():
+    assert "declares no primary analysis" in declared_words(AnalysisSettings())
+    said = declared_words(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
+    assert "hierarchical model" in said and "45 Hz minus 5 Hz" in said and "participants: 10" in said
+    assert "Not declared: exclusions." in said
+    assert "Not declared" not in declared_words(AnalysisSettings("published", (45.0, 5.0), 10, ("Nobody.",)))
+
+
+def test_the_page_and_the_document_show_both(analysis):
+    html = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
+    for words in ("All answers in one model", "Median participant", "as published", "Huynh-Feldt", "Mauchly",
+                  "above the cap", "Direction limit", "p (Holm)"):  # fmt: skip
+        assert words in html
+    document = json.loads(json.dumps(anova_document(analysis), allow_nan=False))
+    assert document["primary"]["medians"][4]["upper_db"] is None
+    assert document["primary"]["medians"][0]["lower_db"] < document["primary"]["medians"][0]["db"]
+    assert document["declared"]["primary"] == "undeclared"
+
+
+def test_the_direction_limit_is_between_the_frequencies_around_the_cap(analysis):
+    limit = analysis.primary.limit
+    assert 25.0 < limit.frequency_hz < 45.0
+    assert "this cap" in limit.words
+
+
+def test_the_declaration_is_part_of_the_analysis(simulate_study, protocol):
+    declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 5.0), 10))
+    assert "Declared as primary" in analyse_study(simulate_study(subjects=2), declared).declared
