@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.psychophysics.hierarchy.run_likelihood import newton_or_none
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, number, p_text, p_value, signed
 
@@ -28,6 +29,7 @@ def primary_section(primary: PrimaryAnalysis | None, words: Sequence[str], means
             _medians(primary),
             _contrasts("Differences by the model (dB)", primary.contrasts, primary.medians),
             *([_contrasts("Differences by reversal means (dB)", means, ())] if means else []),
+            _runs(primary),
             _persons(primary),
             _goodness(primary),
         ),
@@ -110,6 +112,29 @@ def _contrasts(caption: str, rows: Sequence[Contrast], medians: Sequence[MedianT
             f"±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally much at both.",
             *(("* The median is above the cap: only the lower end of the interval is known.",) if above else ()),
         ),
+    )
+
+
+def _runs(primary: PrimaryAnalysis) -> Table:
+    percent = f"{100 * primary.confidence:g} %"
+    rows = []
+    for run in primary.runs:
+        lower, upper = newton_or_none(run.lower_db), newton_or_none(run.upper_db)
+        if run.db is None:
+            shown = f"above {number(lower)}" if lower is not None else NONE
+        else:
+            shown = f"{number(lower)} to {number(upper)}" if upper is not None else f"{number(lower)} or more"
+        size = "above the cap" if run.db is None else number(newton_or_none(run.db))
+        rows.append((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), size, shown))
+    return Table(
+        caption="Single thresholds by maximum likelihood (N)",
+        header=("Participant", "Frequency", "Trials", "Threshold", f"{percent} profile interval"),
+        rows=tuple(rows),
+        notes=(
+            "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the "
+            "model. Above the cap: a one-sided bound.",
+        ),
+        folded=True,
     )
 
 

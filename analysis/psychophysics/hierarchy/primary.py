@@ -16,6 +16,7 @@ from analysis.psychophysics.hierarchy.inference import (
     median_thresholds,
     pseudo_thresholds,
 )
+from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, run_likelihoods
 from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
 from protocols.procedure.staircase import to_db
 
@@ -47,6 +48,8 @@ class PrimaryAnalysis:
     contrasts: tuple[Contrast, ...]
     limit: DirectionLimit
     persons: tuple[PersonEstimate, ...]
+    runs: tuple[RunLikelihood, ...]
+    """Each person at each frequency by those answers alone."""
     person_sd_db: float
     """Between people, at all frequencies."""
     frequency_sd_db: float
@@ -81,7 +84,10 @@ def primary_analysis(
         overall=repeated_measures(answers.subjects, pseudo.tolist()),
         contrasts=contrasts(frequencies, pseudo, confidence),
         limit=direction_limit(frequencies, pseudo, cap_db, confidence),
-        persons=_persons(fit, cap_db),
+        persons=(persons := _persons(fit, cap_db)),
+        runs=run_likelihoods(
+            answers, [(one.slope, one.criterion) for one in persons], fit.lapse, cap_db, family, confidence
+        ),
         person_sd_db=float(sds[0]),
         frequency_sd_db=float(sds[1]),
         slope=float(np.exp(numbers[k + 2])),

@@ -1,0 +1,87 @@
+"""Each run by itself: the threshold that makes its answers most probable, with a profile interval.
+
+One run of some 60 trials does not tell a slope: slope, criterion and lapse rate are the person's from the model of all
+answers. The threshold is the run's alone, not drawn towards anything, and so is the interval.
+
+Source: S. S. Wilks, Ann. Math. Stat. 9 (1938), 60-62 (half the chi-squared quantile below the highest log-likelihood).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+from scipy.stats import chi2, norm
+
+from analysis.psychophysics.hierarchy.answers import Answers
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity
+from equalizer.signals.signal import FloatArray
+
+GRID_DB, BEYOND_DB = 0.1, 30.0
+"""Thresholds are looked for in such steps, so far beyond the levels played on both sides."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunLikelihood:
+    """In dB re 1 N. An interval holds every threshold that the answers do not contradict."""
+
+    subject: str
+    frequency_hz: float
+    trials: int
+    """All runs of the person at this frequency together."""
+    db: float | None
+    """None where the most probable threshold is above the cap: then lower_db is a one-sided bound."""
+    lower_db: float | None
+    """None: no lower end within 30 dB below the levels played."""
+    upper_db: float | None
+    """None: no upper end; the answers do not contradict a participant who feels no direction at all."""
+
+
+def run_likelihoods(
+    answers: Answers,
+    people: Sequence[tuple[float, float]],
+    lapse: float,
+    cap_db: float,
+    family: Family = Family.WEIBULL,
+    confidence: float = 0.95,
+) -> tuple[RunLikelihood, ...]:
+    """people: (slope, criterion) of every person, in the order of the answers."""
+    k = len(answers.frequencies_hz)
+    found = []
+    for run in np.unique(answers.run):
+        person, place = divmod(int(run), k)
+        grid, height = _likelihood(answers, int(run), people[person], lapse, family)
+        trials = int((answers.right + answers.wrong)[answers.run == run].sum())
+        ends = _ends(grid, height, cap_db, confidence)
+        found.append(RunLikelihood(answers.subjects[person], answers.frequencies_hz[place], trials, *ends))
+    return tuple(found)
+
+
+def _likelihood(
+    answers: Answers, run: int, person: tuple[float, float], lapse: float, family: Family
+) -> tuple[FloatArray, FloatArray]:
+    """Thresholds (g,) in dB, and the log-likelihood at each."""
+    cells = answers.run == run
+    level = answers.level_db[cells]
+    grid = np.arange(level.min() - BEYOND_DB, level.max() + BEYOND_DB, GRID_DB)
+    t = AT_THRESHOLD[family] + person[0] * NEPER_PER_DB * (level[None, :] - grid[:, None])
+    p = lapse + (1.0 - 2.0 * lapse) * ndtr(sensitivity(t, family)[0] - answers.side[cells] * person[1])
+    return grid, np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells]
+
+
+def _ends(
+    grid: FloatArray, height: FloatArray, cap_db: float, confidence: float
+) -> tuple[float | None, float | None, float | None]:
+    """Most probable threshold, lower and upper end."""
+    best = float(grid[height.argmax()])
+    above = best > cap_db
+    drop = norm.ppf(confidence) ** 2 / 2 if above else chi2.ppf(confidence, 1) / 2
+    inside = np.flatnonzero(height >= height.max() - drop)
+    lower = float(grid[inside[0]]) if inside[0] > 0 else None
+    upper = float(grid[inside[-1]]) if inside[-1] < len(grid) - 1 else None
+    return (None, lower, None) if above else (best, lower, upper)
+
+
+def newton_or_none(db: float | None) -> float | None:
+    return None if db is None else math.pow(10.0, db / 20.0)
