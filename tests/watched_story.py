@@ -1,0 +1,126 @@
+"""A session as it is followed by an experimenter, told fact by fact."""
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+from protocols.document.hashing import protocol_hash
+from protocols.trial import Phase
+from study.session.facts.events import (
+    AnswerGiven,
+    DeviceFacts,
+    RestTaken,
+    SessionClosed,
+    SessionOpened,
+    TrialMeasured,
+    TrialPresented,
+    TrialSpoiled,
+)
+from study.session.state.due_trial import Present
+from study.session.state.machine import Finish, Rest, next_action
+from study.session.watching.live import Live
+from study.session.watching.watched import Watched, begin_watching, follow
+from study.session.watching.watching import Beside, watch_view
+
+BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)
+
+
+DEVICE = DeviceFacts("a device", simulated=False, sample_rate_hz=1000.0)
+
+
+def at(seconds: float) -> str:
+    return (BEGAN + timedelta(seconds=seconds)).isoformat(timespec="milliseconds")
+
+
+def opened(protocol, text, seed=7) -> SessionOpened:
+    return SessionOpened(
+        utc=at(0),
+        format="hapteq-session",
+        version=1,
+        session="P01_001",
+        subject="P01",
+        participant_number=0,
+        observer="scripted",
+        protocol_text=text,
+        protocol_hash=protocol_hash(protocol),
+        protocol_locked=False,
+        seed=seed,
+        device=DEVICE,
+        equalizer="none",
+        versions={"hapteq": "0"},
+    )
+
+
+def presented(action: Present, seconds: float) -> TrialPresented:
+    return TrialPresented(
+        utc=at(seconds),
+        run=action.run,
+        trial=action.trial,
+        attempt=action.attempt,
+        phase=action.phase,
+        frequency_hz=action.frequency_hz,
+        level_db=action.level_db,
+        level_n=action.level_n,
+        direction=action.label,
+        angle_deg=action.angle_deg,
+        polarity=action.polarity,
+    )
+
+
+def place(action: Present) -> dict[str, int]:
+    return {"run": action.run, "trial": action.trial, "attempt": action.attempt}
+
+
+class Story:
+    """A session under way; ten seconds for each trial."""
+
+    def __init__(self, protocol, text, seed=7) -> None:
+        self.watched: Watched = begin_watching(opened(protocol, text, seed), protocol)
+        self.seconds = 0.0
+
+    def tell(self, event) -> "Story":
+        self.watched = follow(self.watched, event)
+        return self
+
+    def open_trial(self) -> Present:
+        action = next_action(self.watched.state)
+        if isinstance(action, Rest):
+            state = self.watched.state
+            self.tell(RestTaken(at(self.seconds), state.run, state.trial, rested_s=action.seconds))
+            action = next_action(self.watched.state)
+        self.seconds += 10.0
+        self.tell(presented(action, self.seconds))
+        return action
+
+    def answer(self, correct: bool, **measured) -> "Story":
+        action = self.open_trial()
+        answer = action.label if correct else 3 - action.label
+        self.tell(AnswerGiven(at(self.seconds + 2), **place(action), answer=answer, response_time_s=2.0))
+        facts = {"status": "ok", "vibrated_s": 2.0, "delivered_mps2": 4.0, "off_axis_mps2": 3.0} | measured
+        return self.tell(TrialMeasured(at(self.seconds + 3), **place(action), **facts))
+
+    def spoil(self, reason: str) -> "Story":
+        action = self.open_trial()
+        return self.tell(TrialSpoiled(at(self.seconds + 3), **place(action), reason=reason))
+
+    def to_phase(self, phase: Phase) -> "Story":
+        while self.watched.state.runs[self.watched.state.run].phase is not phase:
+            self.answer(True)
+        return self
+
+    def finish(self) -> "Story":
+        answers = iter([True, True, True, False] * 100)
+        while not isinstance(next_action(self.watched.state), Finish):
+            self.answer(next(answers))
+        return self.tell(SessionClosed(at(self.seconds + 4), "completed"))
+
+    def view(self, live: Live | None = None, later: float = 4.0, before=None, writer: bool | None = None):
+        return watch_view(self.watched, Beside(live, writer), at(self.seconds + later), before)
+
+    def live(self, activity="trial", age_s: float = 0.1, since_s: float = 1.0, later: float = 4.0, **changes) -> Live:
+        now = self.seconds + later
+        quiet = Live(at(now - age_s), activity, at(now - since_s), "", 0.5, True, 1.0, False, 0)
+        return replace(quiet, **changes)
+
+
+def kinds(view) -> list[str]:
+    return [alarm.kind for alarm in view.alarms]
