@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from analysis.diagnosis.confirm.confirm_laws import (
     unconfirmed_beside_motion,
 )
 from analysis.diagnosis.confirm.fitting_measures import Look, look_of, looks_of
-from analysis.diagnosis.confirm.laws_beside_model import weighed_beside
+from analysis.diagnosis.confirm.laws_beside_model import Beside, weighed_beside
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import names_of_parts
@@ -33,7 +34,7 @@ from analysis.diagnosis.result.candidates import beside_given, linear_remarks, r
 from analysis.diagnosis.result.contrast_findings import with_contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
-from analysis.diagnosis.result.state_maps import state_maps
+from analysis.diagnosis.result.state_maps import StateMaps, state_maps
 from analysis.diagnosis.result.unconfirmed import unconfirmed_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard
@@ -51,6 +52,7 @@ from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
 
+BALANCE = "the force balance"
 WEIGHED = ("force_deadband", "force_saturation")
 """Laws of the command that a balance has weighed: what it does not name is not there."""
 GAINS = ("force_gain", "sensor_gain")
@@ -96,12 +98,13 @@ def diagnose(
     if settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.0)
         known = settings.balances
-        balances = balances_of(recordings, frozenset(settings.without), settings.time_left) if known is None else known
+        balances = known if known is not None else _balances(recordings, settings)
         for number, look in enumerate(looks_of(recordings, model, balances, settings.compared)):
             progress("fitting the named laws", 0.2 + 0.3 * number)
             context = _search_context(recordings[0], look, settings, map_)
             repeats = all(floor.how == "repeats" for floor in look.chosen.floors)
-            found = searched_by_balance(context, balances, repeats)
+            weigh = partial(searched_by_balance, context, balances, repeats)
+            found = settings.guard.part(BALANCE, "the fit of its laws", weigh, None)
             if found is not None and not (look.narrow and leaves_open(found)):
                 return _assembled(recordings, settings, look, _Seen(found, CleanFloor()), balances)
     progress("measuring the noise", 0.3 if balances else 0.0)
@@ -113,8 +116,7 @@ def diagnose(
         seen = replace(seen, searched=with_laws(seen.searched, progress, settings.time_left))
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
-        weighed = weighed_beside(recordings, look, seen.searched, settings.time_left)
-        seen, balances = replace(seen, searched=weighed.searched), weighed.balances
+        seen, balances = _weighed(recordings, look, seen, settings)
     progress("writing down what was found", 0.95)
     return _assembled(recordings, settings, look, seen, balances)
 
@@ -172,10 +174,23 @@ def _by_given_model(
     return _assembled(recordings, settings, look, replace(seen, searched=searched), ())
 
 
+def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings) -> tuple[Balance, ...]:
+    weighed = partial(balances_of, recordings, frozenset(settings.without), settings.time_left)
+    return settings.guard.part(BALANCE, "its weighing", weighed, ())
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
     searched: Searched
     floor: CleanFloor
+
+
+def _weighed(
+    recordings: Sequence[Recording], look: Look, seen: _Seen, settings: DiagnosisSettings
+) -> tuple[_Seen, tuple[Balance, ...]]:
+    weigh = partial(weighed_beside, recordings, look, seen.searched, settings.time_left)
+    beside = settings.guard.part(BALANCE, "its weighing", weigh, Beside(seen.searched))
+    return replace(seen, searched=beside.searched), beside.balances
 
 
 def _search_context(recording: Recording, look: Look, settings: DiagnosisSettings, map_: Mapper) -> SearchContext:
@@ -258,9 +273,11 @@ def _assembled(
         diagnosis = with_balances(whole.diagnosis, balances, channels, found_too)
     else:
         diagnosis = beside_given(whole.diagnosis, balances, found_too, channels)
+    drawn = partial(state_maps, diagnosis, balances, whole.evidence, recordings[0])
+    maps: tuple[StateMaps, ...] = settings.guard.part("the map of states", "its making", drawn, ())
     early = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
     linear = linear_remarks(balances, channels) if settings.fitted else ()
     remarks = tuple(dict.fromkeys((*early, *look.chosen.remarks, *searched.remarks, *linear, *whole.remarks)))
     reached = reached_of(diagnosis, balances, channels)
-    maps = state_maps(diagnosis, balances, whole.evidence, recordings[0])
-    return replace(whole, diagnosis=diagnosis, remarks=remarks, reached=reached, state_maps=maps)
+    found_here = replace(whole, diagnosis=diagnosis, remarks=remarks, fitted=settings.fitted)
+    return replace(found_here, reached=reached, state_maps=maps)

@@ -167,14 +167,21 @@ def _remainder(found: Findings, pictures: Sequence[Picture]) -> Section:
     )
 
 
+_UNMOVED = {
+    False: "None had to move by more than the standard deviation of its calibration.",
+    True: "None had to move by more than what the first fit left open.",
+}
+"""By whether the model was fitted to the recordings first."""
+
+
 def _own_numbers(found: Findings) -> Section:
     moved = moved_of(found)
-    said = retuned_sentence(moved) or "None had to move by more than the standard deviation of its calibration."
+    said = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
     table = retuned_table(found)
     return Section(
         "The model's own numbers",
         paragraphs=(said,),
-        points=doubtful_sentences(moved),
+        points=doubtful_sentences(moved, found.fitted),
         tables=(table,) if table is not None else (),
     )
 

@@ -82,7 +82,7 @@ def diagnose(
     """
     from study.cli.progress import steps
     from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, answered, written
-    from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, summary
+    from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, new_remarks, summary
 
     plan = DiagnosePlan(tuple(sources), out, model, tuple(without or ()), tuple(clean or ()), seed, compare)
     plan = replace(plan, seconds=seconds, discovery=discovery, effect_files=tuple(effect_file or ()))
@@ -93,6 +93,6 @@ def diagnose(
     # Said before it is drawn: the page takes a while.
     typer.echo(json.dumps(summary(found), indent=2) if as_json else "\n".join(answer_lines(found)))
     with steps("Diagnosing") as show:
-        written(answer, show)
+        complete = written(answer, show)
     if not as_json:
-        typer.echo("\n".join(file_lines(out)))
+        typer.echo("\n".join((*new_remarks(complete.findings, found), *file_lines(out))))

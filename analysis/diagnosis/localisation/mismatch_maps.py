@@ -29,7 +29,9 @@ class Maps:
     def rows(self) -> tuple[Mismatch, ...]:
         """Of the model as given: all that was looked at."""
         return tuple(
-            Mismatch(c.output, c.input, c.band_hz, c.amplitude, None, min(c.share, 1.0), min(c.adjusted_p_value, 1.0))
+            Mismatch(
+                c.output, c.input, c.band_hz, c.amplitude or None, None, min(c.share, 1.0), min(c.adjusted_p_value, 1.0)
+            )
             for c in self.cells["before"]
         )
 

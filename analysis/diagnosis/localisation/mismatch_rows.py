@@ -53,7 +53,7 @@ def _whole_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float
 
 def _cell_row(cell: MismatchCell) -> Mismatch:
     return Mismatch(
-        cell.output, cell.input, cell.band_hz, cell.amplitude, None, min(cell.share, 1.0), cell.adjusted_p_value
+        cell.output, cell.input, cell.band_hz, cell.amplitude or None, None, min(cell.share, 1.0), cell.adjusted_p_value
     )
 
 

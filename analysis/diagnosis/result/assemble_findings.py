@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -52,8 +53,8 @@ def assembled(
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
     maps, courses = maps_of(measure, found.stages, floors, learned), _courses(measure, found, names)
-    local = localised(measure, tuning, found.stages, floors, maps.cells)
-    proposal = _proposal(context, found, judged)
+    local = _localised(context, found, floors, maps)
+    proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     document = _document(searched, errors, (maps, local), proposal)
     effects = (*tuning.model.effects, *model_effects(placed, said.inputs, said.outputs))
     return Findings(
@@ -68,7 +69,7 @@ def assembled(
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
         signatures=_signatures(context, found, said),
-        black_box=_black_box(measure, found, document),
+        black_box=context.guard.part("the black box", "its fit", partial(_black_box, measure, found, document), None),
         remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),
         maps=maps.cells,
         local=local,
@@ -79,6 +80,12 @@ def assembled(
         split_s=_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
     )
+
+
+def _localised(context: SearchContext, found: Explanation, floors: tuple[NoiseFloor, ...], maps: Maps) -> Localisation:
+    looked = partial(localised, context.whole, context.tuning, found.stages, floors, maps.cells)
+    nowhere = Localisation(dict.fromkeys(found.stages, ()))
+    return context.guard.part("the look at where it sits", "its work", looked, nowhere)
 
 
 def _black_box(measure: ErrorMeasure, found: Explanation, document: Diagnosis) -> BlackBox | None:
@@ -204,6 +211,12 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
 
 
 def _signatures(context: SearchContext, found: Explanation, said: Said) -> tuple[Signature, ...]:
+    drawn = partial(_drawn, context, found, said)
+    none: tuple[Signature, ...] = ()
+    return context.guard.part("the curves of effects", "their making", drawn, none)
+
+
+def _drawn(context: SearchContext, found: Explanation, said: Said) -> tuple[Signature, ...]:
     """Each named effect's, against the final model without it alone."""
     measure, tuning, fitted = context.whole, context.tuning, found.after.fitted
     names = Names(

@@ -99,6 +99,7 @@ class Findings(Summarised):
     diagnosis: Diagnosis
     explanation: Explanation
     given: MechanicalModel
+    """What it began from; see `fitted`."""
     improved: MechanicalModel
     """Re-tuned, with the named effects among its `effects`."""
     named: tuple[PlacedEffect, ...]
@@ -119,6 +120,8 @@ class Findings(Summarised):
     """By "before", "retuned", "after": every cell of the map, in units of the noise."""
     local: Localisation = field(default_factory=Localisation)
     """In which states it sits, through what it enters, of which kind it is."""
+    fitted: bool = False
+    """`given` was fitted to these recordings by the program: no calibration says how far its numbers may be off."""
     floor: NoiseFloor | None = None
     """Of the first recording: how the noise was measured, and its spectrum."""
     tuning: Tuning | None = None

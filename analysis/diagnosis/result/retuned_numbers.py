@@ -52,35 +52,42 @@ def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, 
     return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
 
 
-def retuned_sentence(moved: Sequence[MovedNumber]) -> str:
-    """Beside named physics: what else was turned."""
+def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
+    """Beside named physics: what else was turned. fitted: the model was fitted to the same recordings first, so that no
+    calibration holds its numbers."""
     if not moved:
         return ""
-    texts = [number.text for number in moved[:_NAMED]]
+    texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_NAMED]]
     more = len(moved) - _NAMED
     said = listed([*texts, f"{more} more"] if more > 0 else texts)
+    if fitted:
+        return f"Fitted once more, these numbers of the first model moved by more than was left open at first: {said}."
     return f"Re-tuned beyond the calibration's standard deviation: {said}."
 
 
-def doubtful_sentences(moved: Sequence[MovedNumber]) -> tuple[str, ...]:
+def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tuple[str, ...]:
     """Numbers that left what their calibration makes likely: they may stand for physics that was not named. Many are
-    counted, for all of them stand in the table of numbers."""
+    counted, for all of them stand in the table of numbers. fitted: as in `retuned_sentence`."""
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
+    at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
+    if fitted:
+        names = listed([number.name for number in at_end])
+        return (f"As far as they may, these numbers of the first model moved: {names}.{_OPEN}",) if at_end else ()
     if len(far) > _NAMED:
-        edge = sum(abs(number.deviations) >= RETUNING_BOUND - 1e-6 for number in far)
         return (
             f"{len(far)} numbers were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
-            f"{f', {edge} of them as far as they may' if edge else ''}: "
+            f"{f', {len(at_end)} of them as far as they may' if at_end else ''}: "
             "either the calibration is wrong, or they stand for physics that was not named.",
         )
     return tuple(
         f"The {number.name} was moved by {abs(number.deviations):.2g} standard deviations of its calibration"
-        f"{_AS_FAR if abs(number.deviations) >= RETUNING_BOUND - 1e-6 else ''}: "
+        f"{_AS_FAR if number in at_end else ''}: "
         "either the calibration is wrong, or it stands for physics that was not named."
         for number in far
     )
 
 
+_OPEN = " The fit has found no best value for them, or they stand for physics that was not named."
 _AS_FAR = ", as far as it may"
 
 

@@ -197,13 +197,17 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
         lines += [
             raised_sentence(diagnosis.fit.test),
-            retuned_sentence(moved),
+            retuned_sentence(moved, found.fitted),
             remainder_sentence(diagnosis, device_of(found)),
             *ceiling_sentences(found.reached),
             black_box_sentence(found.black_box, bool(diagnosis.effects)),
             *candidate_sentences(diagnosis, device_of(found)),
         ]
-    lines += [next_experiment_sentence(diagnosis), *doubtful_sentences(moved), *implausible_sentences(found)]
+    lines += [
+        next_experiment_sentence(diagnosis),
+        *doubtful_sentences(moved, found.fitted),
+        *implausible_sentences(found),
+    ]
     lines += found.remarks
     return tuple(line for line in lines if line)
 

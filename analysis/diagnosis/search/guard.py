@@ -45,17 +45,29 @@ class Guard:
 
         return mapped
 
-    def part(self, what: str, doing: str, work: Callable[[], Result], instead: Result) -> Result:
-        """Of a piece of the work that can be left out. what: an effect's name, or words."""
-        found = self._tried(what, doing, work) if self.on else (work(),)
+    def part(
+        self,
+        what: str,
+        doing: str,
+        work: Callable[[], Result],
+        instead: Result,
+        answers: tuple[type[Exception], ...] = (),
+    ) -> Result:
+        """Of a piece of the work that can be left out. what: an effect's name, or words. answers: errors that say
+        something to a user, and are no crashes."""
+        found = self._tried(what, doing, work, answers) if self.on else (work(),)
         return found[0] if found else instead
 
-    def _tried(self, what: str, doing: str, work: Callable[[], Result]) -> tuple[Result, ...]:
+    def _tried(
+        self, what: str, doing: str, work: Callable[[], Result], answers: tuple[type[Exception], ...] = ()
+    ) -> tuple[Result, ...]:
         try:
             return (work(),)
         except OutOfTimeError:
             raise
-        except Exception as crash:  # noqa: BLE001 - whatever it is, the rest of the search can go on
+        except Exception as crash:
+            if isinstance(crash, answers):
+                raise
             self.crashes.append(Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": .")))
             return ()
 

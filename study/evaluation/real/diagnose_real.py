@@ -65,7 +65,7 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
     """A recording that cannot be diagnosed comes back as refused, with the reason. Raises LeftError alone."""
     parents = wanted.parents
     try:
-        read = _read(wanted, time_left, on_progress)
+        read = _read(wanted, (time_left, guard), on_progress)
         settings = DiagnosisSettings(
             names=(wanted.name,),
             clean=() if read.before is None else (read.before,),
@@ -113,7 +113,7 @@ def imported(found: FoundMap) -> Recording:
     return all_force_driven([recording])[0]
 
 
-def _read(wanted: RealRecording, time_left: TimeBudget, on_progress: Progress) -> _Read:
+def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress) -> _Read:
     """Raises StudyError where there is nothing to diagnose."""
     on_progress("importing", 0.0)
     if why := wanted.found.source.map.diagnosis.skip:
@@ -128,7 +128,7 @@ def _read(wanted: RealRecording, time_left: TimeBudget, on_progress: Progress) -
             raise nothing_to_diagnose(refusal.problems) from refusal
         remarks = tuple(f"{problem}." for problem in refusal.problems)
     before = None if wanted.before is None else imported(wanted.before)
-    first = _model(wanted, recording, time_left, on_progress)
+    first = _model(wanted, recording, bounds, on_progress)
     return _Read(recording, first.model, first.balances, (*formed, *gaps, *remarks, *first.remarks), before)
 
 
@@ -140,13 +140,15 @@ def _formed(wanted: RealRecording, recording: Recording) -> tuple[tuple[Recordin
     return all_force_driven(formed), said
 
 
-def _model(wanted: RealRecording, recording: Recording, time_left: TimeBudget, on_progress: Progress) -> FirstModel:
+def _model(
+    wanted: RealRecording, recording: Recording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
+) -> FirstModel:
     given = wanted.model()
     if given is None:
         alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
         if wanted.before is not None:
             return FirstModel(*fitted_model(alone, lambda share: on_progress("fitting a linear model", 0.1 * share)))
-        return first_model_of(alone, (), time_left, lambda what, share: on_progress(what, 0.1 * share))
+        return first_model_of(alone, (), bounds, lambda what, share: on_progress(what, 0.1 * share))
     try:
         require_model_of(given, (recording,))
     except NothingToDiagnose as refusal:

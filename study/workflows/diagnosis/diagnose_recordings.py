@@ -16,6 +16,7 @@ from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.first_model.fitted_first import FirstModel
 from analysis.diagnosis.reference.learn_model_error import NothingLearned
 from analysis.diagnosis.result.findings import Findings
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, nearest
@@ -115,13 +116,14 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
         found, clean = both.found, both.clean
     on_progress("reading", READ)
     time_left = _time_budget(plan)
-    first = _model(plan, found, clean, time_left, on_progress)
+    guard = crash_guard()
+    first = _model(plan, found, clean, (time_left, guard), on_progress)
     # A model that was fitted to these recordings has the spring in it.
     spring = found.spring_n_per_m if plan.model is not None or found.simulated else 0.0
     held = with_spring(first.model, spring)
     begun = FITTED if plan.model is None else READ
     _check_compared(plan, found, held)
-    settings = _settings(plan, found, clean, time_left, first.balances)
+    settings = replace(_settings(plan, found, clean, first.balances), time_left=time_left, guard=guard)
     try:
         with worker_threads() as threads:
             findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
@@ -154,9 +156,9 @@ def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
     for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
         note_written(session, plan.out)
     with new_folder(plan.out) as folder:
-        write_diagnosis_into(folder, answer.findings, answer.parents)
+        findings = write_diagnosis_into(folder, answer.findings, answer.parents)
     on_progress("done", 1.0)
-    return DiagnosedRecordings(answer.findings, plan.out)
+    return DiagnosedRecordings(findings, plan.out)
 
 
 def _time_budget(plan: DiagnosePlan) -> TimeBudget:
@@ -168,7 +170,6 @@ def _settings(
     plan: DiagnosePlan,
     found: DiagnosisInput,
     clean: DiagnosisInput | None,
-    time_left: TimeBudget,
     balances: tuple[Balance, ...] | None,
 ) -> DiagnosisSettings:
     return DiagnosisSettings(
@@ -180,8 +181,6 @@ def _settings(
         compared=plan.compare,
         kept=tuple(read_entry(path) for path in plan.effect_files),
         discovery=plan.discovery,
-        time_left=time_left,
-        guard=crash_guard(),
     )
 
 
@@ -214,7 +213,7 @@ def _model(
     plan: DiagnosePlan,
     found: DiagnosisInput,
     clean: DiagnosisInput | None,
-    time_left: TimeBudget,
+    bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
     within = _within(on_progress, READ, FITTED)
@@ -223,7 +222,7 @@ def _model(
     if found.simulated:
         return FirstModel(_twin(within), (TWIN_SAID,))
     if clean is None:
-        return first_model_of(found, plan.without, time_left, within)
+        return first_model_of(found, plan.without, bounds, within)
     what = "fitting a linear model, as none was given"
     on_progress(what, READ)
     return FirstModel(*fitted_model(clean, lambda share: within(what, share), "the clean recordings"))

@@ -27,6 +27,11 @@ def answer_lines(findings: Findings) -> tuple[str, ...]:
     )
 
 
+def new_remarks(written: Findings, said: Findings) -> tuple[str, ...]:
+    """What the figures added since the answer was said."""
+    return tuple(remark for remark in written.remarks if remark not in said.remarks)
+
+
 def file_lines(out: Path) -> tuple[str, ...]:
     """Where everything is."""
     return ("", f"Report: {out / PAGE_NAME}", f"Improved model: {out / MODEL_NAME}")

@@ -4,8 +4,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.diagnose import BALANCE
 from analysis.diagnosis.first_model import fitted_first
 from analysis.diagnosis.first_model.fitted_first import FirstModel
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, nothing_to_diagnose
@@ -14,11 +16,17 @@ GIVE_ONE = "Give a model of the device alone with --model, or a recording that c
 
 
 def first_model_of(
-    found: DiagnosisInput, without: Sequence[str], time_left: TimeBudget, on_progress: Progress
+    found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
-    """As in `analysis`. Raises StudyError."""
-    with _refused():
+    """As in `analysis`; where the force balance crashes, by a fit to spectra. Raises StudyError."""
+    time_left, guard = bounds
+
+    def weighed() -> FirstModel | None:
         return fitted_first.first_model_of(found.recordings, without, time_left, on_progress)
+
+    with _refused():
+        first = guard.part(BALANCE, "the first model", weighed, None, (NothingToDiagnose,))
+    return first or FirstModel(*fitted_model(found, lambda share: on_progress("fitting a linear model", share)), ())
 
 
 def fitted_model(

@@ -12,19 +12,24 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
 from study.store.formats.mechanical_model_file import write_mechanical_model
+from study.workflows.crash_guard import crash_guard
 from study.workflows.picture_files import write_pictures
 
 
-def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> None:
-    """parents: files that it was made from. Raises StudyError."""
+def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
+    """parents: files that it was made from. The findings, with a remark for each figure whose drawing crashed. Raises
+    StudyError."""
     origin = gather_provenance(parents=parents)
     write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, origin)
     improved = replace(findings.improved, provenance=origin.as_dict())
     write_mechanical_model(folder / MODEL_NAME, improved)
-    pictures = diagnosis_pictures(findings)
+    guard = crash_guard()
+    pictures = diagnosis_pictures(findings, guard)
+    findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
     write_pictures(folder / "figures", pictures)
     page = render_diagnosis_report(findings, pictures, _shown(origin), local_now())
     write_text(folder / PAGE_NAME, page)
+    return findings
 
 
 def _shown(origin: Provenance) -> dict[str, str]:

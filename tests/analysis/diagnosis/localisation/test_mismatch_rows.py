@@ -42,6 +42,10 @@ def test_states_are_rows_over_all_levels():
     assert rows[0].amplitude is None
 
 
+def test_a_level_that_is_not_known_is_none():
+    assert mismatch_rows([cell(0.1, amplitude=0.0)])[0].amplitude is None
+
+
 def test_no_more_rows_are_kept_than_a_page_holds():
     rows = mismatch_rows([cell(0.1 + k / 1000) for k in range(100)], [state(0.01, 1e-4)])
     assert len(rows) == MOST_ROWS

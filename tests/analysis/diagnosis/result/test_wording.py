@@ -254,6 +254,16 @@ def test_numbers_of_the_model_that_moved_too_far_are_doubted():
     assert "of its calibration, as far as it may: either" in edge
 
 
+def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
+    assert retuned_sentence((MOVED,), fitted=True) == (
+        "Fitted once more, these numbers of the first model moved by more than was left open at first: "
+        "damping fx +0.350 N s/m."
+    )
+    assert doubtful_sentences((replace(MOVED, deviations=-3.4),), fitted=True) == ()
+    (edge,) = doubtful_sentences((replace(MOVED, deviations=4.0),), fitted=True)
+    assert "calibration" not in edge and edge.startswith("As far as they may")
+
+
 def test_many_doubtful_numbers_are_counted_in_one_sentence():
     moved = (*(replace(MOVED, deviations=4.0) for _ in range(8)), *(replace(MOVED, deviations=-3.5) for _ in range(3)))
     (said,) = doubtful_sentences(moved)

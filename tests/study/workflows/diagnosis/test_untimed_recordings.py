@@ -8,6 +8,7 @@ from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import UNTIMED, measure_of
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.wording import place_of
+from analysis.diagnosis.search.guard import Guard
 from equalizer.plant.effect_vocabulary import matrix_unit
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -33,7 +34,7 @@ def recording() -> Recording:
 @pytest.fixture(scope="module")
 def first(recording):
     given = DiagnosisInput((recording,), ("spring",), (), ())
-    return first_model_of(given, (), lambda: True, lambda what, share: None)
+    return first_model_of(given, (), (lambda: True, Guard()), lambda what, share: None)
 
 
 def test_the_first_model_is_a_spring(first, recording):
