@@ -52,7 +52,8 @@ def hiss_at_rest(recording: Recording, samples: FloatArray) -> Hiss | None:
 def resting_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
-    """(lines, channels) density and its degrees of freedom; None where nothing rests for a quarter of a second."""
+    """(lines, channels) density and its degrees of freedom; None where nothing rests for a quarter of a second, or a
+    reading stands still at rest: an encoder's steps then hide its noise."""
     length = round(_WINDOW_S * recording.sample_rate_hz)
     if length < _LEAST_SAMPLES:
         return None
@@ -68,6 +69,8 @@ def resting_noise(
         return None
     lines_hz: FloatArray = np.arange(1.0, length // 2) * (recording.sample_rate_hz / length)
     mean = np.mean(powers, axis=0)
+    if not mean.any(axis=0).all():
+        return None
     mean[:2] = mean[2:3]
     smooth = over_neighbours(mean, 9)
     density = np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)

@@ -125,3 +125,15 @@ def test_rattling_in_every_segment_does_not_pass_for_noise():
     floor = noise_floor(read_recording(CASES / "open-03.h5"))
     assert floor.response_rms == pytest.approx([0.042, 0.042, 0.083], rel=0.05)
     assert "at rest" in " ".join(floor.remarks)
+
+
+def test_a_reading_that_stands_still_at_rest_does_not_tell_its_noise(device):
+    """An encoder's: a noise of zero would make every error infinitely large."""
+    recording = without_periods(device(rest=3000).recorded())
+    moving = np.zeros((len(recording), 1), dtype=bool)
+    for segment in recording.segments:
+        moving[segment.start : segment.stop + 250] = True
+    still = replace(recording.response, samples=np.where(moving, recording.response.samples, 0.0))
+    floor = noise_floor(replace(recording, response=still))
+    assert floor.how != "rest"
+    assert (floor.response.density > 0).all()
