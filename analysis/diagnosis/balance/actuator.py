@@ -107,7 +107,7 @@ def balance_of(
 ) -> Balance:
     """Of laws of the motion, along what a law of the command lets through where one is named."""
     balance = weigh(search_beside_linear(motions, axis, rotational, without, time_left))
-    actuator = actuator_of(balance.searched, without) if balance.tested else None
+    actuator = actuator_of(balance, without) if balance.tested else None
     if actuator is None:
         return balance
     weighed = actuator.weighed
@@ -131,20 +131,37 @@ def _through(motion: Motion, axis: int, law: CommandLaw) -> Motion:
     return replace(motion, force=force)
 
 
-def actuator_of(searched: Searched, without: frozenset[str]) -> Actuator | None:
+def actuator_of(balance: Balance, without: frozenset[str]) -> Actuator | None:
     """None where nothing in the command's place leaves less."""
+    searched = balance.searched
     regression = searched.regression
     commands = np.concatenate([motion.force[motion.fit, regression.axis] for motion in regression.motions])
     laws = [law for law in command_laws(commands) if law.effect not in without]
     if not np.isfinite(regression.motions[0].band_hz) or not laws or not np.any(commands):
         return None
     turned = _Turned(searched)
+    instead = _in_place_of_motion(turned, laws, tuple(each.place for each in balance.named))
+    if instead is not None:
+        return instead
     beside = min(_sums(searched), key=lambda each: float(turned.errors(AS_COMMANDED, each, False).sum()))
     best = _best_of_each(turned, laws, beside)
     law = min(best, key=lambda each: each[0])[1]
     alone, held = (float(turned.errors(law, each, False).sum()) for each in ((), beside))
     rivals = [other for _, other in best if other is not law]
-    return Actuator(law, _weighed(turned, law, rivals, beside), bool(beside) and alone <= held / (1 - TOLD))
+    weighed = _weighed(turned, law, rivals, (beside, beside))
+    return Actuator(law, weighed, bool(beside) and alone <= held / (1 - TOLD))
+
+
+def _in_place_of_motion(turned: _Turned, laws: Sequence[CommandLaw], named: tuple[int, ...]) -> Actuator | None:
+    """A law of the command that by itself takes most of what the named laws of the motion leave: they took its part,
+    as a drag does that of an actuator whose gain falls."""
+    if not named:
+        return None
+    best = _best_of_each(turned, laws, ())
+    law = min(best, key=lambda each: each[0])[1]
+    rivals = [other for _, other in best if other is not law]
+    weighed = _weighed(turned, law, rivals, (named, ()))
+    return Actuator(law, weighed, True) if weighed.gain >= MOST and weighed.gain_low > 0 else None
 
 
 def _sums(searched: Searched) -> list[tuple[int, ...]]:
@@ -174,8 +191,12 @@ def _moved(turned: _Turned, error: float, law: CommandLaw, beside: tuple[int, ..
     return error, law
 
 
-def _weighed(turned: _Turned, law: CommandLaw, rivals: Sequence[CommandLaw], beside: tuple[int, ...]) -> Weighed:
-    without, held = (turned.errors(each, beside, True) for each in (AS_COMMANDED, law))
+def _weighed(
+    turned: _Turned, law: CommandLaw, rivals: Sequence[CommandLaw], sums: tuple[tuple[int, ...], tuple[int, ...]]
+) -> Weighed:
+    """sums: laws of the motion beside the command as it is, and beside what the law makes of it."""
+    plain, beside = sums
+    without, held = turned.errors(AS_COMMANDED, plain, True), turned.errors(law, beside, True)
     linear = float(turned.errors(AS_COMMANDED, (), True).sum())
     drawn = drawn_of(len(held))
     behind = [(turned.errors(rival, beside, True), rival.effect) for rival in rivals]

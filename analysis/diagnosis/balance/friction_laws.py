@@ -102,13 +102,14 @@ def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[s
 
 
 def damping_laws(c: int, of: Scales) -> Iterator[Law]:
+    """None without a clock: how fast anything moves is then not known."""
+    if not np.isfinite(of.band_hz):
+        return
     yield Law(
         "quadratic_damping", c, (), lambda m, _: m.velocity[:, [c]] * np.abs(m.velocity[:, [c]]),
         positive("coefficient"),
     )  # fmt: skip
     yield Law("drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * relative_time(m), named("change"))
-    if not np.isfinite(of.band_hz):
-        return
     for tau in np.geomspace(0.5 / of.band_hz, of.seconds / 10, 7):
         yield Law(
             "viscoelastic_relaxation", c, (float(tau),),

@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.plainest_structure import NOTABLE, numbers_of, plainest_structure
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import Searched, Structure, values_of
-from analysis.diagnosis.balance.weighed import DRAWS, Weighed, drawn_of, gain_of
+from analysis.diagnosis.balance.weighed import DRAWS, Weighed, drawn_of, gain_of, times_recorded
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.signal import FloatArray
@@ -37,6 +37,8 @@ MENDS = "it acts like a named law, and may only mend its shape"
 MOST_ALIKE = 4
 """Effects of a class; more of them tell nothing."""
 LEAST_BLOCKS = 4
+CANCELLED = 2.0
+"""Times the recorded force's spread that a law's own may be: more is held by other columns, not seen."""
 STILL = 0.01
 """Share of the speed's mean square, where it is fitted, below which samples that are held back test nothing."""
 FAMILIES = (
@@ -158,6 +160,9 @@ def _weighed(
     taken = float(np.sqrt(max(float((without - held).sum()), 0.0) / _size(regression)))
     small = f"it takes {100 * taken:.1f} % of the force, less than such recordings are sure of"
     why_not = _why_not(law, values, (gain, low, share, told), alike) or (small if taken < OF_SIGNAL else "")
+    times = times_recorded(regression, laws, number)
+    if not why_not and times > CANCELLED:
+        why_not = f"its force would be {times:.0f} times what was recorded, and other terms would cancel it"
     chosen = ""
     if not why_not and law.effect in PLAYED_AS:
         alike = (law.effect, *(effect for effect in alike if effect != PLAYED_AS[law.effect]))

@@ -1,11 +1,13 @@
 """A law as it was weighed, and its gain on held-out blocks with an interval from resampled ones."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.balance.law import Law
+from analysis.diagnosis.balance.regression import Regression
 from equalizer.signals.signal import FloatArray
 
 DRAWS, SEED, LEVEL = 2000, 1, 0.025
@@ -48,3 +50,14 @@ def gain_of(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
 
 def drawn_of(blocks: int) -> npt.NDArray[np.int64]:
     return np.random.default_rng(SEED).integers(blocks, size=(DRAWS, blocks))
+
+
+def times_recorded(regression: Regression, laws: Sequence[int], number: int) -> float:
+    """Standard deviation of a law's own force, over that of the recorded one."""
+    columns, place = regression.chosen(laws), regression.places[number]
+    weights = np.zeros(regression.columns[0].shape[1])
+    weights[columns] = regression.weights(columns)
+    kept = [motion.kept(motion.fit) for motion in regression.motions]
+    own = [c[mask, place] @ weights[place] for c, mask in zip(regression.columns, kept, strict=True)]
+    force = [f[mask] for f, mask in zip(regression.force, kept, strict=True)]
+    return float(np.concatenate(own).std() / max(float(np.concatenate(force).std()), 1e-300))

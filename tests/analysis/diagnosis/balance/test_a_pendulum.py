@@ -41,3 +41,18 @@ def test_the_weight_of_a_lever_is_recovered(balance):
 
 def test_a_balanced_lever_has_no_weight(balance):
     assert "gravity_torque" not in {law.law.effect for law in balance(0.0, RUBBING).named}
+
+
+def test_a_weight_that_a_spring_would_have_to_cancel_is_not_named(recording_of, balance_of):
+    """A weak bend of a spring over a small travel is what is left of a huge weight beside its tangent."""
+    rng = np.random.default_rng(SEED)
+    angle = filtfilt(*butter(3, 2 / (RATE_HZ / 2)), rng.standard_normal(8000))
+    angle *= 0.35 / np.abs(angle).max()
+    speed = np.gradient(angle) * RATE_HZ
+    huge = 20.0 * (np.sin(angle + 0.3) - np.sin(0.3) - np.cos(0.3) * angle)
+    force = angle + 0.01 * speed + huge
+    force += 0.01 * force.std() * rng.standard_normal(len(force))
+    recording = recording_of(force[:, None], angle[:, None], RATE_HZ, unit="rad", meta={"imposed": "position"})
+    (found,) = balance_of(recording)
+    law = next(each for each in found.laws if each.law.effect == "gravity_torque")
+    assert "times what was recorded" in law.why_not

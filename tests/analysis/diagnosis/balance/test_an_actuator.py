@@ -60,3 +60,44 @@ def test_a_gain_that_grows_with_the_command_is_a_candidate_alone(found):
     law = balance.laws[0]
     assert law.law.effect in ("actuator_cubic", "actuator_square")
     assert not balance.named
+
+
+def driven_speed(given, drag, seed=3, rate_hz=50.0, count=6000):
+    """Speed of a mass of 1 with a damping of 1 and a drag, driven in random steps; both (n, 1)."""
+    random = np.random.default_rng(seed)
+    command = np.repeat(random.uniform(-1.0, 1.0, count // 50), 50)
+    speed, v = np.empty(count), 0.0
+    for k, push in enumerate(given(command)):
+        speed[k] = v
+        for _ in range(10):
+            v += (push - v - drag * v * abs(v)) / (10 * rate_hz)
+    return command[:, None], (speed + 1e-3 * random.standard_normal(count))[:, None]
+
+
+@pytest.fixture(scope="module")
+def of_speed(balance_of):
+    from equalizer.signals.recording import Hold, Recording
+    from equalizer.signals.signal import Signal
+
+    def found(given, drag):
+        command, speed = driven_speed(given, drag)
+        return balance_of(
+            Recording(
+                "invented",
+                Signal(command, 50.0, "force", "N", ("fx",)),
+                Signal(speed, 50.0, "velocity", "m/s", ("x",)),
+                hold=Hold.ZERO_ORDER,
+            )
+        )[0]
+
+    return found
+
+
+def test_a_gain_that_falls_with_the_command_is_no_drag(of_speed):
+    balance = of_speed(lambda u: u * (1 - 0.5 * np.abs(u)), 0.0)
+    assert balance.laws[0].law.effect in ("actuator_square", "actuator_cubic", "force_saturation")
+    assert "quadratic_damping" not in named(balance)
+
+
+def test_a_drag_is_none_of_the_actuator(of_speed):
+    assert set(named(of_speed(lambda u: u, 2.0))) == {"quadratic_damping"}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.band import WIDEST
+from analysis.diagnosis.balance.laws import laws_of
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of, moving_signal
 from analysis.diagnosis.data.observed_parts import observed_parts
 from equalizer.signals.recording import Hold
@@ -96,6 +97,16 @@ def test_without_a_clock_there_is_no_acceleration(recording_of):
     found = motion_of(recording_of(course(2), course(0), 1.0, meta={"time": "unknown"}))
     assert np.isinf(found.band_hz) and found.step == 1 and not found.acceleration.any()
     assert np.array_equal(np.sign(found.velocity[INNER]), np.sign(np.gradient(course(0), axis=0)[INNER]))
+
+
+def test_without_a_clock_no_law_asks_how_fast_it_moves(recording_of):
+    damping = {"quadratic_damping", "drifting_damping", "viscoelastic_relaxation"}
+
+    def effects(meta):
+        return {law.effect for law in laws_of([motion_of(recording_of(course(2), course(0), 1.0, meta=meta))], False)}
+
+    assert damping <= effects({})
+    assert not damping & effects({"time": "unknown"})
 
 
 def test_a_motion_is_of_the_lowest_derivative_and_moves(recording_of):
