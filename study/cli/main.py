@@ -29,6 +29,7 @@ from study.cli import (
     model,
     noise,
     note,
+    power,
     protocol,
     prove,
     real,
@@ -94,6 +95,9 @@ app.command(
 )(validate.validate)
 app.command("rehearse", short_help="Simulated participants take the whole study", rich_help_panel="Analysis")(
     rehearse.rehearse
+)
+app.command("power", short_help="How many participants are needed, by simulated studies", rich_help_panel="Analysis")(
+    power.power
 )
 app.command("doctor", short_help="Check installation, device, sensor and 1 kHz timing", rich_help_panel="Device")(
     doctor.doctor

@@ -1,0 +1,109 @@
+"""How often a study finds what is there: power, type-1 error, coverage and bias, by analysis and sample size."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.stats import studentized_range
+
+from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.group_contrasts import contrasts
+from analysis.psychophysics.hierarchy.fit import fit_hierarchy
+from analysis.psychophysics.hierarchy.inference import pseudo_thresholds
+from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
+from protocols.definition.staircase_rule import StaircaseRule
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class StudyVerdict:
+    """One simulated study: the highest frequency against the lowest, at the 5 % level."""
+
+    people: int
+    trials: int
+    primary_found: bool
+    """By the hierarchical model of all answers, t test over people."""
+    primary_covers: bool
+    primary_error_db: float
+    """Estimated minus true difference."""
+    means_found: bool
+    """By reversal means in dB, paired t test."""
+    means_error_db: float
+    published_found: bool
+    """By reversal means in newtons, one-way, Tukey's pair."""
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    value: float
+    lower: float
+    upper: float
+    """Wilson's 95 % interval: how well the simulated studies tell the share."""
+
+
+@dataclass(frozen=True, slots=True)
+class PowerPoint:
+    people: int
+    studies: int
+    trials_per_person: float
+    primary: Share
+    """Share of studies that find the difference; without an effect this is the type-1 error."""
+    means: Share
+    published: Share
+    coverage: Share
+    """Of the primary analysis's 95 % interval."""
+    primary_bias_db: float
+    means_bias_db: float
+
+
+def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> StudyVerdict:
+    """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit."""
+    study = simulate_study(crowd, rule, people, seed)
+    true_db = 20.0 * float(np.log10(crowd.medians_n[-1] / crowd.medians_n[0]))
+    primary = contrasts(crowd.frequencies_hz, pseudo_thresholds(fit_hierarchy(study.answers)), CONFIDENCE)[-1]
+    means = contrasts(crowd.frequencies_hz, study.threshold_db, CONFIDENCE)[-1]
+    names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
+    anova = one_way({name: list(column) for name, column in zip(names, study.threshold_n.T, strict=True)})
+    difference_n = abs(float(study.threshold_n[:, -1].mean() - study.threshold_n[:, 0].mean()))
+    margin_n = _critical(len(names), anova.df_within or 1) * math.sqrt((anova.mean_square_within or math.inf) / people)
+    return StudyVerdict(
+        people=people,
+        trials=study.trials,
+        primary_found=primary.p < 1.0 - CONFIDENCE,
+        primary_covers=primary.lower_db <= true_db <= primary.upper_db,
+        primary_error_db=primary.difference_db - true_db,
+        means_found=means.p < 1.0 - CONFIDENCE,
+        means_error_db=means.difference_db - true_db,
+        published_found=difference_n > margin_n,
+    )
+
+
+@cache
+def _critical(groups: int, df: int) -> float:
+    """Tukey's, for equal sizes as here. Kept, because it takes as long as a whole study."""
+    return float(studentized_range.ppf(CONFIDENCE, groups, df))
+
+
+def power_point(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
+    """verdicts: of studies with equally many people, one at least."""
+    n = len(verdicts)
+    return PowerPoint(
+        people=verdicts[0].people,
+        studies=n,
+        trials_per_person=sum(v.trials for v in verdicts) / n / verdicts[0].people,
+        primary=_share([v.primary_found for v in verdicts]),
+        means=_share([v.means_found for v in verdicts]),
+        published=_share([v.published_found for v in verdicts]),
+        coverage=_share([v.primary_covers for v in verdicts]),
+        primary_bias_db=float(np.mean([v.primary_error_db for v in verdicts])),
+        means_bias_db=float(np.mean([v.means_error_db for v in verdicts])),
+    )
+
+
+def _share(found: Sequence[bool]) -> Share:
+    lower, upper = wilson_interval(sum(found), len(found))
+    return Share(sum(found) / len(found), lower, upper)

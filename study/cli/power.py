@@ -1,0 +1,71 @@
+"""`hapteq power`: how many participants a study needs, by whole simulated studies."""
+
+import json
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from study.cli.results import JsonOption
+from study.cli.seed import checked_seed
+from study.errors import WrongUseError
+
+
+def power(
+    subjects: Annotated[str, typer.Option(help="Sample sizes: 5:40:5 (from, to, step), or one number.")] = "5:40:5",
+    effect_db: Annotated[
+        float,
+        typer.Option(min=-40, max=40, help="True difference of the highest frequency; 0 gives the type-1 error."),
+    ] = 3.0,
+    threshold_n: Annotated[float, typer.Option(min=0.01, max=100, help="Median threshold at the others, in N.")] = 0.7,
+    studies: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies of each size.")] = 200,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Processes at work at once.")] = 2,
+    protocol: Annotated[str, typer.Option(help="Protocol with staircase and frequencies.")] = "direction_threshold",
+    out: Annotated[Path, typer.Option(help="Folder of the results; a broken run goes on there.")] = Path("power"),
+    seed: Annotated[int, typer.Option(min=0, callback=checked_seed, help="Seed of all draws.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate whole studies and count how often each analysis finds the difference. Run again, it goes on."""
+    from analysis.psychophysics.power.simulated_study import Crowd
+    from study.cli.progress import bar
+    from study.store.formats.protocol_files import read_study_protocol
+    from study.workflows.planning.simulate_power import PowerPlan, power_lines, simulate_power
+    from study.workflows.worker_processes import worker_processes
+
+    chosen = read_study_protocol(protocol, Path()).protocol
+    frequencies = tuple(sorted(chosen.stimulus.frequencies_hz))
+    if len(frequencies) < 2:
+        raise WrongUseError(
+            "There is nothing to compare",
+            f"{chosen.name} plays fewer than two frequencies.",
+            "Choose a protocol with two or more in stimulus.frequencies_hz.",
+        )
+    raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
+    crowd = Crowd(frequencies, (*[threshold_n] * (len(frequencies) - 1), raised_n))
+    sizes = sample_sizes(subjects)
+    plan = PowerPlan(crowd, chosen.staircase, sizes, studies, seed)
+    title = f"{studies} studies of each of {len(sizes)} sizes"
+    with worker_processes(workers) as pool, bar(title, total=studies * len(sizes)) as advance:
+        points = simulate_power(plan, out, pool, advance)
+    if as_json:
+        typer.echo(json.dumps([asdict(point) for point in points], indent=2))
+        return
+    for line in power_lines(points):
+        typer.echo(line)
+
+
+def sample_sizes(text: str) -> tuple[int, ...]:
+    """5:40:5 as 5, 10 ... 40. Raises WrongUseError."""
+    parts = [int(part) for part in text.split(":")] if re.fullmatch(r"\d{1,4}(:\d{1,4}){0,2}", text) else []
+    low = parts[0] if parts else 0
+    high = parts[1] if len(parts) > 1 else low
+    step = parts[2] if len(parts) > 2 else 1
+    if low < 2 or high < low or step < 1 or high > 1000:
+        raise WrongUseError(
+            "These are no sample sizes",
+            f"--subjects is {text}.",
+            "Write a number from 2 to 1000, or from:to:step, such as 5:40:5.",
+        )
+    return tuple(range(low, high + 1, step))

@@ -1,0 +1,1 @@
+"""Planning a study before its first participant. Begin at `simulate_power.py`."""

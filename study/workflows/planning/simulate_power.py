@@ -1,0 +1,142 @@
+"""Power against participants: simulated studies on any executor, kept as they finish, so that a broken run goes on."""
+
+import json
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from analysis.psychophysics.power.power_curve import PowerPoint, Share, StudyVerdict, judge_study, power_point
+from analysis.psychophysics.power.simulated_study import Crowd
+from protocols.definition.staircase_rule import StaircaseRule
+from study.errors import StudyError, WrongUseError
+from study.store.disk.file_errors import CannotWriteError
+from study.store.disk.json_document import write_json
+from study.store.disk.privacy import make_folder
+from study.store.disk.text_file import read_text
+
+CHUNK = 10
+"""Studies in one piece of work: some seconds, so that little is lost when a worker dies."""
+FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
+
+
+@dataclass(frozen=True, slots=True)
+class PowerPlan:
+    crowd: Crowd
+    rule: StaircaseRule
+    people: tuple[int, ...]
+    """Sample sizes."""
+    studies: int
+    """Of each size."""
+    seed: int
+
+
+Piece = tuple[int, int]
+"""Sample size, and number of the first study of a chunk."""
+
+
+def simulate_power(
+    plan: PowerPlan, out: Path, executor: Executor, on_finished: Callable[[int], None]
+) -> tuple[PowerPoint, ...]:
+    """Blocks until all studies are there, calling `on_finished(how many)`. The same seeds give the same numbers on any
+    executor, in any order; what `out` holds from a broken run of the same plan is not computed again.
+
+    Raises StudyError where `out` belongs to another plan, and CannotWriteError.
+    """
+    if plan.rule.trial_limit:
+        raise WrongUseError(
+            "This staircase has a trial limit",
+            "Runs that it stops have no threshold, and the published analysis cannot be judged without them.",
+            "Set staircase.trial_limit to 0 in the protocol.",
+        )
+    path = out / FINISHED_NAME
+    done = _begun(path, plan)
+    todo = [(n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done]
+    finished = sum(map(len, done.values()))
+    on_finished(finished)
+    futures = {executor.submit(judge_piece, plan, piece): piece for piece in todo}
+    try:
+        for future in as_completed(futures):
+            verdicts = future.result()
+            done[futures[future]] = verdicts
+            _append(path, {"piece": futures[future], "verdicts": [asdict(v) for v in verdicts]})
+            finished += len(verdicts)
+            on_finished(finished)
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+    # In the order of the plan, whatever finished first: sums of the same numbers are then the same to the bit.
+    points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
+    payload = {"plan": _described(plan), "points": [asdict(point) for point in points]}
+    write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
+    return points
+
+
+def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:
+    """In a worker process."""
+    people, first = piece
+    last = min(first + CHUNK, plan.studies)
+    return [judge_study(plan.crowd, plan.rule, people, (plan.seed, people, number)) for number in range(first, last)]
+
+
+def _described(plan: PowerPlan) -> dict[str, object]:
+    """Everything but the sample sizes: more of them may be asked for later."""
+    from pydantic import TypeAdapter
+
+    rule = TypeAdapter(StaircaseRule).dump_python(plan.rule, mode="json")
+    crowd = json.loads(json.dumps(asdict(plan.crowd)))
+    return {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
+
+
+def _begun(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
+    """What a broken run of the same plan has finished; a torn last line is left out."""
+    if not path.exists():
+        try:
+            make_folder(path.parent)
+        except OSError as problem:
+            raise CannotWriteError(path.parent, problem) from problem
+        _append(path, {"plan": _described(plan)})
+        return {}
+    rows = []
+    for line in read_text(path).splitlines():
+        try:
+            rows.append(json.loads(line))
+        except ValueError:
+            continue
+    if not rows or rows[0].get("plan") != _described(plan):
+        raise StudyError(
+            "This folder holds another power simulation",
+            f"{path} was begun with other people, another rule, seed or number of studies.",
+            "Choose another folder with --out, or the same options to go on.",
+            saved="Nothing was changed.",
+        )
+    return {(row["piece"][0], row["piece"][1]): [StudyVerdict(**v) for v in row["verdicts"]] for row in rows[1:]}
+
+
+def _append(path: Path, row: dict[str, object]) -> None:
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.write("\n" * (file.tell() > 0) + json.dumps(row))
+    except OSError as problem:
+        raise CannotWriteError(path, problem) from problem
+
+
+def power_lines(points: Sequence[PowerPoint]) -> list[str]:
+    """A table for the terminal."""
+    lines = [
+        f"{'people':>6}  {'all answers in one model':>26}  {'reversal means, paired':>24}  "
+        f"{'as published (Tukey)':>24}  {'95 % interval covers':>22}  bias dB (model, means)"
+    ]
+    for point in points:
+        shares = (point.primary, point.means, point.published, point.coverage)
+        texts = [_percent(share) for share in shares]
+        lines.append(
+            f"{point.people:6}  {texts[0]:>26}  {texts[1]:>24}  {texts[2]:>24}  {texts[3]:>22}  "
+            f"{point.primary_bias_db:+.2f}, {point.means_bias_db:+.2f}"
+        )
+    return lines
+
+
+def _percent(share: Share) -> str:
+    return f"{100 * share.value:.1f} % ({100 * share.lower:.1f} to {100 * share.upper:.1f})"

@@ -1,0 +1,94 @@
+"""Power: effects are found, nulls are not, broken runs go on, and any executor gives the same numbers."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from analysis.psychophysics.anova import one_way
+from analysis.psychophysics.comparisons import compare_all
+from analysis.psychophysics.power.power_curve import judge_study
+from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
+from protocols.definition.staircase_rule import StaircaseRule, StepPhase
+from study.cli.power import sample_sizes
+from study.errors import StudyError, WrongUseError
+from study.workflows.planning.simulate_power import (
+    FINISHED_NAME,
+    PowerPlan,
+    judge_piece,
+    power_lines,
+    simulate_power,
+)
+
+RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
+PLAN = PowerPlan(Crowd((5.0, 45.0), (0.7, 1.4)), RULE, (3, 8), 12, 3)
+
+
+@pytest.fixture
+def run(tmp_path):
+    def simulated(plan, folder="power", workers=1):
+        with ThreadPoolExecutor(workers) as pool:
+            return simulate_power(plan, tmp_path / folder, pool, lambda done: None)
+
+    return simulated
+
+
+def test_a_large_effect_is_found_more_often_by_more_people(run):
+    few, many = run(PLAN)
+    assert (few.people, many.people, few.studies) == (3, 8, 12)
+    assert many.primary.value >= few.primary.value
+    assert many.primary.value > 0.8
+    assert many.primary.lower < many.primary.value <= many.primary.upper
+    assert len(power_lines((few, many))) == 3
+
+
+def test_without_an_effect_few_studies_find_one(run):
+    (point,) = run(replace(PLAN, crowd=Crowd((5.0, 45.0), (0.7, 0.7)), people=(5,), studies=30))
+    assert point.primary.value < 0.15  # at 5 % five of 30 come once in 50 repetitions
+    assert point.coverage.value == pytest.approx(1.0 - point.primary.value)
+
+
+def test_the_published_verdict_is_that_of_the_pair_in_the_report():
+    crowd, found = Crowd((5.0, 25.0, 45.0), (0.7, 0.7, 1.2)), []
+    for number in range(4):
+        study = simulate_study(crowd, RULE, 8, (5, number))
+        groups = {f"{f:g} Hz": list(column) for f, column in zip((5, 25, 45), study.threshold_n.T, strict=True)}
+        (pair,) = [
+            pair for pair in compare_all(one_way(groups)).pairs if (pair.first, pair.second) == ("5 Hz", "45 Hz")
+        ]
+        found.append(judge_study(crowd, RULE, 8, (5, number)).published_found)
+        assert found[-1] == (pair.p < 0.05)
+    assert len(set(found)) == 2  # both verdicts occur
+
+
+def test_a_broken_run_goes_on_and_any_number_of_workers_gives_the_same_numbers(run, tmp_path):
+    plan = replace(PLAN, people=(3,))
+    whole = run(plan)
+    path = tmp_path / "power" / FINISHED_NAME
+    lines = path.read_text("utf-8").splitlines()
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / FINISHED_NAME).write_text("\n".join([*lines[:2], lines[2][:40]]), "utf-8")
+    assert run(plan, "broken") == whole
+    assert run(plan, "two", workers=2) == whole
+    assert judge_piece(plan, (3, 10)) == judge_piece(plan, (3, 10))
+
+
+def test_a_folder_of_another_plan_is_left_alone(run):
+    run(replace(PLAN, people=(4,), studies=10))
+    with pytest.raises(StudyError, match="another power simulation"):
+        run(replace(PLAN, people=(4,), studies=10, seed=4))
+
+
+def test_a_trial_limit_is_refused(run):
+    with pytest.raises(WrongUseError, match="trial limit"):
+        run(replace(PLAN, rule=replace(RULE, trial_limit=50)))
+
+
+def test_sample_sizes_are_read():
+    assert sample_sizes("5:40:5") == (5, 10, 15, 20, 25, 30, 35, 40)
+    assert sample_sizes("12") == (12,)
+    assert sample_sizes("3:5") == (3, 4, 5)
+    for wrong in ("", "a", "1", "9:5", "5:9:0", "5:9:1:1", "1001"):
+        with pytest.raises(WrongUseError):
+            sample_sizes(wrong)
