@@ -24,6 +24,10 @@ CLOSE, FAR = 0.05, 0.2
 """Error of a factor that is noticed, and that is wrong."""
 LATE = 0.6
 """Samples: a force that is held moves an acceleration by half of one, and so does a difference to the sample before."""
+_FILTERED = (
+    "It is later as well as smaller, as behind a sensor's filter or a flexible part between both: model that, or "
+    "compare them below it. A wrong unit or factor would delay nothing."
+)
 _CAUSES = (
     (1000.0, "mm taken for m, or ms for s"), (180 / np.pi, "degrees taken for radians"), (9.80665, "g for m/s^2"),
     (2 * np.pi, "turns taken for radians, or Hz for rad/s"), (60.0, "per minute taken for per second"),
@@ -106,6 +110,9 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     off = abs(abs(agreed.factor) - 1)
     if agreed.factor < 0:
         return Check(KINEMATICS, "wrong", seen, f"Turn the sign of one of them{_cause(agreed.factor)}.")
+    if off > FAR and agreed.factor < 1 and agreed.lag_samples > LATE and not _cause(agreed.factor):
+        # A wrong unit or factor delays nothing; what is weaker and later went through a filter or a flexible part.
+        return Check(KINEMATICS, "notice", seen, _FILTERED)
     if off > FAR:
         return Check(KINEMATICS, "wrong", seen, f"Check the units and factors of both{_cause(agreed.factor)}.")
     if off > CLOSE:

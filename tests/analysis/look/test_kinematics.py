@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
+from analysis.look.agreement import Agreement
 from analysis.look.channels import channels_of
 from analysis.look.cross_spectra import cross_spectra
-from analysis.look.kinematics import kinematic_checks, kinematic_pairs, lag_checks
+from analysis.look.kinematics import KinematicPair, kinematic_checks, kinematic_pairs, lag_checks
 from equalizer.signals.recording import Recording
 
 RATE_HZ = 1000.0
@@ -100,3 +101,20 @@ def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(recording, 
     force, place, *_ = motion
     (check,) = lags_of(recording(force, (800 * place, "force", "N")))
     assert (check.level, "No two channels show the same thing" in check.seen) == ("fine", True)
+
+
+@pytest.mark.parametrize(
+    ("factor", "lag", "level", "words"),
+    [
+        (0.65, 5.5, "notice", "filter or a flexible part"),
+        (0.65, 0.2, "wrong", "units and factors"),
+        (1.6, 5.5, "wrong", "units and factors"),
+        (1 / 9.80665, 5.5, "wrong", "g for m/s"),
+        (-0.65, 5.5, "wrong", "sign"),
+    ],
+)
+def test_what_is_later_and_smaller_is_no_wrong_unit(factor, lag, level, words):
+    pair = KinematicPair("position x", "acceleration ax", 2, Agreement(factor, 0.1, lag, 0.9))
+    (check,) = kinematic_checks([pair], 1000.0)
+    assert check.level == level
+    assert words in check.do
