@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import welch
 
 from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
 from equalizer.effects.simulation.bodies import bodies_of, moved
@@ -15,6 +14,7 @@ from equalizer.effects.starts.starting_values import own
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import spectral_density
 
 STEPS = 20
 """Per sample: a contact lasts a millisecond."""
@@ -121,7 +121,7 @@ def _played(evidence: Evidence, axis: int, values: Values | None, kept: slice) -
 
 def _spectrum(evidence: Evidence, signal: FloatArray) -> FloatArray:
     window = max(int(BAND_S * evidence.sample_rate_hz), 16)
-    return np.asarray(welch(signal, evidence.sample_rate_hz, nperseg=min(window, len(signal)), axis=0)[1])[1:]
+    return spectral_density(signal, evidence.sample_rate_hz, window)[1][1:]
 
 
 EFFECT = Effect(

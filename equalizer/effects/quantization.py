@@ -6,7 +6,7 @@ that noise which dithers the steps is not taken for a misfit. Otherwise noise ca
 """
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
@@ -40,9 +40,9 @@ def _within_step(response: FloatArray, measured: FloatArray, noise: float, step:
     missing = measured - response
     # From the side of the shorter tail, where probabilities keep their digits.
     side = np.where(missing > 0, -1.0, 1.0)
-    low, high = norm.cdf((side * missing - step / 2) / noise), norm.cdf((side * missing + step / 2) / noise)
+    low, high = ndtr((side * missing - step / 2) / noise), ndtr((side * missing + step / 2) / noise)
     chance = np.random.default_rng(len(response)).random(len(response))
-    residual = side * noise * norm.ppf(np.clip(low + chance * (high - low), FAR, 1 - FAR))
+    residual = side * noise * ndtri(np.clip(low + chance * (high - low), FAR, 1 - FAR))
     far = high < FAR
     residual[far] = (missing - np.sign(missing) * step / 2)[far]
     return np.asarray(measured - residual)

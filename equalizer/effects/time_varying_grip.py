@@ -1,7 +1,7 @@
 """A grip that tightens and loosens: the damping and the stiffness towards the ground come and go."""
 
 import numpy as np
-from scipy.signal import czt
+from scipy.fft import fft, ifft, next_fast_len
 
 from equalizer.effects.effect import ALL_SITES, AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import STEP_S, TIME_S, V_FREE, V_PER_N, X_FREE, X_PER_N, V, X
@@ -74,7 +74,13 @@ def _values(rate_hz: float, strengths: FloatArray) -> Values:
 
 def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
     """The first lines of a transform of so many samples, the last of them zeros: of all lines they are few."""
-    return np.asarray(czt(samples, count, np.exp(-2j * np.pi / size)))
+    # Bluestein's chirp transform (Rabiner, Schafer and Rader 1969, Bell Syst. Tech. J. 48:1249).
+    n, last = len(samples), max(len(samples), count)
+    chirp = np.exp(-1j * np.pi / size * np.arange(last) ** 2)
+    around = np.concatenate([chirp[n - 1 : 0 : -1], chirp[:count]]).conj()
+    room = next_fast_len(n + count - 1)
+    mixed = ifft(fft(samples * chirp[:n], room) * fft(around, room))
+    return np.asarray(mixed[n - 1 : n - 1 + count] * chirp[:count])
 
 
 def _rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:

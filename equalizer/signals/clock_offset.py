@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal as sg
-from scipy.interpolate import make_interp_spline
 
 from equalizer.signals.resampling import Grid, Samples, resampled
 from equalizer.signals.signal import FloatArray
@@ -67,6 +65,9 @@ def _on_grid(samples: Samples, rate_hz: float) -> FloatArray:
 
 def _normalised(values: FloatArray, two: FloatArray) -> FloatArray:
     """Cross-correlation over the overlap of each lag, by the energy of both there."""
+    # Here and below: SciPy's signals and splines take longer to import than a diagnosis that does without them.
+    from scipy import signal as sg
+
     raw = sg.correlate(values, two, mode="full", method="fft")
     ones, twos = np.ones(len(values)), np.ones(len(two))
     energy_one = sg.correlate(values**2, twos, mode="full", method="fft")
@@ -83,6 +84,8 @@ def _enough_overlap(lags: IntArray, number: int, two: int) -> BoolArray:
 
 
 def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None:
+    from scipy import signal as sg
+
     peaks, _ = sg.find_peaks(height)
     rivals = [place for place in peaks if abs(place - peak) > 2 and height[place] > RIVAL * height[peak]]
     if rivals:
@@ -93,6 +96,8 @@ def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None
 
 
 def _between_samples(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
+    from scipy.interpolate import make_interp_spline
+
     around = slice(max(0, peak - 8), peak + 9)
     spline = make_interp_spline(
         offsets_s[around] - offsets_s[peak], correlation[around], k=min(5, len(correlation) - 1)

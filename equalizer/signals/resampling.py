@@ -11,8 +11,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal as sg
-from scipy.interpolate import make_interp_spline
 
 from equalizer.signals.signal import FloatArray
 
@@ -119,6 +117,9 @@ def _from_uneven(samples: Samples, grid: Grid) -> FloatArray:
 
 def _along_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_rate_hz: float) -> FloatArray:
     """The spline on the grid, or on a finer one and then filtered, where the grid is slower than the source."""
+    # Here and below: SciPy's signals and splines take longer to import than a diagnosis that does without them.
+    from scipy.interpolate import make_interp_spline
+
     order = min(5, (len(values) - 1) // 2 * 2 + 1)
     origin_s = times_s[0]
     spline = make_interp_spline(times_s - origin_s, values, k=order)
@@ -130,6 +131,8 @@ def _along_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_ra
 
 def _by_ratio(values: FloatArray, ratio: Fraction, first: int, count: int) -> FloatArray:
     """`ratio` times the rate, from the sample `first` on; ends are continued by their point reflection."""
+    from scipy import signal as sg
+
     up, down = ratio.numerator, ratio.denominator
     if ratio == 1:
         return values[first : first + count].copy()

@@ -8,6 +8,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 HEAVY = ("numpy", "scipy", "numba", "pandas", "statsmodels", "matplotlib", "h5py", "textual")
+SELDOM = ("scipy.signal", "scipy.optimize", "scipy.interpolate", "scipy.integrate", "scipy.sparse", "scipy.ndimage")
+"""Parts of SciPy that load most of the others, or are needed by few."""
 
 
 def loaded_by(statement: str) -> set[str]:
@@ -16,7 +18,7 @@ def loaded_by(statement: str) -> set[str]:
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True, timeout=120
     )
     modules = done.stdout.split()
-    return {name.split(".")[0] for name in modules} | {"scipy.stats"}.intersection(modules)
+    return {name.split(".")[0] for name in modules} | {"scipy.stats", *SELDOM}.intersection(modules)
 
 
 def test_help_loads_nothing_heavy():
@@ -54,3 +56,10 @@ def test_the_process_that_draws_loads_no_arrays_no_disk_and_no_device():
     assert "textual" in loaded
     heavy = {"numpy", "scipy", "numba", "pandas", "statsmodels", "matplotlib", "h5py", "pydantic", "filelock"}
     assert loaded.isdisjoint(heavy), sorted(loaded & heavy)
+
+
+def test_a_diagnosis_begins_without_what_only_some_of_them_need():
+    loaded = loaded_by("import study.workflows.diagnosis.diagnose_recordings")
+    assert "numba" in loaded
+    needless = {"pandas", "statsmodels", "matplotlib", "jinja2", "scipy.stats", *SELDOM}
+    assert loaded.isdisjoint(needless), sorted(loaded & needless)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import welch
 
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import spectral_density
 
 NOISE_SHARE = 0.01
 """Of the acceleration's mean square that the motion's noise may make: the bias of a mass, as a share of it."""
@@ -48,5 +48,5 @@ def _end_hz(column: FloatArray, rate_hz: float, power: int) -> float:
 
 def _spectrum(column: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, float]:
     """Frequencies above zero, the density there, and that of white noise."""
-    frequency_hz, density = welch(column, rate_hz, nperseg=min(len(column), 4096))
+    frequency_hz, density = spectral_density(column, rate_hz, 4096)
     return frequency_hz[1:], density[1:], float(np.median(density[1 + 3 * (len(density) - 1) // 4 :]))

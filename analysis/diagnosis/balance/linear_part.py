@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from analysis.diagnosis.balance.blocks import blocks_of
 from analysis.diagnosis.balance.law import Beside
@@ -69,6 +68,9 @@ def driven_motion(motions: Sequence[Motion]) -> tuple[int, ...]:
     if places <= forces:
         return tuple(min(axis, places - 1) for axis in range(forces))
     missed = [_missed(motions, axis, places) for axis in range(forces)]
+    # Imported where it is used: the package takes longer to import than a diagnosis that does without it.
+    from scipy.optimize import linear_sum_assignment
+
     return tuple(linear_sum_assignment(missed, maximize=True)[1].tolist())
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, rfft
-from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.fault import Fault, Numbers, Told, Undo, Variant, sized
 from analysis.diagnosis.contrast.taken import Taken
+from equalizer.effects.simulation.sensor_path import one_pole
 from equalizer.effects.simulation.slew_kernel import follow
 from equalizer.signals.band_limited import odd_continued, straight
 from equalizer.signals.signal import FloatArray
@@ -159,4 +159,6 @@ def later(samples: FloatArray, by: float) -> FloatArray:
 def lagged(samples: FloatArray, constant: float) -> FloatArray:
     """A low pass of the first order; constant: in samples."""
     share = 1 - np.exp(-1 / constant)
-    return np.asarray(lfilter([share], [1.0, share - 1.0], samples, zi=[(1 - share) * samples[0]])[0])
+    passed = np.empty((len(samples), 1))
+    one_pole((samples - samples[0])[:, None], 1 - share, passed)
+    return np.asarray(samples[0] + passed[:, 0])

@@ -3,7 +3,6 @@
 from contextlib import suppress
 
 import numpy as np
-from scipy.signal import detrend
 
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.contrast.force_base import force_base
@@ -50,7 +49,9 @@ def moves_alike(clean: tuple[Taken, ...], faulty: tuple[Taken, ...]) -> bool:
 
 def _about_its_line(part: Taken) -> FloatArray:
     """(p,): mean squares."""
-    return np.asarray(np.mean(detrend(part.response, axis=0) ** 2, axis=0))
+    at = np.arange(len(part.response)) - (len(part.response) - 1) / 2
+    moved = part.response - part.response.mean(axis=0)
+    return np.asarray(np.mean((moved - at[:, None] * (at @ moved / max(float(at @ at), 1.0))) ** 2, axis=0))
 
 
 def turning_of(recording: Recording) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.weighed import DRAWS, LEVEL, drawn_of
 from analysis.diagnosis.contrast.compare import LEAST, Compared, Weighed
@@ -24,7 +24,7 @@ WORSE = 0.25
 """or of what the fault leaves: where a gain is large, a tenth of it is many times that. By hand."""
 MOST_ALIKE = 4
 """Faults of a class; more of them tell nothing."""
-BOUND = float(t.ppf(0.975, FOLDS - 1))
+BOUND = float(stdtrit(FOLDS - 1, 0.975))
 """Standard errors, from so few blocks, of a 95 % interval: within it, a number may be none."""
 SAME = {
     "transport_delay": ("logger_offset",),

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.fault import EVERY, Fault, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
@@ -60,13 +60,19 @@ class Stream:
             for number, part in enumerate(side.rows)
         ]
         scale = np.concatenate([self.columns, *(self.columns[at] for at in moved)]) * side.scale
-        white = np.concatenate([lfilter(self.colour, [1.0], part, axis=0) for part in wide]) / scale
+        white = np.concatenate([filtered(self.colour, part) for part in wide]) / scale
         kept = white[np.concatenate(side.masks)]
         return Grams(
             np.array([block.T @ block for block in np.array_split(kept, FOLDS)]),
             tuple(moved),
             len(self.columns),
         )
+
+
+def filtered(steps: FloatArray, samples: FloatArray) -> FloatArray:
+    """(n, k), from zero before the first sample."""
+    room = next_fast_len(len(samples) + len(steps) - 1, True)
+    return np.asarray(irfft(rfft(samples, room, axis=0) * rfft(steps, room)[:, None], room, axis=0)[: len(samples)])
 
 
 def _changing(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) -> Places:
@@ -97,7 +103,7 @@ def _own_error(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: Float
 
 def _white_error(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray, colour: FloatArray) -> float:
     """Rms of the white error that a base of these rows' own leaves, over the rms of what is told."""
-    white = np.vstack([lfilter(colour, [1.0], part, axis=0)[mask] for part, mask in zip(rows, masks, strict=True)])
+    white = np.vstack([filtered(colour, part)[mask] for part, mask in zip(rows, masks, strict=True)])
     gram = (white / columns).T @ (white / columns) / len(white)
     weights = weights_of(gram)
     return max(float(np.sqrt(max(float(weights @ gram @ weights), 0.0))), 1e-9)

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import find_objects, label
 
 from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, parts_of
 from analysis.diagnosis.settings import BRIDGED, LEAST_KEPT
@@ -25,7 +24,8 @@ def _across(recording: Recording, name: str) -> tuple[Recording, str]:
     missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
     if not missing.any() or missing.all():
         return recording, ""
-    gaps = [(place[0].start, place[0].stop) for place in find_objects(label(missing)[0]) if place]
+    edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2)
+    gaps = [(int(start), int(stop)) for start, stop in edges]
     whole = _interpolated(recording.command.samples)
     wide = [gap for gap in gaps if not _bridged(recording.command.samples, gap[1] - gap[0])]
     narrow = [gap for gap in gaps if gap not in wide]

@@ -9,12 +9,12 @@ held-out samples answers all the same.
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.signal.windows import hann
 
 from analysis.diagnosis.settings import ANSWER_COHERENCE, ANSWER_DEVIATIONS
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import hann
 
 STRETCHES = 12
 """Per command."""
@@ -79,7 +79,7 @@ def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArra
 
 def _stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray, ComplexArray]]:
     """Without what is at rest, or has gaps."""
-    window = hann(length, sym=False)[:, None]
+    window = hann(length)[:, None]
     for start in range(0, len(recording) - length + 1, length):
         u, y = (part.samples[start : start + length] for part in (recording.command, recording.response))
         if np.ptp(u, axis=0).any() and np.isfinite(y).all():

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.simulation.sensor_path import before_low_pass
@@ -39,7 +38,8 @@ def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFl
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
     slowest = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
-    moved = cumulative_trapezoid(samples, dx=1 / rate_hz, axis=0, initial=0.0)
+    moved = np.zeros(samples.shape)
+    moved[1:] = np.cumsum(samples[1:] + samples[:-1], axis=0) / (2 * rate_hz)
     return MeasuredMotion(moved, density / (2 * np.pi * slowest) ** 2)
 
 

@@ -10,12 +10,12 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import welch
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
 LOWEST, HIGHEST = 2.0, 0.48
@@ -88,9 +88,7 @@ class BandPower:
         rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
         for row, stretch in zip(rows, self.stretches, strict=True):
             window = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
-            lines, density = welch(
-                courses[stretch.record][stretch.first : stretch.last], rate_hz, nperseg=window, axis=0
-            )
+            lines, density = spectral_density(courses[stretch.record][stretch.first : stretch.last], rate_hz, window)
             firsts = np.searchsorted(lines, self._edges)
             for band, (low, high) in enumerate(pairwise(firsts)):
                 row[band] = density[low : max(high, low + 1)].mean(axis=0)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
-from scipy.signal import fftconvolve
 
 from analysis.diagnosis.data.lagged_products import lagged_products
 from analysis.diagnosis.types import Mask
@@ -34,7 +34,9 @@ class WhiteningFilter:
         """(n, c), NaN where it was. The filter is causal; unknown samples count as 0."""
         known = np.isfinite(left)
         filled = np.where(known, left, 0.0)
-        return np.where(known, fftconvolve(filled, self.steps, axes=0)[: len(left)], np.nan)
+        room = next_fast_len(len(left) + self.lags, True)
+        passed = irfft(rfft(filled, room, axis=0) * rfft(self.steps, room, axis=0), room, axis=0)
+        return np.where(known, passed[: len(left)], np.nan)
 
     def warm(self, left: FloatArray) -> Mask:
         """(n,): where all samples that the filter uses are known."""

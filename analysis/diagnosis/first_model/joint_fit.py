@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from analysis.diagnosis.balance.band import NOISE_SHARE
 from analysis.diagnosis.balance.blocks import Block, error_of, part_of_block
@@ -72,7 +72,7 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if tested else fit)])
     folded = (folds / np.array(powers)).mean(axis=1)
     matrices, deviations = (_matrices(regressions[0], shape, values) for values in (found, spread))
-    reach = float(student.ppf(0.975, max(len(own) - 1, 1)))
+    reach = float(stdtrit(max(len(own) - 1, 1), 0.975))
     halves = {part: np.hypot(reach * deviations[part], NOISE_SHARE * np.abs(matrices[part])) for part in PARTS}
     return JointFit(
         matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, folded,

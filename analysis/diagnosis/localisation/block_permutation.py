@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import gamma
+from scipy.special import gammaincc
 
 from equalizer.signals.signal import FloatArray
 
@@ -63,7 +63,7 @@ def permutation_p_values(
     seen = statistics(np.arange(len(strata)))
     chance = np.array([statistics(shuffled(strata, block, random)) for _ in range(permutations)])
     mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
-    p_values = gamma.sf(seen, mean**2 / variance, scale=variance / np.maximum(mean, np.finfo(np.float64).tiny))
+    p_values = gammaincc(mean**2 / variance, seen * mean / variance)
     # Shuffles that were as large are believed before the curve through them.
     counted = (np.sum(chance >= seen, axis=0) + 1) / (permutations + 1)
     believed = np.where(counted > _COUNTED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))

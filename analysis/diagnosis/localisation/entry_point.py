@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as t_distribution
+from scipy.special import stdtr
 
 from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra
 from analysis.diagnosis.settings import (
@@ -178,4 +178,4 @@ def _as_good(log: FloatArray, best: FloatArray, loud: np.ndarray[tuple[int, int]
         return 1.0
     means = difference[: blocks * _BLOCK_LINES].reshape(blocks, _BLOCK_LINES).mean(axis=1)
     error = float(means.std(ddof=1)) / np.sqrt(blocks)
-    return float(t_distribution.sf(means.mean() / max(error, _TINY), blocks - 1))
+    return float(stdtr(blocks - 1, -means.mean() / max(error, _TINY)))

@@ -8,7 +8,6 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import false_discovery_control
 
 from analysis.diagnosis.data.frequency_cells import Band
 from analysis.diagnosis.data.line_statistics import noncentral_f_sf
@@ -211,4 +210,8 @@ def _descend(
 
 
 def _benjamini_hochberg(p_values: FloatArray) -> FloatArray:
-    return np.asarray(false_discovery_control(p_values, method="bh"), dtype=np.float64)
+    order = np.argsort(p_values)[::-1]
+    adjusted = np.empty(len(p_values))
+    scaled = p_values[order] * len(p_values) / np.arange(len(p_values), 0, -1)
+    adjusted[order] = np.minimum(np.minimum.accumulate(scaled), 1.0)
+    return adjusted

@@ -7,7 +7,7 @@ quietest segments count, and where even they differ by more than what is heard a
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise, SegmentNoise
 from analysis.diagnosis.noise.periods import Periods, look_samples, look_spectra
@@ -71,7 +71,7 @@ def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
     """Which rows are as quiet as the quietest of their column. Both (rows, channels)."""
     least = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
-    bound = f_distribution.isf(_ALIKE, freedom, freedom[least, columns])
+    bound = fdtri(freedom, freedom[least, columns], 1 - _ALIKE)
     return np.asarray(variance <= bound * variance[least, columns], dtype=np.bool_)
 
 
@@ -110,6 +110,6 @@ def _no_more_than_rest(
     quiet = quietest(hiss.variance, hiss.freedom)
     weights = np.where(quiet, hiss.freedom, 0.0)
     rest = np.sum(weights * hiss.variance, axis=0) / weights.sum(axis=0)
-    bound = f_distribution.isf(_ALIKE, freedom, weights.sum(axis=0))
+    bound = fdtri(freedom, weights.sum(axis=0), 1 - _ALIKE)
     loud = varied & (density.mean(axis=0) > bound * rest) & (rest > 0)
     return np.where(loud, np.minimum(density, rest), density), np.asarray(loud, dtype=np.bool_)

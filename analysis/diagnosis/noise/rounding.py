@@ -7,12 +7,11 @@ Its part that repeats has the Fourier series of a saw tooth, blurred by the nois
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from equalizer.signals.signal import FloatArray
 
 _TERMS = np.arange(1, 200)
-_EXAMINED = 20_000
+_EXAMINED, _HALVES = 20_000, 40
 _TOLERANCE = 1e-3
 """Of a step: storage as float32 leaves no exact multiples."""
 
@@ -49,9 +48,17 @@ def rounded_noise(between_repeats: float, step: float) -> RoundedNoise:
     seen = between_repeats / step**2
     if seen > 1.0:
         return RoundedNoise(between_repeats, 0.0)
-    before = brentq(lambda variance: variance + 1 / 12 - _repeating(variance) - seen, 0.0, 1.0) if seen > 0 else 0.0
-    repeating = _repeating(before) * step**2
+    repeating = _repeating(_before_rounding(seen)) * step**2
     return RoundedNoise(between_repeats + repeating, repeating)
+
+
+def _before_rounding(seen: float) -> float:
+    """The noise's variance, by halves: what is seen between repeats grows with it. Both for steps of 1."""
+    low, high = 0.0, 1.0 if seen > 0 else 0.0
+    for _ in range(_HALVES):
+        middle = (low + high) / 2
+        low, high = (middle, high) if middle + 1 / 12 - _repeating(middle) < seen else (low, middle)
+    return high
 
 
 def _repeating(variance: float) -> float:

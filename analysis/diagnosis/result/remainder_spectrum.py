@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import welch
 
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.findings import Course
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import spectral_density
 
 _LENGTH = 2048
 _PER_OCTAVE = 6
@@ -69,8 +69,7 @@ def _power(part: tuple[Course, int, int], name: str, length: int) -> FloatArray:
     measured = course.measured[start:stop]
     values = measured if name == "measured" else measured - getattr(course, name)[start:stop]
     known = np.nan_to_num(values)
-    density = welch(known, course.sample_rate_hz, nperseg=length, axis=0)[1]
-    return np.asarray(density)[: length // 2 + 1]
+    return spectral_density(known, course.sample_rate_hz, length)[1]
 
 
 def _noise_power(floor: NoiseFloor | None, lines_hz: FloatArray, rate_hz: float, channels: int) -> FloatArray:

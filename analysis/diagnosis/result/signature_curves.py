@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.signal import welch
 
 from analysis.diagnosis.errors.unexplained_motion import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
@@ -17,6 +16,7 @@ from equalizer.effects.simulation.simulator import Played, simulate_mechanism
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import spectral_density
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Along = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
@@ -188,7 +188,7 @@ def _of_frequency(
 def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Amplitude density in twelfths of an octave, with its standard error."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
-    lines_hz, power = welch(signal, rate_hz, nperseg=length)
+    lines_hz, power = spectral_density(signal, rate_hz, length)
     looks = max(1.0, 1.5 * len(signal) / length)
     edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
     which = np.digitize(lines_hz[1:], edges)

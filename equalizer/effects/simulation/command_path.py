@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter, resample_poly
 
 from equalizer.effects.effect import OnCommand, PlacedEffect
+from equalizer.effects.simulation.sensor_path import one_pole
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
@@ -74,6 +74,9 @@ def finer(commands: FloatArray, steps: int, hold: Hold) -> Driven:
             (commands[:, None] + share[:, None] * change[:, None]).reshape(-1, commands.shape[1]) for share in places
         )
         return Driven(mean, end)
+    # Takes longer to import than a diagnosis without it.
+    from scipy.signal import resample_poly
+
     samples = resample_poly(commands, 2 * steps, 1, axis=0)
     # Every other one stands in the middle of a step, the ones between at its ends.
     return Driven(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
@@ -84,7 +87,8 @@ def lagged(commands: FloatArray, step_s: float, time_constant_s: float) -> Float
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
-    before = lfilter([0.0, 1 - decay], [1.0, -decay], commands, axis=0)
+    at_end = _one_pole(commands, decay)
+    before = np.concatenate([np.zeros_like(at_end[:1]), at_end[:-1]])
     left = (1 - decay) * time_constant_s / step_s
     return np.asarray(commands + (before - commands) * left)
 
@@ -94,7 +98,13 @@ def lagged_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
-    return np.asarray(lfilter([1 - decay], [1.0, -decay], commands, axis=0))
+    return _one_pole(commands, decay)
+
+
+def _one_pole(commands: FloatArray, decay: float) -> FloatArray:
+    out = np.empty(commands.shape)
+    one_pole(np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, out.reshape(len(out), -1))
+    return out
 
 
 def delayed(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numba import njit, types
-from scipy.signal import lfilter
 
 from equalizer.signals.signal import FloatArray
 
@@ -34,7 +33,9 @@ def before_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: f
     if bandwidth_hz <= 0:
         return response
     decay = float(np.exp(-2 * np.pi * bandwidth_hz / sample_rate_hz))
-    return np.asarray(lfilter([1.0, -decay], [1 - decay], response, axis=0))
+    before = np.array(response, dtype=np.float64)
+    before[1:] -= decay * response[:-1]
+    return np.asarray(before / (1 - decay))
 
 
 def within_range(response: FloatArray, limit: float) -> FloatArray:

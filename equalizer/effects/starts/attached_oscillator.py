@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import csd
 
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import cross_density, spectral_density
 
 WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02
 """Of a spectrum; least power of a line that counts, over the largest; share of the missing force that noise alone would
@@ -55,10 +55,10 @@ def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
     acceleration = np.gradient(evidence.axis_velocity, 1 / rate, axis=0) * used
     window = min(int(WINDOW_S * rate), len(used))
     own, force = acceleration[:, axis], (evidence.axis_force * used).T
-    frequency, power = csd(own, own, rate, nperseg=window)
-    cross = np.array([csd(own, row, rate, nperseg=window)[1] for row in force]).T
+    frequency, power = spectral_density(own, rate, window)
+    cross = np.array([cross_density(own, row, rate, window)[1] for row in force]).T
     inside = (frequency > 0) & (frequency < 0.45 * rate) & (power > DRIVEN * power.max())
-    return MissingMass(frequency[inside], power[inside].real, cross[inside])
+    return MissingMass(frequency[inside], power[inside], cross[inside])
 
 
 def hanging(frequency_hz: FloatArray, natural_hz: float | FloatArray, damping_ratio: float) -> ComplexArray:

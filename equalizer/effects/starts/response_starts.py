@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.signal import correlate, correlation_lags
+from scipy.fft import irfft, next_fast_len, rfft
 
 from equalizer.effects.effect import ALL_SITES
 from equalizer.effects.simulation.other_times import read_other_times
@@ -73,17 +73,16 @@ def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> Floa
 
 def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float:
     """By how many samples the measured response (n, p) comes after the predicted one, at most `longest`."""
-    total: FloatArray = np.zeros(2 * len(measured) - 1)
+    longest = min(longest, len(measured) - 1)
+    room = next_fast_len(len(measured) + longest, True)
+    total: FloatArray = np.zeros(2 * longest + 1)
     for after, before in zip(measured.T, predicted.T, strict=True):
         size = float(np.linalg.norm(before) * np.linalg.norm(after))
         if size > 0:
-            total = total + correlate(after, before, mode="full") / size
-    lags = correlation_lags(len(measured), len(measured))
-    near = np.flatnonzero(np.abs(lags) <= longest)
-    top = int(near[np.argmax(total[near])])
-    if top in (near[0], near[-1]):
-        return float(lags[top])
-    return _nearer(measured, predicted, float(lags[top]))
+            alike = irfft(rfft(after, room) * rfft(before, room).conj(), room)
+            total = total + np.concatenate([alike[room - longest :], alike[: longest + 1]]) / size
+    late = int(np.argmax(total)) - longest
+    return float(late) if abs(late) == longest else _nearer(measured, predicted, float(late))
 
 
 def _nearer(measured: FloatArray, predicted: FloatArray, late: float) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.lockin import ComplexArray
@@ -40,9 +40,10 @@ def scatter_over_lines(response: ComplexArray) -> FloatArray:
 
 def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
-    smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
-    # A running sum that strong lines have left keeps their rounding, which may be below zero.
-    return np.asarray(np.maximum(smooth, 0.0))
+    lines = max(1, min(lines, len(power)))
+    around = np.pad(power, [(lines // 2, (lines - 1) // 2), *[(0, 0)] * (power.ndim - 1)], mode="edge")
+    # No running sum: where strong lines have left one, it keeps their rounding.
+    return np.asarray(sliding_window_view(around, lines, axis=0).mean(axis=-1))
 
 
 def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup, jacobian, misfits, stacked
 from equalizer.identification.mechanical.mechanical_structure import Structure
@@ -42,6 +41,9 @@ def refined(
     most_steps: int = 40,
 ) -> Refined[S]:
     """Raises ValueError where the start itself is no model."""
+    # Here, for a diagnosis that fits no model need not wait for the import.
+    from scipy.optimize import least_squares
+
     fitted = [group.without_left_out() for group in groups]
     low, high = structure.bounds(band_hz)
 

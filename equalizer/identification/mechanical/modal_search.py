@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup
 from equalizer.identification.mechanical.mechanical_response import pole_answers, sensor_response
@@ -68,6 +67,9 @@ class ModalSearch:
         return self._refined(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
 
     def _refined(self, start: FloatArray) -> FoundModes:
+        # Here, for a diagnosis that fits no model need not wait for the import.
+        from scipy.optimize import least_squares
+
         half, delay = len(start) // 2, start[-1]
         least, most = (0.0, _MOST_DELAY_SAMPLES) if self._fit_delay and half > 1 else (delay - 1e-9, delay + 1e-9)
         low = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[0] / 10)), np.full(half, np.log(1e-3))])

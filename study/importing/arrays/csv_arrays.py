@@ -5,14 +5,16 @@ import io
 import re
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from study.importing.map_format.import_map import CsvMap
 from study.store.disk.text_file import read_text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_ROWS = 20_000_000
 """Five hours at 1 kHz."""
@@ -112,7 +114,10 @@ def _require_equal_rows(body: list[tuple[int, str]], header: list[str], delimite
             raise ValueError(f"line {number} has {count} fields, but there are {len(header)} columns")
 
 
-def _read(text: str, header: list[str], delimiter: str, settings: CsvMap, how: dict[str, Any]) -> pd.DataFrame:
+def _read(text: str, header: list[str], delimiter: str, settings: CsvMap, how: dict[str, Any]) -> "pd.DataFrame":
+    # Imported where tables are read: it takes longer than all that is done with other files.
+    import pandas as pd
+
     table: pd.DataFrame = pd.read_csv(
         io.StringIO(text),
         sep=r"\s+" if delimiter == " " else delimiter,
@@ -129,6 +134,8 @@ def _read(text: str, header: list[str], delimiter: str, settings: CsvMap, how: d
 def _numbers(
     column: "pd.Series[str]", name: str, body: list[tuple[int, str]], settings: CsvMap
 ) -> npt.NDArray[np.float64]:
+    import pandas as pd
+
     fields = column.str.strip()
     if settings.decimal == ",":
         fields = fields.str.replace(",", ".", regex=False)

@@ -24,8 +24,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
-from study.workflows.diagnosis.session_as_recordings import session_recordings
-from study.workflows.recording.import_recording import recording_from
+from study.workflows.recording.recording_from import recording_from
 
 STILL = 1e-9
 """Of its value: what changes by less is the rounding of numbers."""
@@ -57,6 +56,9 @@ def read_input(
             (f"{folders[0]} is a folder: a session is diagnosed by itself",), "Give recordings, or one session."
         )
     if folders:
+        # Here, for all that reads sessions takes long to import.
+        from study.workflows.diagnosis.session_as_recordings import session_recordings
+
         session = session_recordings(folders[0], seed)
         found = DiagnosisInput(
             (session.recording,), (session.name,), session.parents, session.remarks, session.simulated,

@@ -9,8 +9,8 @@ from typing import Any
 
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording
-from study.errors import StudyError, WrongUseError
-from study.importing.arrays.arrays import ARRAYS, TABLES, read_arrays
+from study.errors import WrongUseError
+from study.importing.arrays.arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import header_map, header_problems
 from study.importing.map_format.import_map import CsvMap, ImportMap
@@ -86,24 +86,6 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
     if all(is_hdf5(path) and format_of(path) == FORMAT for path in files):
         return _ours(files)
     return _by_header(files, on_progress)
-
-
-def recording_from(path: Path) -> tuple[Recording, tuple[str, ...]]:
-    """A recording of ours, or a table or arrays of others through the import, in memory; and what that did. Raises
-    StudyError."""
-    foreign = path.suffix.lower() in (*TABLES, *ARRAYS) or (path.is_file() and is_hdf5(path) and not format_of(path))
-    if not foreign:
-        return read_recording(path), ()
-    try:
-        found = read_foreign((path,), None)
-    except MapNeededError as needed:
-        raise StudyError(
-            needed.title,
-            needed.happened,
-            f"hapteq import {path} --out REC.h5 > MAP.toml prints one: complete it, import with --map MAP.toml, and "
-            "give REC.h5.",
-        ) from needed
-    return found.recording, (f"{path.name} is no recording of ours: it was imported in memory.", *found.notes)
 
 
 def _inside(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:

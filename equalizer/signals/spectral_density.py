@@ -1,0 +1,48 @@
+"""Spectral density by Welch's averaged, windowed stretches (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
+
+As `welch` and `csd` of SciPy at their defaults, whose package takes longer to import than many a spectrum.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from equalizer.signals.signal import FloatArray
+
+ComplexArray = npt.NDArray[np.complexfloating]
+
+
+def spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
+    """One-sided density of (n,) or (n, c), in units squared per hertz, over its first axis, at frequencies (lines,).
+
+    length: of a stretch; stretches have a Hann window, no mean, and overlap by half.
+    """
+    frequency_hz, power = _averaged(signal, signal, rate_hz, length)
+    return frequency_hz, np.asarray(power.real)
+
+
+def cross_density(one: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
+    """The same of two signals of one shape: mean of the first's conjugate with the other."""
+    return _averaged(one, other, rate_hz, length)
+
+
+def hann(length: int) -> FloatArray:
+    """(length,), periodic."""
+    return np.asarray(0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
+
+
+def _averaged(one: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
+    length = min(length, len(one))
+    window = hann(length).reshape(-1, *[1] * (one.ndim - 1))
+    starts = range(0, len(one) - length + 1, length - length // 2)
+    total = np.zeros((length // 2 + 1, *one.shape[1:]), dtype=np.complex128)
+    for start in starts:
+        lines = _lines(one[start : start + length], window)
+        total += lines.conj() * (lines if other is one else _lines(other[start : start + length], window))
+    density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
+    # Each line but those at zero and at half the rate stands for its negative frequency, too.
+    density[1 : len(density) - (length % 2 == 0)] *= 2
+    return np.asarray(np.arange(length // 2 + 1) * (rate_hz / length), dtype=np.float64), np.asarray(density)
+
+
+def _lines(stretch: FloatArray, window: FloatArray) -> ComplexArray:
+    return np.asarray(np.fft.rfft(window * (stretch - stretch.mean(axis=0)), axis=0))

@@ -1,0 +1,32 @@
+"""A recording from any file: read as it is, or imported in memory."""
+
+from pathlib import Path
+
+from equalizer.signals.recording import Recording
+from study.errors import StudyError
+from study.store.disk.hdf5_file import format_of, is_hdf5
+from study.store.formats.recording_file import read_recording
+
+
+def recording_from(path: Path) -> tuple[Recording, tuple[str, ...]]:
+    """A recording of ours, or a table or arrays of others through the import, in memory; and what that did. Raises
+    StudyError."""
+    if path.is_file() and is_hdf5(path) and format_of(path):
+        return read_recording(path), ()
+    # Here, for the import takes longer to load than a recording of ours to read.
+    from study.importing.arrays.arrays import ARRAYS, TABLES
+    from study.importing.map_format.map_errors import MapNeededError
+    from study.workflows.recording.import_recording import read_foreign
+
+    if path.suffix.lower() not in (*TABLES, *ARRAYS) and not (path.is_file() and is_hdf5(path)):
+        return read_recording(path), ()
+    try:
+        found = read_foreign((path,), None)
+    except MapNeededError as needed:
+        raise StudyError(
+            needed.title,
+            needed.happened,
+            f"hapteq import {path} --out REC.h5 > MAP.toml prints one: complete it, import with --map MAP.toml, and "
+            "give REC.h5.",
+        ) from needed
+    return found.recording, (f"{path.name} is no recording of ours: it was imported in memory.", *found.notes)
