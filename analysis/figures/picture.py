@@ -2,8 +2,7 @@
 
 import io
 import re
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -49,9 +48,12 @@ class Picture:
     """Shown in a report only when asked for."""
     alternative: str = ""
     """What is to be seen, for those who cannot see it; the title alone where empty."""
+    drawn: list[str] = field(default_factory=list)
+    """As `inline_svg`, once it was drawn: the page and the file beside it want the same."""
 
 
-@lru_cache(maxsize=256)
 def picture_svg(picture: Picture) -> str:
-    """As `inline_svg`. Drawn once, because the page and the file beside it want the same."""
-    return inline_svg(picture.figure, picture.name, picture.title, picture.alternative)
+    """As `inline_svg`, drawn once."""
+    if not picture.drawn:
+        picture.drawn.append(inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
+    return picture.drawn[0]

@@ -9,6 +9,7 @@ from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import write_text
+from study.workflows.forked_map import forked_map
 
 FIGURE_DPI = 150
 
@@ -19,10 +20,16 @@ def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
         make_folder(folder)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    for picture in pictures:
-        write_text(folder / f"{picture.name}.svg", picture_svg(picture), overwrite=True)
-        if not picture.folded:
-            write_atomically(folder / f"{picture.name}.png", _png(picture), overwrite=True)
+    drawn = forked_map(_drawn, pictures)
+    for picture, (svg, png) in zip(pictures, drawn, strict=True):
+        picture.drawn[:] = [svg]
+        write_text(folder / f"{picture.name}.svg", svg, overwrite=True)
+        if png:
+            write_atomically(folder / f"{picture.name}.png", png, overwrite=True)
+
+
+def _drawn(picture: Picture) -> tuple[str, bytes]:
+    return picture_svg(picture), b"" if picture.folded else _png(picture)
 
 
 def _png(picture: Picture) -> bytes:

@@ -15,7 +15,7 @@ from scipy.signal import StateSpace, lsim
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from equalizer.effects.catalogue import CATALOGUE
 from study.evaluation.challenge.draw_case import Case, draw_case
-from study.workflows.worker_threads import worker_threads
+from study.workflows.forked_map import forked_map, processor_s
 
 SEED = 61
 EFFECTS = ((), ("sensor_lag",), ("force_saturation",), ("coulomb_friction",))
@@ -52,12 +52,11 @@ class Taken:
 
 def diagnosed(case: Case, without: tuple[str, ...] = (), times: int = 1) -> Taken:
     """times: of the recording, one after another."""
-    with worker_threads() as threads:
-        counted = Counted(threads.map)
-        wall, cpu = time.perf_counter(), time.process_time()
-        settings = DiagnosisSettings(without=without)
-        found = diagnose([case.recording] * times, case.model, settings, counted, lambda what, share: None)
-        taken = time.perf_counter() - wall, time.process_time() - cpu
+    counted = Counted(forked_map)
+    wall, cpu = time.perf_counter(), processor_s()
+    settings = DiagnosisSettings(without=without)
+    found = diagnose([case.recording] * times, case.model, settings, counted, lambda what, share: None)
+    taken = time.perf_counter() - wall, processor_s() - cpu
     said = found.diagnosis
     return Taken(*taken, counted.items, f"{said.verdict} {' '.join(one.effect for one in said.effects)}")
 

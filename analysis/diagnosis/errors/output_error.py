@@ -92,10 +92,7 @@ def sensitivity(
     numbers whose columns are not."""
     base = fitting(measure, measure.residuals(tuning.tuned(at), hypothesis.placed()))
 
-    columns = np.zeros((len(at), len(base))) if beside is None else beside[0].copy()
-
-    def move_one(number: int) -> None:
-        columns[number] = 0.0
+    def moved(number: int) -> FloatArray:
         for move in (MOVED, -MOVED):
             there = at.copy()
             there[number] += move
@@ -105,11 +102,15 @@ def sensitivity(
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
             if np.isfinite(change).all():
-                np.divide(change, move, out=columns[number])
-                return
+                return np.divide(change, move, out=change)
         # Neither way is a model: the number stays where it is.
+        return np.zeros(len(base))
 
-    list(map_(move_one, range(len(at)) if beside is None else beside[1]))  # type: ignore[operator]
+    columns, numbers = (
+        (np.zeros((len(at), len(base))), range(len(at))) if beside is None else (beside[0].copy(), beside[1])
+    )
+    for number, column in zip(numbers, map_(moved, numbers), strict=True):  # type: ignore[operator]
+        columns[number] = column
     return Sensitivity(at, columns, columns @ columns.T)
 
 
@@ -180,17 +181,16 @@ def own_columns(
     """(numbers, samples): sensitivity of the prediction to the hypothesis's numbers."""
     model: MechanicalModel = tuning.tuned(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
-    columns = np.empty((len(moves), len(errors)))
 
-    def move_one(number: int) -> None:
+    def moved(number: int) -> FloatArray:
         point, move = from_.hypothesis.point.copy(), moves[number]
         point[number] += move
         with np.errstate(over="ignore", invalid="ignore"):
-            moved = fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))
-            np.divide(errors - moved, move, out=columns[number])
+            change = errors - fitting(measure, measure.residuals(model, from_.hypothesis.placed(point)))
+            return np.divide(change, move, out=change)
 
-    list(map_(move_one, range(len(moves))))  # type: ignore[operator]
-    return columns
+    columns = list(map_(moved, range(len(moves))))  # type: ignore[operator]
+    return np.array(columns).reshape(len(moves), len(errors))
 
 
 def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:

@@ -45,7 +45,10 @@ def localised(
     """Of the first recording, which stands for the device. stages: see `Explanation.stages`."""
     left = any(cell.beyond_noise for cell in cells["retuned"])
     entry = _entry(measure, tuning, stages["retuned"], floors[0]) if left else None
-    states = {stage: _states(measure, tuning, fitted, cells[stage], entry) for stage, fitted in stages.items()}
+    # What is the same fit is looked at once.
+    looked = {id(fitted): (fitted, cells[stage]) for stage, fitted in stages.items()}
+    found = {fit: _states(measure, tuning, *of_fit, entry) for fit, of_fit in looked.items()}
+    states = {stage: found[id(fitted)] for stage, fitted in stages.items()}
     return Localisation(states, entry, distortion(measure.records[0].recording, floors[0]))
 
 

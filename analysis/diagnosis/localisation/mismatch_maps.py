@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import ttest_1samp
+from scipy.special import stdtr
 
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
@@ -14,6 +14,7 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import Margin, MismatchCell, Prediction, mismatch_cells
 from analysis.diagnosis.localisation.model_error import beyond_error, model_error
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.types import Mapper
 
 Cells = tuple[MismatchCell, ...]
 STRETCHES = 16
@@ -41,12 +42,21 @@ def maps_of(
     stages: Mapping[str, Fitted],
     floors: tuple[NoiseFloor, ...],
     learned: CleanFloor | None = None,
+    map_: Mapper = map,
 ) -> Maps:
     """stages: see `Explanation.stages`. learned: what is no mismatch, from clean recordings; beside it, what the
     last stage errs by on held-out samples is none."""
-    cells = {stage: cells_of(measure, fitted, floors, learned) for stage, fitted in stages.items()}
-    error = model_error(cells_of(measure, stages["after"], floors, held_out=True))
-    return Maps({stage: beyond_error(own, error) for stage, own in cells.items()})
+    # What is the same fit is looked at once.
+    fits = list({id(fitted): fitted for fitted in stages.values()}.values())
+
+    def looked_at(number: int) -> Cells:
+        if number == len(fits):
+            return cells_of(measure, stages["after"], floors, held_out=True)
+        return cells_of(measure, fits[number], floors, learned)
+
+    found: list[Cells] = list(map_(looked_at, range(len(fits) + 1)))  # type: ignore[arg-type]
+    error, cells = model_error(found[-1]), {id(fitted): own for fitted, own in zip(fits, found, strict=False)}
+    return Maps({stage: beyond_error(cells[id(fitted)], error) for stage, fitted in stages.items()})
 
 
 def whole_mismatch(measure: ErrorMeasure, stands: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
@@ -73,7 +83,8 @@ def _more_than_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> flo
     known = over[np.isfinite(over)]
     if len(known) < len(over) or len(known) < 2 or np.ptp(known) == 0:
         return 0.0 if not known.size or known.mean() > 1 else 1.0
-    return float(ttest_1samp(known, 1.0, alternative="greater").pvalue)
+    score = (known.mean() - 1.0) / (known.std(ddof=1) / np.sqrt(len(known)))
+    return float(stdtr(len(known) - 1, -score))
 
 
 def cells_of(

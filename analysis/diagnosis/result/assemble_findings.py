@@ -52,7 +52,7 @@ def assembled(
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
     channels = channel_names(recording, len(measure.noise))
-    maps, courses = maps_of(measure, found.stages, floors, learned), _courses(measure, found, names)
+    maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _courses(measure, found, names)
     local = _localised(context, found, floors, maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
     document = _document(searched, errors, (maps, local), proposal)

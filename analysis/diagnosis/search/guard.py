@@ -5,6 +5,7 @@ Off, as it is unless asked for, every crash is an error: so tests, benchmarks an
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import TypeVar
 
 from analysis.diagnosis.effect_words import noun_of
@@ -37,11 +38,14 @@ class Guard:
             return map_
 
         def mapped(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
-            def kept(item: object) -> tuple[object, ...]:
-                return self._tried(_effect_of(item), doing, lambda: function(item))
+            @wraps(function)
+            def kept(item: object) -> tuple[object, ...] | Crash:
+                return _tried(_effect_of(item), doing, lambda: function(item))
 
-            results: list[tuple[object, ...]] = list(map_(kept, items))  # type: ignore[arg-type]
-            return [result for found in results for result in found]
+            results: list[tuple[object, ...] | Crash] = list(map_(kept, items))  # type: ignore[arg-type]
+            # Noted here, for it may have happened in another process.
+            self.crashes.extend(found for found in results if isinstance(found, Crash))
+            return [result for found in results if not isinstance(found, Crash) for result in found]
 
         return mapped
 
@@ -55,26 +59,29 @@ class Guard:
     ) -> Result:
         """Of a piece of the work that can be left out. what: an effect's name, or words. answers: errors that say
         something to a user, and are no crashes."""
-        found = self._tried(what, doing, work, answers) if self.on else (work(),)
-        return found[0] if found else instead
-
-    def _tried(
-        self, what: str, doing: str, work: Callable[[], Result], answers: tuple[type[Exception], ...] = ()
-    ) -> tuple[Result, ...]:
-        try:
-            return (work(),)
-        except OutOfTimeError:
-            raise
-        except Exception as crash:
-            if isinstance(crash, answers):
-                raise
-            self.crashes.append(Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": .")))
-            return ()
+        found = _tried(what, doing, work, answers) if self.on else (work(),)
+        if isinstance(found, Crash):
+            self.crashes.append(found)
+            return instead
+        return found[0]
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """One per effect, with what it crashed at and how."""
         return tuple(_sentence(what, self.crashes) for what in dict.fromkeys(crash.what for crash in self.crashes))
+
+
+def _tried(
+    what: str, doing: str, work: Callable[[], Result], answers: tuple[type[Exception], ...] = ()
+) -> tuple[Result] | Crash:
+    try:
+        return (work(),)
+    except OutOfTimeError:
+        raise
+    except Exception as crash:
+        if isinstance(crash, answers):
+            raise
+        return Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": ."))
 
 
 def _sentence(what: str, crashes: Iterable[Crash]) -> str:

@@ -1,6 +1,7 @@
 """Time limit of a search: what was found until then is the result."""
 
 from collections.abc import Callable, Iterable
+from functools import wraps
 from itertools import count
 
 from analysis.diagnosis.types import Mapper, TimeBudget
@@ -26,17 +27,29 @@ def counted(most: int) -> TimeBudget:
 
 
 def budgeted(map_: Mapper, time_left: TimeBudget) -> Mapper:
-    """The same map; raises OutOfTimeError before a piece of work that would begin after the time limit."""
+    """The same map; raises OutOfTimeError before a piece of work that would begin after the time limit.
 
-    def asked(function: Callable[..., object]) -> Callable[..., object]:
-        def work(*arguments: object) -> object:
-            if not time_left():
-                raise OutOfTimeError
-            return function(*arguments)
+    Where pieces are worked on in other processes, what was asked there is asked here again: each counts once.
+    """
+    asked = [0]
 
-        return work
+    def ask() -> None:
+        asked[0] += 1
+        if not time_left():
+            raise OutOfTimeError
 
     def mapped(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
-        return list(map_(asked(function), *items))
+        begun = asked[0]
+
+        @wraps(function)
+        def work(*arguments: object) -> tuple[object, int]:
+            before = asked[0]
+            ask()
+            return function(*arguments), asked[0] - before
+
+        found: list[tuple[object, int]] = list(map_(work, *items))  # type: ignore[arg-type]
+        for _ in range(sum(times for _, times in found) - (asked[0] - begun)):
+            ask()
+        return [result for result, _ in found]
 
     return mapped

@@ -32,7 +32,7 @@ from study.workflows.diagnosis.diagnosis_input import (
     nothing_to_diagnose,
 )
 from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
-from study.workflows.worker_threads import worker_threads
+from study.workflows.forked_map import forked_map
 
 SHORT = "too short"
 """What is said of a recording that holds too few cycles: of a real one, for which there is no other, it is a remark."""
@@ -74,12 +74,11 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
             time_left=time_left,
             guard=guard,
         )
-        with worker_threads() as threads:
-            found = diagnose((read.recording,), read.model, settings, threads.map, on_progress)
-            found = replace(found, remarks=(*read.remarks, *found.remarks))
-            diagnosis = wanted.found.source.map.diagnosis
-            names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
-            answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
+        found = diagnose((read.recording,), read.model, settings, forked_map, on_progress)
+        found = replace(found, remarks=(*read.remarks, *found.remarks))
+        diagnosis = wanted.found.source.map.diagnosis
+        names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
+        answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
     except StudyError as refusal:
         return RealDiagnosis(_refused(wanted, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import process_time
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.search.time_budget import counted
@@ -34,6 +33,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import write_real_answer
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
+from study.workflows.forked_map import processor_s
 
 RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
@@ -134,7 +134,7 @@ def _answers(
     left = dict.fromkeys((each.folder.name for each in found.recordings), whole)
     for number, recording in enumerate(found.recordings):
         rest = sum(other.folder == recording.folder for other in found.recordings[number:])
-        begun = process_time()
+        begun = processor_s()
         budget = max(left[recording.folder.name] / rest - BESIDE_S, 0.1 * whole)
 
         def show(what: str, share: float, number: int = number, real_recording: RealRecording = recording) -> None:
@@ -144,7 +144,7 @@ def _answers(
 
         there = kept.get(answer_place(plan.out, recording))
         answers.append(there or _answer(plan, recording, budget, show, clock))
-        left[recording.folder.name] -= process_time() - begun
+        left[recording.folder.name] -= processor_s() - begun
     return tuple(answers)
 
 
@@ -152,8 +152,8 @@ def _answer(
     plan: RealPlan, real_recording: RealRecording, budget_s: float, on_progress: Progress, clock: Clock
 ) -> RealAnswer:
     """budget_s: of processor time, that the search may take."""
-    begun_s, worked, guard = clock.now_s(), process_time(), crash_guard()
-    timed: TimeBudget = lambda: process_time() - worked < budget_s  # noqa: E731
+    begun_s, worked, guard = clock.now_s(), processor_s(), crash_guard()
+    timed: TimeBudget = lambda: processor_s() - worked < budget_s  # noqa: E731
     time_left = counted(EVALUATIONS) if plan.seconds is None else timed
 
     def kept(done: RealDiagnosis) -> RealAnswer:

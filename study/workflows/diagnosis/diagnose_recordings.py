@@ -4,7 +4,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import process_time
 from typing import Protocol
 
 import numpy as np
@@ -23,7 +22,6 @@ from equalizer.plant.mechanical_model import MechanicalModel, nearest
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.disk.new_folder import new_folder, require_new_folder
-from study.store.sessions.written_elsewhere import note_written
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
@@ -35,8 +33,7 @@ from study.workflows.diagnosis.diagnosis_input import (
 from study.workflows.diagnosis.effect_file import read_entry
 from study.workflows.diagnosis.fitted_first import first_model_of, fitted_model
 from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
-from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
-from study.workflows.worker_threads import worker_threads
+from study.workflows.forked_map import forked_map, processor_s
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
 """Shares of the work at which the recordings are read, a model is fitted where none was given, and all is computed."""
@@ -125,8 +122,7 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
     _check_compared(plan, found, held)
     settings = replace(_settings(plan, found, clean, first.balances), time_left=time_left, guard=guard)
     try:
-        with worker_threads() as threads:
-            findings = engine(found.recordings, held, settings, threads.map, _within(on_progress, begun, DIAGNOSED))
+        findings = engine(found.recordings, held, settings, forked_map, _within(on_progress, begun, DIAGNOSED))
     except NothingLearned as refusal:
         raise nothing_to_diagnose(
             (str(refusal),), "Leave --clean out, or record the sound device in the same way."
@@ -154,6 +150,8 @@ def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
     on_progress("writing the report", DIAGNOSED)
     plan = answer.plan
     for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
+        from study.store.sessions.written_elsewhere import note_written
+
         note_written(session, plan.out)
     with new_folder(plan.out) as folder:
         findings = write_diagnosis_into(folder, answer.findings, answer.parents)
@@ -162,8 +160,8 @@ def written(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
 
 
 def _time_budget(plan: DiagnosePlan) -> TimeBudget:
-    worked = process_time()
-    return lambda: plan.seconds is None or process_time() - worked < plan.seconds
+    worked = processor_s()
+    return lambda: plan.seconds is None or processor_s() - worked < plan.seconds
 
 
 def _settings(
@@ -229,6 +227,8 @@ def _model(
 
 
 def _twin(on_progress: Progress) -> MechanicalModel:
+    from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
+
     what = "identifying the simulated device's twin"
     on_progress(what, 0.0)
     with tempfile.TemporaryDirectory() as folder:

@@ -362,8 +362,8 @@ def test_results_of_the_screen_lie_in_a_session_or_beside_a_recording(tmp_path):
 def test_compare_and_seconds_reach_the_engine(files, findings, tmp_path):
     engine = asked_of_engine(plan(files, tmp_path / "out", compare="force", seconds=1e-9), findings)
     assert engine.settings.compared == "force"
-    assert not engine.settings.patient()
-    assert asked_of_engine(plan(files, tmp_path / "out"), findings).settings.patient()
+    assert not engine.settings.time_left()
+    assert asked_of_engine(plan(files, tmp_path / "out"), findings).settings.time_left()
 
 
 def test_forces_without_a_measured_motion_are_refused(files, recording, tmp_path):
