@@ -71,5 +71,5 @@ def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tupl
     tuning = tuning_of(given, recording.command.channels)
     context = SearchContext(measure.shortened(), measure, tuning, map)
     before = evaluated(context.measure, tuning, np.zeros(len(tuning.names)), NOTHING)
-    given_, retuned = (context.confirmed(context.contender(fitted)) for fitted in (before, retuned_alone(context)))
+    given_, retuned = (context.confirmed(context.candidate(fitted)) for fitted in (before, retuned_alone(context)))
     return context, Explanation(given_, retuned, retuned, (), ())

@@ -19,7 +19,7 @@ from analysis.diagnosis.confirm.laws_beside_model import Beside, weighed_beside
 from analysis.diagnosis.contrast.decide import BEYOND
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.data.observed_parts import names_of_parts
-from analysis.diagnosis.discovery.join import with_laws
+from analysis.diagnosis.discovery.join import has_law, with_laws
 from analysis.diagnosis.errors.choose_measure import Compared, measure_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
@@ -112,8 +112,6 @@ def diagnose(
         return beside
     look = look_of(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     seen = _by_search(recordings, look, settings, map_, progress, balances)
-    if settings.discovery and not settings.fitted:
-        seen = replace(seen, searched=with_laws(seen.searched, progress, settings.time_left))
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
         seen, balances = _weighed(recordings, look, seen, settings)
@@ -226,20 +224,31 @@ def _by_search(
         beside = searched_beside_reference(context, learned, catalogue, progress, settings.time_left)
         found = _Seen(beside, learned.floor)
     else:
-        found = _Seen(searched(context, catalogue, progress, settings.time_left), CleanFloor())
+        found = _searched(context, catalogue, settings, progress)
         if hums_low(found.searched.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            found = _Seen(searched(context, catalogue, progress, settings.time_left), CleanFloor())
+            found = _searched(context, catalogue, settings, progress)
     if balances and found.searched.judged.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
         found = replace(found, searched=unconfirmed_beside_motion(borne_out(found.searched, repeats)))
     seen = found.searched
-    if seen.judged.verdict in ("unexplained", "partly_explained") and not context.certain and settings.time_left():
+    left = seen.judged.verdict in ("unexplained", "partly_explained") and not has_law(seen)
+    if left and not context.certain and settings.time_left():
         progress("looking for play that rattles", 0.9)
         rattled = rattling(seen.context, seen.found, chosen.floors, may_be_named)
         if rattled is not None:
             return replace(found, searched=Searched(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
+
+
+def _searched(
+    context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
+) -> _Seen:
+    def beyond(seen: Searched) -> Searched:
+        wanted = settings.discovery and not settings.fitted
+        return with_laws(seen, progress, settings.time_left) if wanted else seen
+
+    return _Seen(searched(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
 
 
 def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:

@@ -170,5 +170,6 @@ LAW_MOST_ROUNDS = 3  # laws that are added one after the other
 LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error, change nothing for a reader
 LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
 LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
-LAW_PLACEBO = 0.2  # share that the best term may take of a shuffled force
+LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may leave of the missing one at most
+LAW_SAME = 0.05  # of what a law foretells: laws that are no further apart are one, written in two ways (issue 16)
 LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told

@@ -50,7 +50,7 @@ def weighed_beside(recordings: Sequence[Recording], look: Look, seen: Searched, 
         return Beside(seen, balances)
     if known_noise and near:
         why_not = "the noise is known here, and what it leaves is more than noise"
-        return Beside(replace(seen, unconfirmed=_unconfirmed(seen, why_not)), balances)
+        return Beside(replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed(seen, why_not))), balances)
     why_not = objection(seen, balances)
     if seen.found.steps and not why_not:
         return Beside(replace(seen, judged=Judgement("partly_explained", True)), balances)
@@ -58,7 +58,7 @@ def weighed_beside(recordings: Sequence[Recording], look: Look, seen: Searched, 
     if found is not None and not objection(found, balances):
         judged = replace(found.judged, verdict="partly_explained")
         return Beside(replace(found, judged=judged, remarks=seen.remarks), balances)
-    return Beside(replace(seen, unconfirmed=_unconfirmed(seen, why_not)), balances)
+    return Beside(replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed(seen, why_not))), balances)
 
 
 def objection(seen: Searched, balances: Sequence[Balance]) -> str:

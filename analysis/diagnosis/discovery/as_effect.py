@@ -6,22 +6,26 @@ from collections.abc import Sequence
 from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.discovery.sums import Sum
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, claimed
-from equalizer.effects.discovered_law import Channels, law_effect, law_values
+from equalizer.effects.discovered_law import Channels, axis_names, law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
 _NUMBER = re.compile(r"\bp(\d+)\b")
+_SIGNAL = re.compile(rf"\b([vf]?)([{AXES}])\b")
 
 
-def law_of_sum(of: Sum) -> Law:
-    """p0 is the first term's factor, then its numbers, then the next term's."""
+def law_of_sum(of: Sum, recording: Recording) -> Law:
+    """p0 is the first term's factor, then its numbers, then the next term's. The grammar calls the driven axes x, y, z
+    in their order; the law calls them as the recording does."""
+    names = axis_names(recording.command.channels)
     parts: list[str] = []
     numbers: list[float] = []
     for term, factor in zip(of.terms, of.factors, strict=True):
         first = len(numbers)
         numbers += [factor, *term.numbers]
         parts.append(f"p{first}*{_numbered(term.shape, first + 1)}")
-    return Law(" + ".join(parts), tuple(numbers), (), "force", AXES[of.axis])
+    text = _SIGNAL.sub(lambda found: found[1] + names[AXES.index(found[2])], " + ".join(parts))
+    return Law(text, tuple(numbers), (), "force", names[of.axis])
 
 
 def _numbered(shape: str, first: int) -> str:

@@ -20,21 +20,25 @@ from analysis.diagnosis.settings import (
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
+_PLACEBOS = 3
+_LACKING = 2
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searched:
     sums: tuple[Sum, ...]
     """The best first."""
     placebo: float
-    """Share of the held-out squares above the noise that the best term takes of a residual out of its time."""
+    """Share of the held-out squares that the best term takes of residuals out of their time: what chance takes."""
 
 
 def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> Searched:
     """base: of the model's numbers alone."""
     view = base.view
     kept, columns = _tabled(view, terms)
-    found = _refined(base, (), kept, _order(base, columns), time_left)
-    every = list(found)
+    order = _order(base, columns)
+    found = _refined(base, (), kept, order, time_left)
+    every = [*found, *_without_variables(base, found, kept, order, time_left)]
     while found and len(found[0].terms) < LAW_MOST_TERMS and time_left():
         best = found[0]
         if best.crossed - 1 <= LAW_MAIN_PART * (best.without - 1):
@@ -53,15 +57,30 @@ def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> S
 
 
 def _placebo(view: View, columns: FloatArray) -> float:
-    """Each block gets the residual of another one, backwards."""
-    turned = np.zeros_like(view.residual)
-    blocks = list(pairwise(view.edges))
-    for (a, b), (c, d) in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
-        count = min(b - a, d - c)
-        turned[a : a + count] = view.residual[c : c + count][::-1]
-    found = tried(products_of(replace(view, residual=turned)), columns)
-    without = float(found.without.sum())
-    return max(1 - float(found.with_it.sum(axis=0).min()) / max(without, 1e-300), 0.0)
+    """Each block gets the residual of another one, backwards and as large as its own: the most of several turns."""
+    blocks, takes = list(pairwise(view.edges)), [0.0]
+    for shift in range(1, min(len(blocks), _PLACEBOS + 1)):
+        turned = np.zeros_like(view.residual)
+        for (a, b), (c, d) in zip(blocks, [*blocks[shift:], *blocks[:shift]], strict=True):
+            count = min(b - a, d - c)
+            own, other = view.residual[a:b], view.residual[c : c + count]
+            size = float(np.linalg.norm(own)) / max(float(np.linalg.norm(other)), 1e-300)
+            turned[a : a + count] = size * other[::-1]
+        found = tried(products_of(replace(view, residual=turned)), columns)
+        without = float(found.without.sum())
+        takes.append(1 - float(found.with_it.sum(axis=0).min()) / max(without, 1e-300))
+    return max(takes)
+
+
+def _without_variables(
+    base: Products, found: Sequence[Sum], terms: Sequence[Term], order: Sequence[int], time_left: TimeBudget
+) -> tuple[Sum, ...]:
+    """The grammar without what the best needs: the best starts of laws that lack one of its variables."""
+    if not found:
+        return ()
+    needed = set(found[0].variables)
+    left = [number for number in order if not needed <= terms[number].variables]
+    return _refined(base, (), terms, left, time_left)[:_LACKING]
 
 
 def _worth(shorter: Sum, longer: Sum) -> bool:

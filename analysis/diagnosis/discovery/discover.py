@@ -41,7 +41,9 @@ class Round:
     sums: tuple[Sum, ...]
     """As the screen had them; the first is that of the first candidate."""
     placebo: float
-    """Share of the held-out squares above the noise that the best term takes of a missing force out of its time."""
+    """Share of the held-out squares that the best term takes of a missing force out of its time."""
+    taken: float
+    """The same share of the missing force itself, by the law."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +89,7 @@ def _next(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round 
     every = sorted(
         (item for found in searched for item in found.sums), key=lambda item: _taken(views, item), reverse=True
     )
-    sums = _near(_different(every))[:LAW_FITTED]
+    sums = _with_other_variables(_near(_different(every)))
     if not sums:
         return None
     known = sensitivity_at(context, base.deviations, base.hypothesis)
@@ -104,8 +106,20 @@ def _next(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round 
     close = [pair for pair in rest if _price(pair[1]) < _price(fits[0][1]) and inseparable(refined[0][0], pair[0])]
     refined += [(context.candidate(refine(context, candidate.fitted)), item) for candidate, item in close]
     ranked = _plainest_first([*refined, *(pair for pair in rest if pair not in close)])
-    placebo = max((found.placebo for found in searched), default=0.0)
-    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo)
+    first = ranked[0][1]
+    # Of the axis that it acts along.
+    placebo = max(found.placebo for found in searched if any(item.axis == first.axis for item in found.sums))
+    taken = 1 - first.crossed / max(first.without, 1e-300)
+    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, taken)
+
+
+def _with_other_variables(sums: Sequence[Sum]) -> list[Sum]:
+    """The best few, and the best that lacks a variable of the first, if it is no further off."""
+    first = [*sums[:LAW_FITTED]]
+    if not first or any(not set(sums[0].variables) <= set(each.variables) for each in first):
+        return first
+    other = next((each for each in sums if not set(sums[0].variables) <= set(each.variables)), None)
+    return first if other is None else [*first, other]
 
 
 def _plainest_first(pairs: Sequence[tuple[FittedCandidate, Sum]]) -> list[tuple[FittedCandidate, Sum]]:
@@ -127,7 +141,8 @@ def _price(of: Sum) -> int:
 
 def _started(context: SearchContext, base: Fitted, each: Sum) -> Fitted | None:
     """With the model's own numbers as they were, or as the sum wants them."""
-    law = hypothesis_of(law_of_sum(each), each.axis, context.measure.records[0].recording)
+    recording = context.measure.records[0].recording
+    law = hypothesis_of(law_of_sum(each, recording), each.axis, recording)
     found: list[Fitted] = []
     for deviations in (base.deviations, np.clip(base.deviations + each.moved, -RETUNING_BOUND, RETUNING_BOUND)):
         try:

@@ -5,6 +5,7 @@ recording's own travel, speed and duration span. What is linear in an axis's own
 stiffness are numbers of the model. docs/diagnosis.md says what the grammar holds and what it does not.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -16,6 +17,7 @@ from equalizer.signals.signal import FloatArray
 Columns = Mapping[str, FloatArray]
 """Along a recording, (n,) each, SI: x, y, z and vx, … the axes' motion, fx, … the commands, t."""
 AXES = "xyz"
+_SIGNAL = re.compile(rf"\b(?:[vf]?[{AXES}]|t)\b")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,10 @@ class Term:
     """Which of them are exponents."""
     turns: tuple[int, ...] = ()
     """Which of them are angles: all others are positive."""
+
+    @property
+    def variables(self) -> frozenset[str]:
+        return frozenset(_SIGNAL.findall(self.shape))
 
 
 def odd(name: str, number: int) -> str:

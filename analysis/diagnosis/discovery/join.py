@@ -1,15 +1,17 @@
 """A finished search, with a law that has no name where no catalogue name stands, or where the law is far better."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.discovery.as_effect import laws_of
 from analysis.diagnosis.discovery.discover import Discovered, discover
-from analysis.diagnosis.discovery.proof import beats, failed
+from analysis.diagnosis.discovery.proof import beats, failed, proved
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import identified
-from analysis.diagnosis.search.search import Searched
+from analysis.diagnosis.search.search import Searched, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.settings import NAMED_ERROR, NOISE_ALONE, SEALED_ALONE_ERROR
@@ -18,14 +20,17 @@ from analysis.diagnosis.types import Progress, TimeBudget
 
 def with_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> Searched:
     """The same search where it needs no law, or where none is found that is better than what it names; a law that is
-    not proved is a remark, and no more."""
+    not proved is a candidate, and no more."""
     context, known = searched.context, searched.found
     if not _wanted(searched) or not time_left():
         return searched
     found = discover(context, known, progress, time_left)
-    if found is None or not _gains(found.found) or not _beats_names(context, searched, found):
+    if found is None or not _gains(found.found):
         return searched
-    reasons = failed(found, context.whole.records)
+    rivals = _rivals(context, known)
+    reasons = failed(context, found, rivals)
+    if not all(beats(found.found.after, rival) for rival in rivals):
+        reasons = (*reasons, "what the catalogue names leaves hardly more")
     checked = identified(context, found.found, time_left)
     if len(checked.steps) < len(found.found.steps):
         reasons = (*reasons, "these recordings leave its numbers as good as open")
@@ -36,8 +41,15 @@ def with_laws(searched: Searched, progress: Progress, time_left: TimeBudget) -> 
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
-        return replace(searched, remarks=(*searched.remarks, _candidate(context, found, reasons)))
-    return Searched(context, checked, judged, errors=None if checked.errors is None else checked.errors[1])
+        return replace(searched, unconfirmed=(*searched.unconfirmed, *_candidates(context, found, reasons)))
+    remarks = (proved(context, checked, rivals),)
+    return Searched(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
+
+
+def has_law(searched: Searched) -> bool:
+    """Whether a law without a name is named."""
+    laws = laws_of(searched.found.after.fitted.hypothesis)
+    return searched.judged.named and any(law is not None for law in laws)
 
 
 def _wanted(searched: Searched) -> bool:
@@ -60,23 +72,18 @@ def _sealed(of: FittedCandidate) -> float:
     return float(np.mean(np.log(of.score.test)))
 
 
-def _beats_names(context: SearchContext, searched: Searched, found: Discovered) -> bool:
-    """What is named, and the best that was not."""
-    known = searched.found
+def _rivals(context: SearchContext, known: Explanation) -> list[FittedCandidate]:
+    """What is named, and the best of the first round of the catalogue."""
     rivals = [known.after] if known.steps else []
     if known.rounds and known.rounds[0]:
         rivals.append(context.confirmed(known.rounds[0][0]))
-    return all(beats(found.found.after, rival) for rival in rivals)
+    return rivals
 
 
-def _candidate(context: SearchContext, found: Discovered, reasons: tuple[str, ...]) -> str:
-    """A sentence."""
-    after, retuned = found.found.after, found.found.retuned
-    laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
-    said = " and ".join(f"F{law.axis} = {law.text} {context.tuning.model.system.force}" for law in laws)
-    less = float(np.exp(_sealed(after) - _sealed(retuned)))
-    gain = f", which leaves {100 * less:.3g} % of the re-tuned model's error on held-out data" if less < 1 else ""
-    return (
-        f"A law without a name is a candidate, and no more: {said}{gain}. Why it is not confirmed: "
-        f"{'; '.join(dict.fromkeys(reasons))}."
-    )
+def _candidates(context: SearchContext, found: Discovered, reasons: tuple[str, ...]) -> Iterator[Unconfirmed]:
+    """Each law, with the gain of all."""
+    gain = held_out_gain(context.whole, found.found.retuned, found.found.after)
+    hypothesis = found.found.after.fitted.hypothesis
+    for number, law in enumerate(laws_of(hypothesis)):
+        if law is not None:
+            yield Unconfirmed(hypothesis, 0.0 if gain is None else max(gain.gain, 0.0), "; ".join(reasons), number)

@@ -5,18 +5,22 @@ kind than those it was found in bear it out, where its numbers are the same in e
 shuffled force finds nothing, and where no law of other variables does as well.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.discovery.discover import Discovered, Round
-from analysis.diagnosis.discovery.grammar import AXES
-from analysis.diagnosis.discovery.sums import Sum
+from analysis.diagnosis.discovery.as_effect import law_of_sum, laws_of
+from analysis.diagnosis.discovery.discover import Discovered
+from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
-from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_STABLE
-from equalizer.laws.law import Law
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE
+from analysis.wording import listed
+from equalizer.effects.discovered_law import axis_names
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
 
@@ -24,44 +28,78 @@ SAME_KIND = (
     "nothing that was kept for the test is of another kind than what it was found in: louder, or on several axes"
 )
 
+HALF_TAKEN = (
+    "the model's own coupled damping or stiffness, which acts on both axes alike, takes half of any such force: a "
+    "gyroscopic pair of half its size does as well"
+)
+_COUPLED = re.compile(r"p0\*v?[a-z]")
+"""Linear in the motion of another axis; in its own the model is."""
 
-def failed(of: Discovered, records: Sequence[Observed]) -> tuple[str, ...]:
-    """Why the laws are candidates and no more; empty where they pass."""
-    return tuple(_failed(of, records))
+
+def failed(context: SearchContext, of: Discovered, rivals: Sequence[FittedCandidate]) -> tuple[str, ...]:
+    """Why the laws are candidates and no more; empty where they pass. rivals: the best of the catalogue, confirmed."""
+    return tuple(dict.fromkeys(_failed(context, of, rivals)))
 
 
-def _failed(of: Discovered, records: Sequence[Observed]) -> Iterator[str]:
-    if not tested_otherwise(records):
+def _failed(context: SearchContext, of: Discovered, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
+    if not tested_otherwise(context.whole.records):
         yield SAME_KIND
     for number, found in enumerate(of.rounds):
         first = found.sums[0]
         if first.spread > LAW_STABLE:
             yield f"its numbers differ by {100 * first.spread:.0f} % from stretch to stretch"
-        if found.placebo > LAW_PLACEBO:
-            yield f"in a shuffled force the same search finds {100 * found.placebo:.0f} % of it"
-        for other in _alike(found):
-            yield f"a law of {' and '.join(other)} does as well"
-        if number and not of.found.steps[number].score.mean_log_error < of.found.steps[number - 1].score.mean_log_error:
-            yield "it brings nothing beside the law before it"
+        if 1 - found.taken > LAW_PLACEBO * (1 - found.placebo):
+            yield (
+                f"it takes {100 * found.taken:.0f} % of the missing force, and the same search takes "
+                f"{100 * found.placebo:.0f} % of one that is shuffled in time"
+            )
+        yield from _alike(context, of, number)
+    if any(law is not None and _COUPLED.fullmatch(law.expression) for law in laws_of(of.found.after.fitted.hypothesis)):
+        yield HALF_TAKEN
+    yield from _not_ahead(context, of.found.after, (of.found.retuned, "the re-tuned model"))
+    for rival in rivals:
+        yield from _not_ahead(context, of.found.after, (rival, f"{noun_of(rival.newest)} alone or with what it needs"))
 
 
-def _alike(found: Round) -> Iterator[tuple[str, ...]]:
-    """Variables of laws that leave hardly more, and are not those of the first."""
+def _not_ahead(context: SearchContext, law: FittedCandidate, rival: tuple[FittedCandidate, str]) -> Iterator[str]:
+    """On held-out data, by an interval from resampled stretches."""
+    ahead = held_out_gain(context.whole, rival[0], law)
+    if ahead is None:
+        yield "too little was held out to confirm it"
+    elif ahead.low <= 0:
+        yield f"what it gains on held-out data over {rival[1]} is not larger than what varies between stretches"
+
+
+def _alike(context: SearchContext, of: Discovered, number: int) -> Iterator[str]:
+    """Laws of other variables that leave hardly more of what was fitted to, that what was kept for the test does not
+    part from it either, and that foretell other things."""
+    found = of.rounds[number]
     best = found.fitted_candidates[0]
-    for candidate, each in zip(found.fitted_candidates[1:], found.sums[1:], strict=True):
-        if inseparable(best, candidate) and _variables(each) != _variables(found.sums[0]):
-            yield _variables(each)
+    close = [
+        (candidate, each)
+        for candidate, each in zip(found.fitted_candidates[1:], found.sums[1:], strict=True)
+        if inseparable(best, candidate) and each.variables != found.sums[0].variables
+    ]
+    if not close:
+        return
+    law = context.confirmed(best)
+    for candidate, each in close:
+        rival = context.confirmed(candidate)
+        ahead = held_out_gain(context.whole, rival, law)
+        parted = ahead is not None and ahead.low > 0
+        if not parted and not _say_the_same(of.found.retuned, law, rival):
+            names = law_of_sum(each, context.measure.records[0].recording).variables
+            yield f"a law of {' and '.join(names)} does as well"
 
 
-def _variables(of: Sum) -> tuple[str, ...]:
-    names = {
-        name
-        for term in of.terms
-        for name in Law(
-            f"p{len(term.numbers)}*{term.shape}", (*term.numbers, 1.0), (), "force", AXES[of.axis]
-        ).variables
-    }
-    return tuple(sorted(names))
+def _say_the_same(without: FittedCandidate, law: FittedCandidate, other: FittedCandidate) -> bool:
+    """Whether two laws foretell the same of all samples, the sealed ones included: then they are one law, written in
+    two ways, as a relaxation by place or by speed."""
+    apart = added = 0.0
+    for base, one, two in zip(without.fitted.residuals, law.fitted.residuals, other.fitted.residuals, strict=True):
+        apart += float(np.nansum((one - two) ** 2))
+        added += float(np.nansum((one - base) ** 2))
+    return apart <= LAW_SAME**2 * added
 
 
 def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
@@ -73,8 +111,8 @@ def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
     return excess(law) <= LAW_BEATS * excess(rival)
 
 
-def tested_otherwise(records: Sequence[Observed]) -> bool:
-    """Whether anything sealed is louder, of another kind, or drives other axes together than what laws are found in."""
+def tested_otherwise(records: Sequence[Observed]) -> tuple[str, ...]:
+    """What sealed stretches are that those are not which laws are found in; none where they are alike."""
     found: list[tuple[str, tuple[int, ...], float]] = []
     sealed: list[tuple[str, tuple[int, ...], float]] = []
     for record in records:
@@ -82,11 +120,57 @@ def tested_otherwise(records: Sequence[Observed]) -> bool:
             part = slice(segment.start, segment.stop)
             told = _told(segment, record.command[part])
             (sealed if record.test[part].any() else found).append(told)
-    kinds = {(kind, axes) for kind, axes, _ in found}
+    kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
     loudest = max((level for _, _, level in found), default=np.inf)
-    return any((kind, axes) not in kinds or level > 1.05 * loudest for kind, axes, level in sealed)
+    said = [
+        (any(level > 1.05 * loudest for _, _, level in sealed), "louder commands"),
+        (any(driven not in axes and len(driven) > 1 for _, driven, _ in sealed), "axes driven together"),
+        (any(kind not in kinds for kind, _, _ in sealed), "another kind of command"),
+    ]
+    return tuple(words for true, words in said if true)
 
 
 def _told(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
     driven = np.flatnonzero(np.abs(command).max(axis=0, initial=0.0) > 0)
     return segment.kind, tuple(driven.tolist()), float(np.abs(command).max(initial=0.0))
+
+
+def proved(context: SearchContext, found: Explanation, rivals: Sequence[FittedCandidate]) -> str:
+    """Where a named law was proved, how far it goes beside the best of the catalogue, and where it was never seen. A
+    sentence or two."""
+    whole, after = context.whole, found.after
+    laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
+    where = listed(tested_otherwise(whole.records))
+    said = f"The formula was tested on {where}, which nothing was fitted to: {_left(context, found, after)}"
+    closest = min((_remains(context, found, rival) for rival in rivals), default=None)
+    if closest is not None:
+        said += f", the best law of the catalogue {100 * closest:.3g} %"
+    visited = _visited(context, found, {name for law in laws for name in law.variables})
+    return f"{said}. What it says beyond {listed(visited)} is not known." if visited else f"{said}."
+
+
+def _left(context: SearchContext, found: Explanation, law: FittedCandidate) -> str:
+    return f"there it leaves {100 * _remains(context, found, law):.3g} % of the re-tuned model's error"
+
+
+def _remains(context: SearchContext, found: Explanation, law: FittedCandidate) -> float:
+    """Share of the held-out error, rms, in the mean over the channels."""
+    gain = held_out_gain(context.whole, found.retuned, law)
+    return float("nan") if gain is None else float(np.sqrt(max(1 - gain.gain, 0.0)))
+
+
+def _visited(context: SearchContext, found: Explanation, names: set[str]) -> tuple[str, ...]:
+    """How far each signal went, test included; of the motion."""
+    measure, fitted = context.whole, found.after.fitted
+    model, placed = context.tuning.tuned(fitted.deviations), fitted.hypothesis.placed()
+    evidence = measure.evidence(model, placed, fitted.residuals)
+    letters = axis_names(measure.records[0].recording.command.channels)
+    length, time = model.system.length, model.system.time
+    said = []
+    for axis, letter in enumerate(letters):
+        for name, unit in ((letter, length), (f"v{letter}", f"{length}/{time}")):
+            if name in names:
+                of = [told.axis_velocity if name != letter else told.axis_position for told in evidence]
+                most = max(float(np.abs(each[:, axis]).max()) for each in of)
+                said.append(f"{name} = ± {most:.3g} {unit}")
+    return tuple(said)

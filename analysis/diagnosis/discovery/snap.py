@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
@@ -45,10 +46,7 @@ def _plain(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hyp
         parts.append(claimed(Claim(effect, "one", claim.sites), [law_values(simple)]))
     if not changed:
         return None
-    found = parts[0]
-    for part in parts[1:]:
-        found = together(found, part)
-    return found
+    return reduce(together, parts)
 
 
 def _of_claim(whole: Hypothesis, number: int) -> Hypothesis:

@@ -36,6 +36,10 @@ class Sum:
     moved: tuple[float, ...]
     """(t,): what it wants the model's own numbers to change by, in standard deviations."""
 
+    @property
+    def variables(self) -> tuple[str, ...]:
+        return tuple(sorted(frozenset[str]().union(*(term.variables for term in self.terms))))
+
 
 def column_of(view: View, term: Term) -> FloatArray | None:
     """(s,); None where it is no number somewhere."""

@@ -76,7 +76,7 @@ def named_effects(found: Explanation, errors: FloatArray, said: Said) -> tuple[N
                 probability=likely,
                 parameters=_estimates(whole, number, errors, slice(first, first + size), said),
                 rivals=rivals,
-                law=_law(whole, number, axis_of(claim, said)),
+                law=law_of_claim(whole, number, axis_of(claim, said)),
             )
         )
         first += size
@@ -170,7 +170,7 @@ def _units(effect: Effect, values: Values, said: Said) -> dict[str, str]:
     return {p.name: p.unit_in(said.system, said.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
 
 
-def _law(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
+def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
     law = whole.claims[number].effect.law
     if law is None:
         return None

@@ -7,7 +7,7 @@ from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.named_effects import axis_of, reported_numbers, said_of
+from analysis.diagnosis.result.named_effects import axis_of, law_of_claim, reported_numbers, said_of
 from analysis.diagnosis.search.search import Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.placing import place_of_effect
@@ -18,14 +18,14 @@ from equalizer.signals.recording import Recording
 def unconfirmed_of(
     found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
-    """The effect that was added last stands for those before it. Shares are of what a black box takes, or, where
-    physics takes more, of the largest gain."""
+    """The effect that was added last stands for those before it, where none is meant. Shares are of what a black box
+    takes, or, where physics takes more, of the largest gain."""
     if not found:
         return ()
     said, most = said_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
     candidates = []
     for each in found:
-        number = len(each.hypothesis.claims) - 1
+        number = each.claim % len(each.hypothesis.claims)
         claim = each.hypothesis.claims[number]
         candidates.append(
             Candidate(
@@ -36,6 +36,7 @@ def unconfirmed_of(
                 held_out_gain=min(each.gain, 1.0),
                 share_of_black_box=min(each.gain / most, 1.0),
                 why_not=each.why_not,
+                law=law_of_claim(each.hypothesis, number, axis_of(claim, said)),
             )
         )
     return tuple(candidates)

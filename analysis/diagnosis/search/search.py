@@ -1,6 +1,6 @@
 """The search without clean recordings; repeated with half of the sealed samples where only they show a mismatch."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +70,8 @@ class Unconfirmed:
     gain: float
     """Share of the held-out error power that goes with it."""
     why_not: str
+    claim: int = -1
+    """Which of the hypothesis's effects is meant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,18 +88,25 @@ class Searched:
 
 
 def searched(
-    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget = always
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget = always,
+    beyond: Callable[[Searched], Searched] = lambda seen: seen,
 ) -> Searched:
+    """beyond: what is tried where the catalogue leaves something, before sealed samples are opened for it."""
     found = _pruned(context, explain(context, catalogue, progress, time_left), time_left)
     judged = _judged(context, found)
-    if found.ended_early or found.barred or judged.named or not _sealed_alone(found):
-        return Searched(context, found, judged, _remarks(found))
+    tried = beyond(Searched(context, found, judged, _remarks(found)))
+    if found.ended_early or found.barred or tried.judged.named or not _sealed_alone(found):
+        return tried
     half = context.half_opened()
     again = _pruned(half, explain(half, catalogue, progress, time_left), time_left)
     second = _judged(half, again)
     if second.named:
-        return Searched(half, again, second, (OPENED, *_remarks(again)))
-    return Searched(context, found, replace(judged, verdict="unexplained"), (NOT_SHOWN, *_remarks(found)))
+        return Searched(half, again, second, (OPENED, *_remarks(again)), unconfirmed=tried.unconfirmed)
+    judged = replace(judged, verdict="unexplained")
+    return replace(tried, judged=judged, remarks=(NOT_SHOWN, *tried.remarks))
 
 
 def _pruned(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:

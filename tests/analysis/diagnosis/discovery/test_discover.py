@@ -1,21 +1,26 @@
 """Laws are found in simulated recordings, and none where nothing is missing. Compiles."""
 
+from dataclasses import replace
+
 import pytest
 
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
-from analysis.diagnosis.discovery.as_effect import laws_of
+from analysis.diagnosis.discovery.as_effect import law_of_sum, laws_of
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
-from analysis.diagnosis.discovery.grammar import axes_of, periodic, terms_of
-from analysis.diagnosis.discovery.join import with_laws
+from analysis.diagnosis.discovery.grammar import Term, axes_of, periodic, terms_of
+from analysis.diagnosis.discovery.join import has_law, with_laws
+from analysis.diagnosis.discovery.proof import SAME_KIND
 from analysis.diagnosis.discovery.screen import products_of
 from analysis.diagnosis.discovery.snap import readable
+from analysis.diagnosis.discovery.sums import Sum
 from analysis.diagnosis.discovery.whitened import views_of
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluated
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.search import Searched
 from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.settings import LAW_PLACEBO
 from equalizer.effects.catalogue import CATALOGUE
 from tests.diagnosed import device
 from tests.lawful import PLAN, arena_of, law, recorded
@@ -76,13 +81,20 @@ def test_a_proved_law_explains(seed=7):
     seen = joined(recorded((DRAG,), seed))
     assert seen.judged.verdict == "explained"
     assert [claim.effect.name for claim in seen.found.after.fitted.hypothesis.claims] == ["discovered_law"]
+    assert has_law(seen)
+    assert "louder commands and another kind of command" in seen.remarks[0]
+    assert "beyond vx = ±" in seen.remarks[0]
 
 
 def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
     plan = (*PLAN[:3], ("multisine", 1.5, "test"))
     seen = joined(recorded((DRAG,), seed, plan=plan))
     assert not seen.judged.named
-    assert any("candidate" in remark and "abs(vx)**1.5" in remark for remark in seen.remarks)
+    law = laws_of(seen.unconfirmed[0].hypothesis)[0]
+    assert law is not None
+    assert "abs(vx)**1.5" in law.expression
+    assert SAME_KIND in seen.unconfirmed[0].why_not
+    assert seen.unconfirmed[0].gain > 0.9
 
 
 def test_a_shuffled_force_holds_no_law(seed=9):
@@ -98,7 +110,17 @@ def test_a_shuffled_force_holds_no_law(seed=9):
         products_of(view), (*terms, *periodic(seen.columns, axis[0], seen.left[:, 0], seen.rate_hz)), always
     )
     best = found.sums[0]
-    assert found.placebo < 0.1 < 0.9 < 1 - best.crossed / best.without
+    assert best.crossed / best.without < LAW_PLACEBO * (1 - found.placebo)
+    assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked
+
+
+def test_axes_are_called_as_the_recording_does():
+    """Its only axis is y: the grammar calls it x."""
+    recording = recorded((), 3)
+    named = replace(recording, command=replace(recording.command, channels=("fy",)))
+    drag = Sum(0, (Term("abs(vx)*x*fx"),), (-2.0,), 1.0, 9.0, 0.0, ())
+    law = law_of_sum(drag, named)
+    assert (law.axis, law.variables) == ("y", ("fy", "vy", "y"))
 
 
 @pytest.mark.parametrize(
