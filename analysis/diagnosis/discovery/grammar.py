@@ -120,10 +120,11 @@ def _saturating(of: Axis) -> Iterator[Term]:
 
 
 def _singular(of: Axis) -> Iterator[Term]:
-    """About a place that the axis never reached."""
+    """About a place that the axis never reached; as it is, or without its value at zero, where the device rests."""
     for share, power, side in product((1.15, 1.5, 2.5), (1.0, 2.0, 3.0), (of.x, f"(-{of.x})")):
         beyond = (1.02 * of.travel, 20 * of.travel)
-        yield Term(f"1/abs(p0 - {side})**p1", (share * of.travel, power), (beyond, POWER), (1,))
+        for shape in (f"(1/abs(p0 - {side})**p1 - 1/p0**p1)", f"1/abs(p0 - {side})**p1"):
+            yield Term(shape, (share * of.travel, power), (beyond, POWER), (1,))
 
 
 def _memory(of: Axis, others: Sequence[Axis], seconds: float, rate_hz: float) -> Iterator[Term]:
