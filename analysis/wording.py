@@ -1,6 +1,15 @@
 """Numbers as text: the same everywhere, and a dash where there is none."""
 
+import re
 from collections.abc import Sequence
+
+_UNTIMED = (
+    (r"√Hz", "√(cycle per sample)"),
+    (r"\bHz\b", "cycles per sample"),
+    (r"\(s\)", "(samples)"),
+    (r"(?<=\d) s\b", " samples"),
+)
+"""Units that hang on time, and what they are where samples are numbered and the rate of 1 Hz is nominal."""
 
 NONE = "–"
 _NAMED = 12
@@ -68,3 +77,10 @@ def capital(sentence: str) -> str:
 
 def ended(sentence: str) -> str:
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
+
+
+def untimed_text(text: str) -> str:
+    """A sentence or label of a recording of which no time is known, without seconds and hertz."""
+    for unit, instead in _UNTIMED:
+        text = re.sub(unit, instead, text)
+    return text

@@ -12,6 +12,7 @@ from analysis.figures.diagnosis_rivals import rivals_pictures
 from analysis.figures.diagnosis_signature import signature_pictures
 from analysis.figures.diagnosis_state_maps import state_map_pictures
 from analysis.figures.picture import Picture
+from analysis.figures.untimed import in_samples
 
 
 def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
@@ -30,7 +31,8 @@ def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Pic
     }
     known = guard or Guard()
     none: Sequence[Picture] = ()
-    return tuple(picture for name, draw in drawn.items() for picture in known.part(name, "its drawing", draw, none))
+    pictures = [picture for name, draw in drawn.items() for picture in known.part(name, "its drawing", draw, none)]
+    return tuple(pictures if found.is_timed else map(in_samples, pictures))
 
 
 def _remainder(found: Findings) -> list[Picture]:

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from analysis.diagnosis.types import Mask
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, new_figure, plain_axes
+from analysis.figures.untimed import in_samples
 from analysis.look.channels import Channel
 from analysis.look.kinematics import KinematicPair, derivative
 from analysis.look.overview import Overview
@@ -37,7 +38,7 @@ def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
         pictures.append(_levels(found, f"levels-{place}"))
     if found.pairs:
         pictures.append(_derivatives(found, f"derivatives-{place}"))
-    return tuple(pictures)
+    return tuple(pictures if found.recording.is_timed else map(in_samples, pictures))
 
 
 def _rows(found: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
@@ -61,7 +62,7 @@ def _signals(found: Overview, name: str) -> Picture:
                 panel.axvspan(segment.start / rate_hz, segment.stop / rate_hz, color=shade, zorder=0, linewidth=0)
         for start, _ in found.stretches[1:]:
             panel.axvline(start / rate_hz, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
-    figure.supxlabel("Time (s)" if found.recording.meta.get("time") != "unknown" else "Sample", fontsize=10)
+    figure.supxlabel("Time (s)", fontsize=10)
     handles = [Patch(color=_FIT, label="to fit"), Patch(color=_TEST, label="to test")]
     if any(segment.role for segment in found.recording.segments):
         figure.legend(handles=handles, loc="outside upper center", ncols=2, fontsize=8.5, frameon=False)

@@ -1,7 +1,7 @@
 """Everything that can be said of a recording before any model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.look.channels import Channel, Stretch, channels_of, rms, stretches_of
 from analysis.look.check import Check
 from analysis.look.clipping import clipping
-from analysis.look.clock import clock
+from analysis.look.clock import CLOCK, clock
 from analysis.look.completeness import constant_channels, copied_channels, missing_samples
 from analysis.look.cross_spectra import CrossSpectra, cross_spectra
 from analysis.look.driven_band import (
@@ -24,6 +24,7 @@ from analysis.look.kinematics import KinematicPair, kinematic_checks, kinematic_
 from analysis.look.levels import SegmentLevel, level_checks, segment_levels
 from analysis.look.plausibility import offsets, units
 from analysis.look.repeats import Repeats, repeat_checks, repeats
+from analysis.wording import untimed_text
 from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summarised, Summary
 
@@ -129,6 +130,11 @@ def overview(name: str, recording: Recording) -> Overview:
         *level_checks(levels, channels),
         *repeat_checks(recording, repeated),
     )
+    if not recording.is_timed:
+        checks = tuple(
+            check if check.name == CLOCK else replace(check, seen=untimed_text(check.seen), do=untimed_text(check.do))
+            for check in checks
+        )
     severity = ("wrong", "notice", "fine")
     return Overview(
         name=name,

@@ -111,7 +111,7 @@ _NO_MAP = "There is no map: the noise of this recording is not known."
 
 def _where(found: Findings, pictures: Sequence[Picture]) -> Section:
     said = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
-    listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch)
+    listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch, found.is_timed)
     return Section(
         "Where model and device disagree",
         paragraphs=said,
@@ -158,7 +158,7 @@ def _errors(found: Findings, pictures: Sequence[Picture]) -> Section:
 
 def _remainder(found: Findings, pictures: Sequence[Picture]) -> Section:
     left = found.diagnosis.remainder
-    tables = (mismatch_table("What is left", left),) if left else ()
+    tables = (mismatch_table("What is left", left, found.is_timed),) if left else ()
     return Section(
         "What is still unexplained",
         paragraphs=(remainder_sentence(found.diagnosis, device_of(found)),),

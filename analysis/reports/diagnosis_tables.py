@@ -102,14 +102,14 @@ def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None
     return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
 
 
-def mismatch_table(caption: str, places: Sequence[Mismatch]) -> Table:
-    """The first, folded."""
+def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = True) -> Table:
+    """The first, folded. is_timed: bands are in hertz, and not in cycles per sample."""
     worst = places[:_MOST_PLACES]
     rows = tuple(
         (
             each.output,
             each.input,
-            f"{each.band_hz[0]:g} to {each.band_hz[1]:g} Hz",
+            f"{each.band_hz[0]:g} to {each.band_hz[1]:g} {'Hz' if is_timed else 'cycles per sample'}",
             NONE if each.amplitude is None else f"{each.amplitude:g}",
             each.state or NONE,
             share_text(each.share),

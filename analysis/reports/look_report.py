@@ -7,7 +7,7 @@ from analysis.figures.picture import Picture
 from analysis.look.check import Check
 from analysis.look.overview import Overview
 from analysis.reports.page import Page, Section, Table, render_page
-from analysis.wording import typeset
+from analysis.wording import typeset, untimed_text
 
 
 def render_look_report(
@@ -41,11 +41,12 @@ def brief(found: Overview) -> str:
     """In a sentence: what was recorded, for how long, and what came of the checks."""
     recording = found.recording
     counts = {level: sum(check.level == level for check in found.checks) for level in ("wrong", "notice", "fine")}
-    return (
+    said = (
         f"{found.name}: {recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, "
         f"{len(found.channels)} channels, {len(recording.segments)} segments; checks: {counts['wrong']} wrong, "
         f"{counts['notice']} to notice, {counts['fine']} fine."
     )
+    return said if recording.is_timed else untimed_text(said)
 
 
 def _sections(overview: Overview, pictures: Sequence[Picture], found: Sequence[Overview]) -> tuple[Section, ...]:
@@ -81,8 +82,7 @@ def _segments(overview: Overview) -> Table:
     header = (
         "Segment",
         "Role",
-        "Start (s)",
-        "Length (s)",
+        *(("Start (s)", "Length (s)") if overview.recording.is_timed else ("Start (samples)", "Length (samples)")),
         "Period",
         *(f"Rms of {c.role} {c.name}" for c in overview.channels),
     )

@@ -64,6 +64,11 @@ class Recording(Summarised):
     """(n, q): what was known beside, such as a temperature, a pressure, a setting."""
 
     @property
+    def is_timed(self) -> bool:
+        """Whether time is known; where not, samples are numbered and the rate of 1 Hz is nominal."""
+        return self.meta.get("time") != "unknown"
+
+    @property
     def sample_rate_hz(self) -> float:
         return self.response.sample_rate_hz
 

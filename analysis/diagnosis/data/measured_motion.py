@@ -61,4 +61,4 @@ def filled_gaps(samples: FloatArray) -> FloatArray:
 
 def time_unit(recording: Recording) -> str:
     """ "sample" where no time is known: what hangs on time then hangs on the samples' numbers."""
-    return "sample" if recording.meta.get("time") == "unknown" else "s"
+    return "s" if recording.is_timed else "sample"

@@ -68,6 +68,7 @@ def assembled(
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
+        is_timed=measure.records[0].recording.is_timed,
         signatures=_signatures(context, found, said),
         black_box=context.guard.part("the black box", "its fit", partial(_black_box, measure, found, document), None),
         remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),

@@ -124,6 +124,8 @@ class Findings(Summarised):
     """`given` was fitted to these recordings by the program: no calibration says how far its numbers may be off."""
     floor: NoiseFloor | None = None
     """Of the first recording: how the noise was measured, and its spectrum."""
+    is_timed: bool = True
+    """Whether time is known: where not, what is in hertz is in cycles per sample."""
     tuning: Tuning | None = None
     """What the deviations of `explanation` count: names, units, sizes."""
     axes: tuple[str, ...] = ()

@@ -45,9 +45,9 @@ def recording_facts(found: Overview) -> tuple[str, ...]:
     """What a recording says of itself, a line each."""
     recording, meta = found.recording, found.recording.meta
     parts = len(found.stretches)
+    rate = f"{recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, " if recording.is_timed else ""
     facts = [
-        f"{found.name}: {recording.device}, {recording.response.duration_s:.4g} s at "
-        f"{recording.sample_rate_hz:.6g} Hz, {len(recording)} samples{f' in {parts} parts' if parts > 1 else ''}",
+        f"{found.name}: {recording.device}, {rate}{len(recording)} samples{f' in {parts} parts' if parts > 1 else ''}",
         f"hold: {recording.hold.value}",
     ]
     left_out = ("provenance", "parts", "import")
