@@ -9,7 +9,7 @@ from study.cli.results import JsonOption, show
 
 
 def analyze(
-    data: Annotated[Path, typer.Argument(help="Folder of sessions, or one session.")],
+    data: Annotated[Path, typer.Argument(help="Folder of sessions, one session, or a Psych-DS dataset.")],
     out: Annotated[Path | None, typer.Option(help="Where results go; default: 'analysis' in the folder.")] = None,
     ellipsoid: Annotated[
         Path | None, typer.Option(help="A recording of the ellipsoid protocol, to be added to the report.")

@@ -22,6 +22,7 @@ from study.cli import (
     doctor,
     effect,
     equalize,
+    export,
     identify,
     import_recording,
     kit,
@@ -96,6 +97,7 @@ app.command(
 app.command("rehearse", short_help="Simulated participants take the whole study", rich_help_panel="Analysis")(
     rehearse.rehearse
 )
+app.command("export", short_help="Trials as Psych-DS, BIDS or MATLAB files", rich_help_panel="Analysis")(export.export)
 app.command("power", short_help="How many participants are needed, by simulated studies", rich_help_panel="Analysis")(
     power.power
 )

@@ -28,7 +28,8 @@ from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.results.analyze_data import sensor_frame
-from study.workflows.results.collect_sessions import Collected, collect_sessions
+from study.workflows.results.collect_sessions import collect_sessions
+from study.workflows.results.collected import Collected
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
 

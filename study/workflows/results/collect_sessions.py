@@ -1,42 +1,20 @@
 """Which sessions enter one analysis: one protocol, one kind of participant, nothing withdrawn or contradictory."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.psychophysics.population import Population, split_by_population
 from analysis.wording import listed
 from equalizer.plant.model_quality import NOT_STORED
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.trial import Trial
 from study.errors import StudyError, WrongUseError
 from study.session.state.state import SessionState
 from study.session.views.archive_views import TURNED_AWAY
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import LOG_NAME
+from study.workflows.results.collected import Collected
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import finish_tables
-
-
-@dataclass(frozen=True, slots=True)
-class Collected:
-    protocol: StudyProtocol
-    protocol_hash: str
-    trials: tuple[Trial, ...]
-    sessions: tuple[SessionFolder, ...]
-    seeds: tuple[int, ...]
-    devices: tuple[str, ...]
-    """Names of all devices that were used."""
-    observers: tuple[str, ...]
-    """Names of the simulated participants; empty for people."""
-    left_out: tuple[str, ...]
-    """What did not enter, and why, in sentences."""
-    qualities: tuple[tuple[str, str], ...]
-    """Of the models that stimuli went through: (sessions, sentence), by what was measured; none for plain forces."""
-    locked: str
-    """Whether the protocol was locked when its sessions began."""
-    finished: tuple[str, ...]
-    """What was written now, because the program was killed before it was done, in sentences."""
 
 
 def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
@@ -77,6 +55,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
         qualities=_qualities(entering),
         locked=_locked([state for _, state in entering]),
         finished=_finish(whole),
+        parents=tuple(folder.log for folder, _ in entering),
     )
 
 

@@ -1,0 +1,34 @@
+"""`hapteq export`: a study's trials in the forms that other tools read."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from study.cli.results import JsonOption
+
+
+def export(
+    data: Annotated[Path, typer.Argument(help="Folder of sessions, or one session.")],
+    out: Annotated[Path, typer.Option(help="Folder to write; it must not be there yet, or be empty.")],
+    form: Annotated[
+        Literal["psych-ds", "bids", "mat"],
+        typer.Option(help="Psych-DS (CSV with a data dictionary), BIDS behaviour, or a MATLAB file."),
+    ] = "psych-ds",
+    protocol: Annotated[
+        str | None, typer.Option(help="Which protocol's sessions, where the folder holds several.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write all trials with their protocol, seeds and versions. `hapteq analyze` takes a Psych-DS dataset back."""
+    from study.workflows.results.collect_sessions import collect_sessions
+    from study.workflows.results.export_study import export_study
+
+    done = export_study(collect_sessions(data, protocol), data, out, form)
+    if as_json:
+        typer.echo(json.dumps({"out": str(done.out), "files": done.files, "trials": done.trials}, indent=2))
+        return
+    for said in done.left_out:
+        typer.echo(f"Left out: {said}", err=True)
+    typer.echo(f"{done.out}: {done.trials} trials in {len(done.files)} files")

@@ -1,0 +1,72 @@
+"""Trials as BIDS behaviour: per participant and session a TSV with its JSON, and the tables of the dataset.
+
+Brain Imaging Data Structure 1.10, "Behavioral experiments (with no neural recordings)". Missing values are n/a.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from protocols.trial import Trial
+from study.store.disk.csv_rows import columns, rows_to_csv
+from study.store.disk.text_file import write_text
+from study.store.formats.trial_columns import TRIAL_COLUMNS
+
+VERSION = "1.10.0"
+FIXED = ("subject", "session")
+"""In a file's name, and so no columns."""
+
+
+def write_bids(
+    folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
+) -> tuple[Path, ...]:
+    """folder: there, and empty. Raises CannotWriteError."""
+    task = _label(name)
+    written = [
+        _json(folder / "dataset_description.json", {
+            "Name": name, "BIDSVersion": VERSION, "DatasetType": "raw",
+            "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("version", ""))}],
+        }),
+        _text(folder / "README.md", f"# {name}\n\nTrials of a study of force directions, exported by hapteq.\n"),
+        _text(folder / "code" / "protocol.toml", protocol_text),
+        _json(folder / f"task-{task}_beh.json", {
+            "TaskName": task,
+            **{column: _described(column) for column in columns(Trial) if column not in FIXED},
+        }),
+    ]  # fmt: skip
+    subjects = list(dict.fromkeys(trial.subject for trial in trials))
+    rows = "".join(f"sub-{_label(subject)}\t{subject}\n" for subject in subjects)
+    written.append(_text(folder / "participants.tsv", f"participant_id\tcode\n{rows}"))
+    for session in dict.fromkeys(trial.session for trial in trials):
+        of = [trial for trial in trials if trial.session == session]
+        sub, ses = f"sub-{_label(of[0].subject)}", f"ses-{_label(session)}"
+        written.append(_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _tsv(of)))
+    return tuple(written)
+
+
+def _tsv(trials: Sequence[Trial]) -> str:
+    """None of the values holds a comma or a quote, so fields of CSV are those of TSV."""
+    lines = [line.split(",") for line in rows_to_csv(trials, Trial).splitlines()]
+    kept = [number for number, column in enumerate(columns(Trial)) if column not in FIXED]
+    return "".join("\t".join(line[number] or "n/a" for number in kept) + "\n" for line in lines)
+
+
+def _described(column: str) -> dict[str, str]:
+    words, unit = TRIAL_COLUMNS[column]
+    return {"Description": words, **({"Units": unit} if unit else {})}
+
+
+def _label(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9]", "", text)
+
+
+def _json(path: Path, value: Mapping[str, Any]) -> Path:
+    return _text(path, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
+
+
+def _text(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, text, overwrite=False)
+    return path

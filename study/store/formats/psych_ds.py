@@ -1,0 +1,100 @@
+"""Trials as a Psych-DS dataset: one CSV per session below `data/`, described by `dataset_description.json`.
+
+Psych-DS 1 (https://psych-ds.github.io): file names of `keyword-value` pairs that end in `_data.csv`, and JSON-LD of
+schema.org that names every column. The protocol lies in `materials/`, so that the dataset can be analysed again.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from protocols.trial import Trial
+from study.store.disk.csv_rows import CsvError, columns, rows_from_csv, rows_to_csv
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.strict_json import load_json
+from study.store.disk.text_file import read_text, write_text
+from study.store.formats.trial_columns import TRIAL_COLUMNS
+from study.store.formats.trials_file import trial_problems
+
+DESCRIPTION_NAME = "dataset_description.json"
+PROTOCOL_NAME = "materials/protocol.toml"
+KIND = "Psych-DS dataset"
+OURS = "hapteq"
+"""The key of what only this program needs: protocol, seeds, devices."""
+
+
+@dataclass(frozen=True, slots=True)
+class PsychDs:
+    trials: tuple[Trial, ...]
+    protocol_text: str
+    facts: Mapping[str, Any]
+    """Of the description's own key."""
+    files: tuple[Path, ...]
+
+
+def is_psych_ds(folder: Path) -> bool:
+    return (folder / DESCRIPTION_NAME).is_file() and (folder / PROTOCOL_NAME).is_file()
+
+
+def write_psych_ds(
+    folder: Path, name: str, trials: Sequence[Trial], protocol_text: str, facts: Mapping[str, Any]
+) -> tuple[Path, ...]:
+    """folder: there, and empty. facts: JSON values. Raises CannotWriteError."""
+    (folder / "data").mkdir()
+    (folder / "materials").mkdir()
+    written = []
+    for session in dict.fromkeys(trial.session for trial in trials):
+        rows = [trial for trial in trials if trial.session == session]
+        path = folder / "data" / f"subject-{_value(rows[0].subject)}_session-{_value(session)}_data.csv"
+        write_text(path, rows_to_csv(rows, Trial), overwrite=False)
+        written.append(path)
+    write_text(folder / PROTOCOL_NAME, protocol_text, overwrite=False)
+    description = {
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": name,
+        "description": "Trials of a study of force directions, one row per presentation, as hapteq logged them.",
+        "schemaVersion": "Psych-DS 0.4.0",
+        "variableMeasured": [_variable(column) for column in columns(Trial)],
+        OURS: dict(facts),
+    }
+    write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=2, ensure_ascii=False) + "\n", overwrite=False)
+    return (*written, folder / PROTOCOL_NAME, folder / DESCRIPTION_NAME)
+
+
+def read_psych_ds(folder: Path) -> PsychDs:
+    """As `write_psych_ds` wrote it. Raises CannotReadError, UnusableFileError."""
+    path = folder / DESCRIPTION_NAME
+    try:
+        description = load_json(read_text(path))
+    except ValueError as error:
+        raise UnusableFileError(path, KIND, (str(error),)) from error
+    facts = description.get(OURS) if isinstance(description, dict) else None
+    files = tuple(sorted((folder / "data").glob("*_data.csv")))
+    if not isinstance(facts, dict) or not files:
+        missing = "no file below data/ ends in _data.csv" if isinstance(facts, dict) else f"the key '{OURS}' is missing"
+        raise UnusableFileError(path, KIND, (missing,))
+    trials: list[Trial] = []
+    for each in files:
+        try:
+            rows = rows_from_csv(read_text(each), Trial)
+        except CsvError as error:
+            raise UnusableFileError(each, KIND, error.problems) from error
+        if wrong := trial_problems(rows):
+            raise UnusableFileError(each, KIND, wrong)
+        trials += rows
+    return PsychDs(tuple(trials), read_text(folder / PROTOCOL_NAME), facts, files)
+
+
+def _variable(column: str) -> dict[str, str]:
+    words, unit = TRIAL_COLUMNS[column]
+    found = {"@type": "PropertyValue", "name": column, "description": words}
+    return {**found, "unitText": unit} if unit else found
+
+
+def _value(text: str) -> str:
+    """Letters and digits alone, as names of files want them."""
+    return re.sub(r"[^A-Za-z0-9]", "", text)

@@ -1,0 +1,27 @@
+"""What the columns of a table of trials mean, and their units: for exported data."""
+
+TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
+    "subject": ("Code of the participant", ""),
+    "session": ("Name of the session", ""),
+    "run": ("Number of the run within the session, from 0: one staircase at one frequency", ""),
+    "trial": ("Number of the trial within the run, from 0", ""),
+    "attempt": ("Number of the presentation of this trial, from 0; above 0 where an earlier one was void", ""),
+    "phase": ("Part of the session: training, test, detection, or catch trials within the test", ""),
+    "frequency_hz": ("Frequency of the sinusoidal force", "Hz"),
+    "level_n": ("Commanded amplitude of the force; the level of the staircase", "N"),
+    "direction_shown": ("Which of the two directions was played: 1 or 2", ""),
+    "answer": ("Which direction was answered: 1 or 2; empty without an answer", ""),
+    "correct": ("Whether the answer is right; empty without an answer", ""),
+    "reversal": ("Whether the staircase turned at this trial", ""),
+    "response_time_s": ("From the steady stimulus to the answer", "s"),
+    "delivered_mps2": ("Measured amplitude of the acceleration along the direction", "m/s^2"),
+    "off_axis_mps2": ("Measured amplitude of the acceleration across the direction", "m/s^2"),
+    "displacement_mm": ("Measured amplitude of the handle's motion along the direction", "mm"),
+    "missed_ticks": ("Ticks of the control loop that were missed while the stimulus was played", ""),
+    "felt": ("False where a person answered while no device moved; empty for simulated participants", ""),
+    "status": ("What became of the presentation: ok, flagged, unmeasured, spoiled, open", ""),
+    "angle_deg": ("Angle of the direction in the plane of the protocol's directions", "deg"),
+    "wanted_mps2": ("Acceleration that the level stands for, where stimuli are equalized", "m/s^2"),
+    "void_cause": ("Why this presentation is void; empty where it counts", ""),
+    "repeat_cause": ("Why this trial is presented again; empty for a first attempt", ""),
+}

@@ -1,0 +1,90 @@
+"""A study's trials as other tools read them, with protocol, seeds and versions; and a Psych-DS dataset read back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from protocols.definition.study_protocol import StudyProtocol
+from protocols.document.dumping import dump_protocol
+from protocols.document.hashing import protocol_hash
+from protocols.document.loading import ProtocolError, load_protocol
+from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.disk.provenance import gather_provenance
+from study.store.formats.bids_behaviour import write_bids
+from study.store.formats.psych_ds import KIND, PROTOCOL_NAME, read_psych_ds, write_psych_ds
+from study.store.formats.trials_mat import write_trials_mat
+from study.store.sessions.archive import SessionFolder
+from study.store.sessions.written_elsewhere import note_written
+from study.workflows.results.collected import Collected
+
+Form = Literal["psych-ds", "bids", "mat"]
+WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
+    "psych-ds": write_psych_ds,
+    "bids": write_bids,
+    "mat": write_trials_mat,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    out: Path
+    files: tuple[str, ...]
+    """Relative to `out`."""
+    trials: int
+    left_out: tuple[str, ...]
+    """What did not enter, and why, in sentences."""
+
+
+def export_study(collected: Collected, data: Path, out: Path, form: Form) -> Exported:
+    """Writes whole or not at all. collected: the sessions of `data` that belong together. Raises StudyError."""
+    require_new_folder(out)
+    facts = _facts(collected)
+    with new_folder(out) as folder:
+        files = WRITERS[form](
+            folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), facts
+        )
+        names = tuple(path.relative_to(folder).as_posix() for path in files)
+    note_written(data, out)
+    return Exported(out, names, len(collected.trials), collected.left_out)
+
+
+def _facts(collected: Collected) -> dict[str, Any]:
+    names = [folder.name for folder in collected.sessions]
+    return {
+        **gather_provenance(protocol_hash=collected.protocol_hash).as_dict(),
+        "protocol_hash": collected.protocol_hash,
+        "seeds": dict(zip(names, collected.seeds, strict=True)),
+        "devices": list(collected.devices),
+        "observers": list(collected.observers),
+        "locked": collected.locked,
+    }
+
+
+def collect_exported(folder: Path) -> Collected:
+    """A dataset of `export_study` in Psych-DS form: the same trials and the same protocol give the same results.
+    Raises StudyError."""
+    found = read_psych_ds(folder)
+    try:
+        protocol = load_protocol(found.protocol_text, PROTOCOL_NAME)
+    except ProtocolError as error:
+        raise UnusableFileError(folder / PROTOCOL_NAME, KIND, tuple(str(each) for each in error.problems)) from error
+    if not isinstance(protocol, StudyProtocol):
+        raise UnusableFileError(folder / PROTOCOL_NAME, KIND, ("it is no protocol of a study",))
+    seeds = found.facts.get("seeds", {})
+    sessions = tuple(dict.fromkeys(trial.session for trial in found.trials))
+    return Collected(
+        protocol=protocol,
+        protocol_hash=protocol_hash(protocol),
+        trials=found.trials,
+        sessions=tuple(SessionFolder(folder / name) for name in sessions),
+        seeds=tuple(int(seeds.get(name, 0)) for name in sessions),
+        devices=tuple(map(str, found.facts.get("devices", ()))),
+        observers=tuple(map(str, found.facts.get("observers", ()))),
+        left_out=(),
+        qualities=(),
+        locked=str(found.facts.get("locked", "not known")),
+        finished=(),
+        parents=(*found.files, folder / PROTOCOL_NAME),
+    )

@@ -1,0 +1,112 @@
+"""Exported trials: as other tools read them, and read back with the same results."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+from scipy.io import loadmat
+
+from protocols.trial import Trial
+from study.cli.main import main
+from study.store.disk.csv_rows import columns
+from study.store.formats.trial_columns import TRIAL_COLUMNS
+from study.store.formats.trials_file import read_trials
+
+PSYCH_DS_FILE = re.compile(r"[a-z]+-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*_data\.csv")
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory, small_text) -> Path:
+    """Two sessions of the small protocol."""
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "small.toml").write_text(small_text)
+    for number in (1, 2):
+        assert main(["study", "--protocol", str(folder / "small.toml"), "--observer", "ideal", "--seed", str(number),
+                     "--subject", f"P0{number}", "--data", str(folder / "data")]) == 0  # fmt: skip
+    return folder / "data"
+
+
+def logged(data: Path) -> list[Trial]:
+    return [trial for path in sorted(data.glob("*/trials.csv")) for trial in read_trials(path)]
+
+
+def test_every_column_is_described():
+    assert set(TRIAL_COLUMNS) == set(columns(Trial))
+
+
+def test_a_psych_ds_dataset_names_all_its_columns(data, tmp_path):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
+    description = json.loads((tmp_path / "ds" / "dataset_description.json").read_text("utf-8"))
+    assert (description["@context"], description["@type"]) == ("https://schema.org/", "Dataset")
+    files = sorted((tmp_path / "ds" / "data").iterdir())
+    assert len(files) == 2 and all(PSYCH_DS_FILE.fullmatch(path.name) for path in files)
+    named = {each["name"] for each in description["variableMeasured"]}
+    for path in files:
+        with path.open(newline="") as table:
+            assert set(next(csv.reader(table))) == named
+    assert description["hapteq"]["seeds"] == {"P01_001": 1, "P02_001": 2}
+
+
+def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, capsys):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
+    said = []
+    for source, out in ((data, tmp_path / "a"), (tmp_path / "ds", tmp_path / "b")):
+        capsys.readouterr()
+        assert main(["analyze", str(source), "--out", str(out)]) == 0
+        said.append(capsys.readouterr().out)
+    assert said[0] == said[1]
+    first, second = (json.loads((tmp_path / name / "anova.json").read_text("utf-8")) for name in "ab")
+    for document in (first, second):
+        del document["provenance"]
+    assert first == second
+    assert (tmp_path / "a" / "thresholds.csv").read_bytes() == (tmp_path / "b" / "thresholds.csv").read_bytes()
+
+
+def test_a_matlab_file_holds_every_trial(data, tmp_path):
+    assert main(["export", str(data), "--out", str(tmp_path / "mat"), "--form", "mat"]) == 0
+    found = loadmat(tmp_path / "mat" / "trials.mat", simplify_cells=True)
+    trials = logged(data)
+    assert found["trials"]["level_n"].tolist() == [trial.level_n for trial in trials]
+    assert list(found["trials"]["session"]) == [trial.session for trial in trials]
+    assert set(found["trials"]) == set(columns(Trial))
+    assert found["units"]["level_n"] == "N"
+
+
+def test_bids_has_a_table_per_session_and_says_what_is_missing(data, tmp_path):
+    assert main(["export", str(data), "--out", str(tmp_path / "bids"), "--form", "bids"]) == 0
+    tables = sorted((tmp_path / "bids").glob("sub-*/ses-*/beh/*_beh.tsv"))
+    assert [path.name.split("_")[0] for path in tables] == ["sub-P01", "sub-P02"]
+    rows = [line.split("\t") for path in tables for line in path.read_text("utf-8").splitlines()[1:]]
+    assert len(rows) == len(logged(data)) and all("" not in row for row in rows)
+    (sidecar,) = (tmp_path / "bids").glob("task-*_beh.json")
+    described = json.loads(sidecar.read_text("utf-8"))
+    assert set(tables[0].read_text("utf-8").splitlines()[0].split("\t")) <= set(described)
+
+
+@pytest.mark.parametrize("form", ["psych-ds", "bids", "mat"])
+def test_a_folder_that_holds_something_is_left_alone(data, tmp_path, form, capsys):
+    (tmp_path / "kept.txt").write_text("mine")
+    assert main(["export", str(data), "--out", str(tmp_path), "--form", form]) != 0
+    assert "holds files already" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["kept.txt"]
+
+
+@pytest.mark.parametrize("spoil", ["{", '{"name": 1}', "[]"])
+def test_a_damaged_description_is_named(data, tmp_path, spoil, capsys):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
+    (tmp_path / "ds" / "dataset_description.json").write_text(spoil)
+    assert main(["analyze", str(tmp_path / "ds")]) != 0
+    assert "dataset_description.json" in capsys.readouterr().err
+
+
+def test_a_table_with_a_wrong_row_is_named(data, tmp_path, capsys):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
+    path = next((tmp_path / "ds" / "data").iterdir())
+    header, first, *rest = path.read_text("utf-8").splitlines()
+    fields = first.split(",")
+    fields[header.split(",").index("level_n")] = "-1.0"
+    path.write_text("\n".join([header, ",".join(fields), *rest]) + "\n")
+    assert main(["analyze", str(tmp_path / "ds")]) != 0
+    assert path.name in capsys.readouterr().err
