@@ -130,12 +130,6 @@ def overview(name: str, recording: Recording) -> Overview:
         *level_checks(levels, channels),
         *repeat_checks(recording, repeated),
     )
-    if not recording.is_timed:
-        checks = tuple(
-            check if check.name == CLOCK else replace(check, seen=untimed_text(check.seen), do=untimed_text(check.do))
-            for check in checks
-        )
-    severity = ("wrong", "notice", "fine")
     return Overview(
         name=name,
         recording=recording,
@@ -148,8 +142,20 @@ def overview(name: str, recording: Recording) -> Overview:
         coherences=coherences,
         pairs=pairs,
         repeats=repeated,
-        checks=tuple(sorted(checks, key=lambda check: severity.index(check.level))),
+        checks=_worst_first(checks if recording.is_timed else tuple(map(_in_samples, checks))),
     )
+
+
+def _worst_first(checks: tuple[Check, ...]) -> tuple[Check, ...]:
+    severity = ("wrong", "notice", "fine")
+    return tuple(sorted(checks, key=lambda check: severity.index(check.level)))
+
+
+def _in_samples(check: Check) -> Check:
+    """Of a recording of which no time is known; the check of the clock says just that."""
+    if check.name == CLOCK:
+        return check
+    return replace(check, seen=untimed_text(check.seen), do=untimed_text(check.do))
 
 
 def _summary(channel: Channel) -> ChannelSummary:

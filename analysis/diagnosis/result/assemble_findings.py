@@ -48,10 +48,9 @@ def assembled(
     what clean recordings differ by."""
     context, found, judged = searched.context, searched.found, searched.judged
     measure, tuning = context.whole, context.tuning
-    errors = _errors(searched)
     recording, fitted = measure.records[0].recording, found.after.fitted
     said, placed = said_of(recording, tuning.model), fitted.hypothesis.placed()
-    channels = channel_names(recording, len(measure.noise))
+    channels, errors = channel_names(recording, len(measure.noise)), _errors(searched)
     maps, courses = maps_of(measure, found.stages, floors, learned, context.map_), _courses(measure, found, names)
     local = _localised(context, found, floors, maps)
     proposal = context.guard.part("the next recording", "its choice", partial(_proposal, context, found, judged), None)
@@ -68,7 +67,7 @@ def assembled(
         noise_rms=dict(zip(channels, measure.noise.tolist(), strict=True)),
         channel_errors=channel_errors(found, channels),
         mismatch=maps.rows,
-        is_timed=measure.records[0].recording.is_timed,
+        is_timed=recording.is_timed,
         signatures=_signatures(context, found, said),
         black_box=context.guard.part("the black box", "its fit", partial(_black_box, measure, found, document), None),
         remarks=_remarks(learned_sentence(learned, channels), courses, tuning, floors),

@@ -27,7 +27,7 @@ def write_bids(
     written = [
         _json(folder / "dataset_description.json", {
             "Name": name, "BIDSVersion": VERSION, "DatasetType": "raw",
-            "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("version", ""))}],
+            "GeneratedBy": [{"Name": "hapteq", "Version": str(facts.get("versions", {}).get("hapteq", ""))}],
         }),
         _text(folder / "README.md", f"# {name}\n\nTrials of a study of force directions, exported by hapteq.\n"),
         _text(folder / "code" / "protocol.toml", protocol_text),

@@ -78,6 +78,8 @@ def test_bids_has_a_table_per_session_and_says_what_is_missing(data, tmp_path):
     assert main(["export", str(data), "--out", str(tmp_path / "bids"), "--form", "bids"]) == 0
     tables = sorted((tmp_path / "bids").glob("sub-*/ses-*/beh/*_beh.tsv"))
     assert [path.name.split("_")[0] for path in tables] == ["sub-P01", "sub-P02"]
+    made = json.loads((tmp_path / "bids" / "dataset_description.json").read_text("utf-8"))
+    assert made["GeneratedBy"][0]["Version"]
     rows = [line.split("\t") for path in tables for line in path.read_text("utf-8").splitlines()[1:]]
     assert len(rows) == len(logged(data)) and all("" not in row for row in rows)
     (sidecar,) = (tmp_path / "bids").glob("task-*_beh.json")
