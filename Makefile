@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
+# Where Python is told not to keep compiled code, what is there already is used all the same.
+COMPILE := $(BIN)/python -m compileall -q protocols equalizer analysis study
 
 # Small matrices: threads of a linear algebra library would wait for each other longer than they work.
 export OPENBLAS_NUM_THREADS ?= 1
@@ -114,6 +116,7 @@ $(VENV)/bin/python:
 $(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
 	@echo "Installing hapteq and what it needs (a minute or two)"
 	@$(PIP) install --quiet -c constraints.txt -e .
+	@$(COMPILE)
 	@touch $@
 
 # Not after the plain installation: both at once are quicker than one after the other. What is imported compiles itself
@@ -124,4 +127,5 @@ $(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml constraints.txt
 	@# The driver's tests compile a stub of the vendor's library: by the system's compiler, else by one from pip.
 	@command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null || \
 		$(PIP) install --quiet -c constraints.txt -e '.[compiler]'
+	@$(COMPILE)
 	@touch $(VENV)/.installed $@

@@ -202,9 +202,6 @@ def _settle_in() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
-    # Python's compiled code is kept as numba's is, also where the environment says not to: without it, a diagnosis
-    # imports for 4 s longer.
-    sys.dont_write_bytecode = False
     for library in ("OPENBLAS", "OMP", "MKL"):
         # Our matrices are small: threads would wait for each other longer than they work. Heard before numpy loads.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
