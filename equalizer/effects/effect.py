@@ -8,6 +8,7 @@ sensed.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
+from weakref import WeakValueDictionary
 
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import Law
@@ -125,7 +126,7 @@ class OnResponse:
 Acts = Structure | AxisForce | JointForce | OnCommand | OnResponse
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Effect:
     """A catalogue entry. Its name, place, units and reported parameters stand in the vocabulary."""
 
@@ -150,6 +151,21 @@ class Effect:
     """Of an effect that has no name of its own: its formula."""
     of_time: bool = False
     """It hangs on when in a recording a sample was taken, or on rare events: no part of a recording stands for all."""
+
+    def __post_init__(self) -> None:
+        _living[id(self)] = self
+
+
+_living: WeakValueDictionary[int, Effect] = WeakValueDictionary()
+
+
+def living_effects() -> dict[int, Effect]:
+    """All that there are, by their address: of the catalogue, and of laws without a name.
+
+    Effects hold functions, which cannot be sent to another process; a forked process has them at the same addresses.
+    """
+    held = [reference() for reference in _living.valuerefs()]
+    return {id(effect): effect for effect in held if effect is not None}
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,9 @@
 
 A forked process has all that its work refers to, with nothing to be sent; results come back through a pipe. It takes
 the next piece whenever it is done with one, and so does the process that forked it. Work within work is done there.
+
+Forking beside numba is safe here: no kernel has `parallel=True` or `prange`, so numba starts no threads whose locks a
+forked process would inherit.
 """
 
 import io
@@ -10,22 +13,27 @@ import pickle
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
 from inspect import unwrap
 from time import perf_counter, process_time
 from types import CodeType
 from typing import Any, TypeVar
 
-from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.effect import Effect
+from equalizer.effects.effect import Effect, living_effects
 
 Result = TypeVar("Result")
 WORTH_S = 0.1
 """Work that is shorter, as it was the last time, is done without forking: that takes a fifth of it."""
 _TOKEN, _MOST_TOKENS = 4, 8192
 """Bytes of a token in the pipe that pieces are taken from; and so many fit into it."""
-_mean_s: dict[CodeType, float] = {}
+_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""What may raise an exception in a program of ours, anywhere."""
+_mean_s: dict[CodeType | type, float] = {}
+"""How long a piece took, the last time that a function was mapped."""
+_lost: set[CodeType | type] = set()
+"""Functions whose results could not be sent, or whose process died: forked again, they would be computed twice."""
 _spent_s = [0.0]
 """By the processes that this one was forked from, until then."""
 _within: list[bool] = []
@@ -47,11 +55,16 @@ def forked_map(function: Callable[..., Result], *items: Iterable[Any], workers: 
     """As `map`, in the same order. What raises there raises here; left early, no process stays behind."""
     pieces = list(zip(*items, strict=True))
     count = min(len(pieces), workers or cores())
-    known_s = _mean_s.get(_code(function), WORTH_S)
+    key = _key(function)
     # macOS does not allow what its libraries start to be forked.
-    if count < 2 or _within or sys.platform == "darwin" or not hasattr(os, "fork") or known_s * len(pieces) < WORTH_S:
-        return [function(*piece) for piece in pieces]
-    return _Shared(function, pieces).with_others(count - 1)
+    possible = count > 1 and not _within and sys.platform != "darwin" and hasattr(os, "fork")
+    if possible and key not in _lost and _mean_s.get(key, WORTH_S) * len(pieces) >= WORTH_S:
+        return _Shared(function, pieces).with_others(count - 1)
+    begun_s = perf_counter()
+    results = [function(*piece) for piece in pieces]
+    if pieces:
+        _mean_s[key] = (perf_counter() - begun_s) / len(pieces)
+    return results
 
 
 class _Shared:
@@ -59,6 +72,7 @@ class _Shared:
 
     def __init__(self, function: Callable[..., Any], pieces: Sequence[tuple[Any, ...]]) -> None:
         self._function, self._pieces = function, pieces
+        self._known = living_effects()
         self._stride = -(-len(pieces) // _MOST_TOKENS)
         self._tokens, end = os.pipe()
         for first in range(0, len(pieces), self._stride):
@@ -68,62 +82,78 @@ class _Shared:
     def with_others(self, others: int) -> list[Any]:
         children: list[tuple[int, int]] = []
         try:
-            for _ in range(others):
-                children.append(self._forked())
+            while len(children) < others and self._forked(children):
+                pass
             _within.append(True)
             try:
                 found = self._taken(guarded=False)
             finally:
                 _within.pop()
             while children:
-                process, answers = children[0]
-                found.update(_received(answers))
-                os.waitpid(process, 0)
-                del children[0]
-                os.close(answers)
+                found.update(_received(children[0][1], self._known))
+                with _signals_held():
+                    _ended(*children.pop(0))
         finally:
-            os.close(self._tokens)
-            for process, answers in children:
-                os.close(answers)
-                os.kill(process, signal.SIGKILL)
-                os.waitpid(process, 0)
+            with _signals_held():
+                os.close(self._tokens)
+                for process, answers in children:
+                    with suppress(ProcessLookupError):
+                        os.kill(process, signal.SIGKILL)
+                    _ended(process, answers)
+        return self._in_order(found)
+
+    def _in_order(self, found: dict[int, tuple[Any, Exception | None]]) -> list[Any]:
         results = []
         for number, piece in enumerate(self._pieces):
-            # What a process could not send, or died of, is done here.
-            result, error = found[number] if number in found else (self._function(*piece), None)
+            if number not in found:
+                # What a process could not send, or died of, is done here.
+                _lost.add(_key(self._function))
+                found[number] = self._function(*piece), None
+            result, error = found[number]
             if error is not None:
                 raise error
             results.append(result)
         return results
 
-    def _forked(self) -> tuple[int, int]:
-        """Its process, and where its answers come from."""
-        spent_s = processor_s()
-        answers, end = os.pipe()
-        parent = os.getpid()
-        with warnings.catch_warnings():
-            # Of other threads, whose locks it might wait for: it computes, and leaves without cleaning up.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            process = os.fork()
-        if process:
+    def _forked(self, children: list[tuple[int, int]]) -> bool:
+        """Adds a process, and where its answers come from; False where the system gives no further one."""
+        spent_s, parent = processor_s(), os.getpid()
+        # An exception in between would leave a process that is in no list, or let it go on with its parent's work.
+        with _signals_held():
+            answers, end = os.pipe()
+            try:
+                with warnings.catch_warnings():
+                    # Of other threads, whose locks it might wait for: it computes, and leaves without cleaning up.
+                    warnings.simplefilter("ignore", DeprecationWarning)
+                    process = os.fork()
+            except OSError:
+                os.close(answers)
+                os.close(end)
+                return False
+            if not process:
+                try:
+                    self._work_there(end, parent, spent_s)
+                finally:
+                    os._exit(0)
+            children.append((process, answers))
             os.close(end)
-            return process, answers
-        try:
-            # A terminal sends Ctrl-C to all; who forked this one ends it.
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-                signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
-            _within.append(True)
-            _spent_s[0] = spent_s
-            sent = _packed(self._taken(guarded=True, parent=parent))
-            with os.fdopen(end, "wb") as pipe:
-                pipe.write(sent)
-        finally:
-            os._exit(0)
+        return True
+
+    def _work_there(self, end: int, parent: int, spent_s: float) -> None:
+        # A terminal sends Ctrl-C to all; the process that forked this one ends it.
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+        _within.append(True)
+        _spent_s[0] = spent_s
+        sent = _packed(self._taken(guarded=True, parent=parent), self._known)
+        with os.fdopen(end, "wb") as pipe:
+            pipe.write(sent)
 
     def _taken(self, guarded: bool, parent: int = 0) -> dict[int, tuple[Any, Exception | None]]:
         """Results and errors, by number. guarded: an error is kept, and ends this share of the work."""
         found: dict[int, tuple[Any, Exception | None]] = {}
-        code, begun_s = _code(self._function), perf_counter()
+        begun_s = perf_counter()
         while token := os.read(self._tokens, _TOKEN):
             first = int.from_bytes(token, "little")
             for number in range(first, min(first + self._stride, len(self._pieces))):
@@ -137,54 +167,78 @@ class _Shared:
                     found[number] = None, error
                     return found
         if found:
-            _mean_s[code] = (perf_counter() - begun_s) / len(found)
+            _mean_s[_key(self._function)] = (perf_counter() - begun_s) / len(found)
         return found
 
 
-def _code(function: Callable[..., Any]) -> CodeType:
-    return getattr(unwrap(function), "__code__", _code.__code__)
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """They come when this is left."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@cache
-def _known() -> dict[int, Effect]:
-    """Effects stay what they are, however often they are sent: a forked process has them at the same addresses."""
-    return {id(effect): effect for effect in CATALOGUE}
+def _ended(process: int, answers: int) -> None:
+    os.close(answers)
+    with suppress(ChildProcessError):
+        os.waitpid(process, 0)
+
+
+def _key(function: Callable[..., Any]) -> CodeType | type:
+    """What functions have in common that are made anew for each map."""
+    inner = unwrap(function)
+    while isinstance(inner, partial):
+        inner = unwrap(inner.func)
+    return inner if isinstance(inner, type) else getattr(inner, "__code__", type(inner))
 
 
 class _Pickler(pickle.Pickler):
+    """Effects stay what they are, however often they are sent: a forked process has them at the same addresses."""
+
+    def __init__(self, file: io.BytesIO, known: Mapping[int, Effect]) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._known = known
+
     def persistent_id(self, obj: object) -> int | None:
         if not isinstance(obj, Effect):
             return None
-        if id(obj) not in _known():
+        if id(obj) not in self._known:
             raise pickle.PicklingError(obj.name)
         return id(obj)
 
 
 class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, known: Mapping[int, Effect]) -> None:
+        super().__init__(file)
+        self._known = known
+
     def persistent_load(self, pid: int) -> Effect:
-        return _known()[pid]
+        return self._known[pid]
 
 
-def _packed(found: dict[int, tuple[Any, Exception | None]]) -> bytes:
+def _packed(found: dict[int, tuple[Any, Exception | None]], known: Mapping[int, Effect]) -> bytes:
     """One after the other; what cannot be sent is left out."""
     whole = io.BytesIO()
     for number, answer in found.items():
         each = io.BytesIO()
         try:
-            _Pickler(each, pickle.HIGHEST_PROTOCOL).dump((number, answer))
+            _Pickler(each, known).dump((number, answer))
         except (pickle.PicklingError, TypeError, AttributeError, ValueError):
             continue
         whole.write(each.getbuffer())
     return whole.getvalue()
 
 
-def _received(answers: int) -> dict[int, tuple[Any, Exception | None]]:
+def _received(answers: int, known: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
     with os.fdopen(answers, "rb", closefd=False) as pipe:
         sent = io.BytesIO(pipe.read())
     found: dict[int, tuple[Any, Exception | None]] = {}
     while sent.tell() < len(sent.getbuffer()):
         try:
-            number, answer = _Unpickler(sent).load()
+            number, answer = _Unpickler(sent, known).load()
         except (pickle.UnpicklingError, EOFError):
             break
         found[number] = answer

@@ -20,16 +20,21 @@ def always() -> bool:
     return True
 
 
-def counted(most: int) -> TimeBudget:
-    """Until it was asked so often: the same pieces on every machine, however busy."""
-    asked = count()
-    return lambda: next(asked) < most
+class Counted:
+    """TimeBudget until it was asked so often: the same pieces on every machine, however busy."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._asked = most, count()
+
+    def __call__(self) -> bool:
+        return next(self._asked) < self._most
 
 
 def budgeted(map_: Mapper, time_left: TimeBudget) -> Mapper:
     """The same map; raises OutOfTimeError before a piece of work that would begin after the time limit.
 
-    Where pieces are worked on in other processes, what was asked there is asked here again: each counts once.
+    Where pieces are worked on in other processes, a count is asked here again, for what was asked there: each counts
+    once. A clock is not: pieces that began in time are kept, however late they are done.
     """
     asked = [0]
 
@@ -48,8 +53,12 @@ def budgeted(map_: Mapper, time_left: TimeBudget) -> Mapper:
             return function(*arguments), asked[0] - before
 
         found: list[tuple[object, int]] = list(map_(work, *items))  # type: ignore[arg-type]
-        for _ in range(sum(times for _, times in found) - (asked[0] - begun)):
-            ask()
+        elsewhere = sum(times for _, times in found) - (asked[0] - begun)
+        if isinstance(time_left, Counted):
+            for _ in range(elsewhere):
+                ask()
+        else:
+            asked[0] += elsewhere
         return [result for result, _ in found]
 
     return mapped

@@ -1,18 +1,24 @@
 """Work over forked processes: in order, with its errors, from within itself, counted, and left at once."""
 
+import errno
+import gc
 import os
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.time_budget import OutOfTimeError, budgeted, counted
+from analysis.diagnosis.search.time_budget import Counted, OutOfTimeError, budgeted
 from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.discovered_law import law_effect
+from equalizer.effects.effect import living_effects
+from equalizer.laws.law import law_of
 from study.workflows import forked_map as module
 from study.workflows.forked_map import forked_map, processor_s
 
@@ -21,6 +27,7 @@ from study.workflows.forked_map import forked_map, processor_s
 def two_cores_and_nothing_known(monkeypatch):
     monkeypatch.setattr(module, "cores", lambda: 2)
     monkeypatch.setattr(module, "_mean_s", {})
+    monkeypatch.setattr(module, "_lost", set())
 
 
 def children() -> list[int]:
@@ -50,12 +57,110 @@ def test_arrays_and_effects_come_back_as_they_are():
         assert effect is CATALOGUE[number]
 
 
-def test_what_cannot_be_sent_is_done_here():
+def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_found():
+    law = law_effect(law_of("2*vx", "force", "x"))
+
+    def found(_: int) -> tuple[object, int]:
+        time.sleep(0.02)
+        return law, os.getpid()
+
+    answers = forked_map(found, range(6))
+    assert all(effect is law for effect, _ in answers)
+    assert len({process for _, process in answers}) == 2
+
+
+def test_an_effect_that_is_let_go_is_not_kept():
+    law = law_effect(law_of("2*vx", "force", "x"))
+    address = id(law)
+    assert living_effects()[address] is law
+    del law
+    gc.collect()
+    assert address not in living_effects()
+
+
+def test_what_cannot_be_sent_is_done_here_and_not_tried_elsewhere_again():
+    processes: list[int] = []
+
     def function_of(number: int) -> object:
         time.sleep(0.02)
+        processes.append(os.getpid())
         return lambda: number
 
-    assert [found() for found in forked_map(function_of, range(6))] == list(range(6))
+    for _ in range(2):
+        assert [found() for found in forked_map(function_of, range(6))] == list(range(6))
+        assert len(processes) == 6
+        processes.clear()
+        assert module._key(function_of) in module._lost
+
+
+def of_seconds(seconds: float, _: int) -> int:
+    time.sleep(seconds)
+    return os.getpid()
+
+
+def test_work_that_was_short_is_forked_again_once_it_takes_longer():
+    assert set(forked_map(partial(of_seconds, 0.0), range(4))) >= {os.getpid()}
+    assert set(forked_map(partial(of_seconds, 0.0), range(4))) == {os.getpid()}
+    assert set(forked_map(partial(of_seconds, 0.06), range(4))) == {os.getpid()}
+    assert len(set(forked_map(partial(of_seconds, 0.06), range(8)))) == 2
+
+
+def test_functions_without_code_of_their_own_are_told_apart():
+    class Callable:
+        def __call__(self) -> None: ...
+
+    functions = (slow, of_seconds, Callable(), pow, Path)
+    assert len({module._key(function) for function in functions}) == len(functions)
+    assert module._key(partial(partial(slow), 1.0)) == module._key(slow)
+    assert module._key(Callable()) == module._key(Callable())
+
+
+def failing_fork(after: int):
+    """fork, that the system refuses after so many times."""
+    left, fork = [after], os.fork
+
+    def forked() -> int:
+        if not left[0]:
+            raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+        left[0] -= 1
+        return fork()
+
+    return forked
+
+
+@pytest.mark.parametrize("after", [0, 1])
+def test_a_system_without_further_processes_leaves_the_work_to_those_there_are(monkeypatch, after):
+    monkeypatch.setattr(os, "fork", failing_fork(after))
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    found = forked_map(slow, range(8), workers=4)
+    assert [number for number, _ in found] == list(range(8))
+    assert len({process for _, process in found}) == 1 + after
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert children() == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_at_the_fork_ends_this_process_and_leaves_none(monkeypatch, tmp_path, number):
+    fork, here, gone_on = os.fork, os.getpid(), tmp_path / "gone on"
+
+    def forked() -> int:
+        process = fork()
+        signal.raise_signal(number)
+        return process
+
+    monkeypatch.setattr(os, "fork", forked)
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            forked_map(slow, range(8))
+        assert children() == []
+    finally:
+        if os.getpid() != here:
+            gone_on.touch()
+            os._exit(1)
+        signal.signal(number, before)
+    assert not gone_on.exists()
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {number}
 
 
 def test_what_a_process_died_of_is_done_here():
@@ -103,7 +208,7 @@ def test_crashes_in_a_process_are_noted_here():
 
 def asked(most: int, map_: object) -> int:
     """How many maps of four nested maps of two a count allows."""
-    mapped, done = budgeted(map_, counted(most)), 0
+    mapped, done = budgeted(map_, Counted(most)), 0
 
     def nested(number: int) -> float:
         time.sleep(0.01)
@@ -121,6 +226,22 @@ def asked(most: int, map_: object) -> int:
 @pytest.mark.parametrize("most", [11, 12, 13, 23, 24, 100])
 def test_evaluations_are_counted_wherever_they_are_made(most):
     assert asked(most, forked_map) == asked(most, map) == most // 12
+
+
+def test_pieces_that_began_in_time_are_kept_where_a_clock_ran_out_before_they_were_done(tmp_path):
+    over = tmp_path / "over"
+    mapped = budgeted(forked_map, lambda: not over.exists())
+
+    def last(number: int) -> int:
+        (tmp_path / str(number)).touch()
+        while not (tmp_path / str(1 - number)).exists():
+            time.sleep(0.001)
+        over.touch()
+        return number
+
+    assert list(mapped(last, [0, 1])) == [0, 1]
+    with pytest.raises(OutOfTimeError):
+        mapped(abs, [2])
 
 
 def test_processor_time_of_processes_counts():
@@ -143,7 +264,7 @@ def test_ctrl_c_ends_a_program_and_all_its_processes():
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from study.workflows.forked_map import forked_map\n"
         "def work(_):\n"
-        "    print(os.getpid(), flush=True)\n"
+        "    os.write(1, f'{os.getpid()}\\n'.encode())\n"  # at once: two processes write
         "    time.sleep(50)\n"
         "forked_map(work, range(8), workers=2)\n"
     )
