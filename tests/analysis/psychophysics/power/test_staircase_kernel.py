@@ -47,6 +47,14 @@ def test_the_compiled_evidence_is_that_of_the_analysis(family):
     np.testing.assert_allclose(compiled, sensitivity(t, family)[0], atol=1e-7)
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_far_above_threshold_errors_become_as_rare_as_the_family_says(family):
+    """Beyond t = 3.2 too, where only a Weibull participant is sure: a logistic one still errs in 2 %."""
+    t = np.linspace(0.0, 10.0, 51)
+    errors = norm.sf([evidence(x, FAMILIES.index(family)) for x in t])
+    np.testing.assert_allclose(errors, norm.sf(sensitivity(t, family)[0]), rtol=1e-6, atol=1.2e-11)
+
+
 def test_shares_are_those_of_the_model_with_lapses_and_a_criterion():
     """At a level that never moves: one step of almost nothing."""
     rule = StaircaseRule(1.0, 1.0, 10, 10, (StepPhase(1e-6, 100),), 100, 10, trial_limit=1900)
