@@ -20,6 +20,9 @@ EQUIVALENCE_DB = 2.0
 EQUIVALENCE_UP_TO_HZ = 25.0
 """Where the published thresholds are alike, and no peak is cut by the cap."""
 
+ROUNDING_DB = 1e-9
+"""Differences closer than this are equal: sums of the same steps in another order."""
+
 
 @dataclass(frozen=True, slots=True)
 class Contrast:
@@ -42,12 +45,13 @@ class Contrast:
 
 
 def contrasts(frequencies_hz: Sequence[float], values_db: FloatArray, confidence: float) -> tuple[Contrast, ...]:
-    """values_db: (n, k), NaN for a gap. Contrasts without two participants are left out."""
+    """values_db: (n, k), NaN for a gap. Contrasts without two participants, or with differences equal in all, are
+    left out."""
     found = []
     for place in range(1, len(frequencies_hz)):
         both = values_db[:, [0, place]]
         both = both[np.isfinite(both).all(axis=1)]
-        if len(both) >= 2 and np.ptp(both[:, 1] - both[:, 0]) > 0:
+        if len(both) >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
             found.append((frequencies_hz[place], both))
     p_values = [_t_test(both[:, 1] - both[:, 0]) for _, both in found]
     corrected = holm(p_values)

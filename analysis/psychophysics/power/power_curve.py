@@ -10,10 +10,11 @@ from scipy.stats import studentized_range
 
 from analysis.psychophysics.anova import one_way
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.psychophysics.group_contrasts import contrasts
+from analysis.psychophysics.group_contrasts import Contrast, contrasts
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import pseudo_thresholds
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
+from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
 
 CONFIDENCE = 0.95
@@ -26,7 +27,8 @@ class StudyVerdict:
     people: int
     trials: int
     primary_found: bool
-    """By the hierarchical model of all answers, t test over people."""
+    """By the hierarchical model of all answers, t test over people. Not found, here and below, where the differences
+    of all people are equal and no test judges them."""
     primary_covers: bool
     primary_error_db: float
     """Estimated minus true difference."""
@@ -64,8 +66,8 @@ def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int,
     """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit."""
     study = simulate_study(crowd, rule, people, seed)
     true_db = 20.0 * float(np.log10(crowd.medians_n[-1] / crowd.medians_n[0]))
-    primary = contrasts(crowd.frequencies_hz, pseudo_thresholds(fit_hierarchy(study.answers)), CONFIDENCE)[-1]
-    means = contrasts(crowd.frequencies_hz, study.threshold_db, CONFIDENCE)[-1]
+    pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
+    primary, means = (_highest(crowd.frequencies_hz, values) for values in (pseudo, study.threshold_db))
     names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
     anova = one_way({name: list(column) for name, column in zip(names, study.threshold_n.T, strict=True)})
     difference_n = abs(float(study.threshold_n[:, -1].mean() - study.threshold_n[:, 0].mean()))
@@ -73,13 +75,23 @@ def judge_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int,
     return StudyVerdict(
         people=people,
         trials=study.trials,
-        primary_found=primary.p < 1.0 - CONFIDENCE,
-        primary_covers=primary.lower_db <= true_db <= primary.upper_db,
-        primary_error_db=primary.difference_db - true_db,
-        means_found=means.p < 1.0 - CONFIDENCE,
-        means_error_db=means.difference_db - true_db,
+        primary_found=primary is not None and primary.p < 1.0 - CONFIDENCE,
+        primary_covers=primary is not None and primary.lower_db <= true_db <= primary.upper_db,
+        primary_error_db=_mean_difference(pseudo) - true_db,
+        means_found=means is not None and means.p < 1.0 - CONFIDENCE,
+        means_error_db=_mean_difference(study.threshold_db) - true_db,
         published_found=difference_n > margin_n,
     )
+
+
+def _highest(frequencies_hz: Sequence[float], values_db: FloatArray) -> Contrast | None:
+    """The highest frequency against the lowest; None where it cannot be judged."""
+    found = contrasts(frequencies_hz, values_db, CONFIDENCE)
+    return next((contrast for contrast in found if contrast.frequency_hz == frequencies_hz[-1]), None)
+
+
+def _mean_difference(values_db: FloatArray) -> float:
+    return float((values_db[:, -1] - values_db[:, 0]).mean())
 
 
 @cache

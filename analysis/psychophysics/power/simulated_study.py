@@ -20,6 +20,7 @@ class Crowd:
     79.37 %, normal in dB."""
 
     frequencies_hz: tuple[float, ...]
+    """In ascending order."""
     medians_n: tuple[float, ...]
     person_sd_db: float = 2.5
     """Of what makes one person better or worse at all frequencies."""

@@ -42,3 +42,10 @@ def test_a_gap_leaves_out_the_person_for_that_contrast_alone():
     values[0, 1] = np.nan
     assert [c.participants for c in contrasts(HZ, values, 0.95)] == [9, 10, 10]
     assert contrasts(HZ, values[:1], 0.95) == ()
+
+
+def test_differences_that_are_equal_but_for_rounding_are_left_out():
+    """0.1 + 0.2 is not 0.3: a t test would be certain of it."""
+    values = np.array([[0.0, 0.3, 0.0], [0.1, 0.1 + (0.1 + 0.2), 0.4]])
+    assert np.ptp(values[:, 1] - values[:, 0]) > 0
+    assert [c.frequency_hz for c in contrasts((5.0, 15.0, 25.0), values, 0.95)] == [25.0]

@@ -3,10 +3,12 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from analysis.psychophysics.anova import one_way
 from analysis.psychophysics.comparisons import compare_all
+from analysis.psychophysics.group_contrasts import contrasts
 from analysis.psychophysics.power.power_curve import judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -59,6 +61,34 @@ def test_the_published_verdict_is_that_of_the_pair_in_the_report():
         found.append(judge_study(crowd, RULE, 8, (5, number)).published_found)
         assert found[-1] == (pair.p < 0.05)
     assert len(set(found)) == 2  # both verdicts occur
+
+
+SHORT = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3),), 3, 2)
+"""Two reversals averaged, in steps of 4 dB: two people often differ equally."""
+
+
+def test_equal_differences_are_not_judged_and_not_found():
+    """Of two people, in a protocol with two frequencies."""
+    crowd = Crowd((5.0, 45.0), (0.7, 1.4))
+    study = simulate_study(crowd, SHORT, 2, (9,))
+    assert np.ptp(study.threshold_db[:, 1] - study.threshold_db[:, 0]) == 0
+    verdict = judge_study(crowd, SHORT, 2, (9,))
+    assert not verdict.means_found
+    true_db = 20 * np.log10(2.0)
+    assert verdict.means_error_db == pytest.approx(
+        study.threshold_db[:, 1].mean() - study.threshold_db[:, 0].mean() - true_db
+    )
+
+
+def test_another_frequency_does_not_stand_in_for_the_highest():
+    """Where 45 Hz differs by 8 dB in both people, 25 Hz alone can be judged."""
+    crowd = Crowd((5.0, 25.0, 45.0), (0.7, 0.7, 1.4))
+    study = simulate_study(crowd, SHORT, 2, (26,))
+    (other,) = contrasts(crowd.frequencies_hz, study.threshold_db, 0.95)
+    assert other.frequency_hz == 25.0
+    verdict = judge_study(crowd, SHORT, 2, (26,))
+    assert not verdict.means_found
+    assert verdict.means_error_db == pytest.approx(8.0 - 20 * np.log10(2.0))
 
 
 def test_a_broken_run_goes_on_and_any_number_of_workers_gives_the_same_numbers(run, tmp_path):
