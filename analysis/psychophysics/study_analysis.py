@@ -159,7 +159,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol) -> StudyAnal
         primary=primary,
         mean_contrasts=means,
         declared=declared_words(protocol.analysis),
-        compared=analyses_compared(primary, means, comparisons, table),
+        compared=analyses_compared(primary, means, comparisons, table, rule),
         warnings=(
             *study_warnings(tested, rows, table, protocol),
             *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested))]),

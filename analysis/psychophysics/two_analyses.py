@@ -8,14 +8,19 @@ from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.wording import listed, p_text, signed
 from protocols.definition.declared_analysis import AnalysisSettings
+from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
 NOTABLE_DB = 1.0
 """A difference between the two analyses that is worth a sentence: the small step of the staircase."""
-PUBLISHED_NEAR_CAP = (
-    "Near the cap the published intervals do not hold what they say: for true thresholds of 3 N at 35 Hz and 4 N at "
-    "45 Hz, simulated, reversal means lose 5 dB of the difference to 5 Hz, their interval covers 3 %, Tukey's 0 %; and "
-    'one-way analysis finds a difference that is not there in 0.4 % of studies instead of 5 %, so that its "not '
-    'significant" says little.'
+SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
+"""The published staircase and cap: `NEAR_PUBLISHED_CAP` was simulated with it and holds for no other."""
+NEAR_CAP = (
+    'Near the cap the published intervals do not hold what they say, and the published "not significant" says little.'
+)
+NEAR_PUBLISHED_CAP = (
+    "With this staircase and cap, for true thresholds of 3 N at 35 Hz and 4 N at 45 Hz, simulated, reversal means lose "
+    "5 dB of the difference to 5 Hz, their interval covers 3 %, Tukey's 0 %; and one-way analysis finds a difference "
+    "that is not there in 0.4 % of studies instead of 5 %."
 )
 
 
@@ -41,9 +46,14 @@ def declared_words(declared: AnalysisSettings) -> str:
 
 
 def analyses_compared(
-    primary: PrimaryAnalysis | None, means: Sequence[Contrast], comparisons: Comparisons, table: ThresholdTable
+    primary: PrimaryAnalysis | None,
+    means: Sequence[Contrast],
+    comparisons: Comparisons,
+    table: ThresholdTable,
+    rule: StaircaseRule,
 ) -> str:
-    """means: contrasts of reversal means in dB, against the same frequency as those of the primary analysis."""
+    """means: contrasts of reversal means in dB, against the same frequency as those of the primary analysis. rule: the
+    staircase that was played."""
     if primary is None:
         return (
             "The hierarchical model needs answers of two participants at every frequency of the protocol; these data "
@@ -64,7 +74,8 @@ def analyses_compared(
         if apart
         else f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
     )
-    return " ".join(filter(None, [size, _verdicts(primary, comparisons), PUBLISHED_NEAR_CAP if table.cut else ""]))
+    cut = [NEAR_CAP, NEAR_PUBLISHED_CAP if rule == SIMULATED_RULE else ""] if table.cut else []
+    return " ".join(filter(None, [size, _verdicts(primary, comparisons), *cut]))
 
 
 def _verdicts(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:

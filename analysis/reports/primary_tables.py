@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
-from analysis.psychophysics.hierarchy.run_likelihood import newton_or_none
+from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, newton_or_none
 from analysis.reports.page import Section, Table
 from analysis.wording import NONE, number, p_text, p_value, signed
 
@@ -70,7 +70,8 @@ def limit_words(primary: PrimaryAnalysis) -> str:
 def _medians(primary: PrimaryAnalysis) -> Table:
     rows = []
     for median in primary.medians:
-        shown, db = _interval(median.lower_n, median.upper_n), _interval(median.lower_db, median.upper_db, 1)
+        shown = interval_words(median.lower_n, median.upper_n)
+        db = interval_words(median.lower_db, median.upper_db, 1)
         size = "above the cap" if median.above_cap else number(median.newton)
         rows.append(
             (f"{median.frequency_hz:g} Hz", size, shown, NONE if median.above_cap else number(median.db, 1), db)
@@ -84,7 +85,10 @@ def _medians(primary: PrimaryAnalysis) -> Table:
     )
 
 
-def _interval(lower: float, upper: float | None, digits: int = 2) -> str:
+def interval_words(lower: float | None, upper: float | None, digits: int = 2) -> str:
+    """Of a median, whose upper end is missing above the cap."""
+    if lower is None:
+        return "no lower bound"
     return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
 
 
@@ -119,23 +123,31 @@ def _runs(primary: PrimaryAnalysis) -> Table:
     percent = f"{100 * primary.confidence:g} %"
     rows = []
     for run in primary.runs:
-        lower, upper = newton_or_none(run.lower_db), newton_or_none(run.upper_db)
-        if run.db is None:
-            shown = f"above {number(lower)}" if lower is not None else NONE
-        else:
-            shown = f"{number(lower)} to {number(upper)}" if upper is not None else f"{number(lower)} or more"
-        size = "above the cap" if run.db is None else number(newton_or_none(run.db))
-        rows.append((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), size, shown))
+        rows.append((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), *run_words(run)))
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
         header=("Participant", "Frequency", "Trials", "Threshold", f"{percent} profile interval"),
         rows=tuple(rows),
         notes=(
             "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the "
-            "model. Above the cap: a one-sided bound.",
+            "model. Above the cap, or below the levels played (right answers only): no size, a one-sided bound.",
         ),
         folded=True,
     )
+
+
+def run_words(run: RunLikelihood) -> tuple[str, str]:
+    """Threshold and interval in newtons; a dash where the answers contradict nothing."""
+    lower, upper = newton_or_none(run.lower_db), newton_or_none(run.upper_db)
+    if run.below:
+        size = "below the levels played"
+    else:
+        size = "above the cap" if run.db is None else number(newton_or_none(run.db))
+    if lower is not None and upper is not None:
+        return size, f"{number(lower)} to {number(upper)}"
+    if upper is not None:
+        return size, f"below {number(upper)}"
+    return size, NONE if lower is None else f"above {number(lower)}"
 
 
 def _persons(primary: PrimaryAnalysis) -> Table:

@@ -65,7 +65,7 @@ def measure(crowd: Crowd, studies: int, bounds: bool) -> dict[str, list[float]]:
             "any Holm": [min(c.p_holm for c in found) < 0.05],
             "Huynh-Feldt, Greenhouse-Geisser": [within.p_huynh_feldt < 0.05, within.p < 0.05],
             "one-way": [paper.p is not None and paper.p < 0.05],
-            "bound": [lower_bound(fit, 4, 0.95, Prior()) <= true[4]] if bounds else [np.nan],
+            "bound": [(low := lower_bound(fit, 4, 0.95, Prior())) is None or low <= true[4]] if bounds else [np.nan],
         })  # fmt: skip
     return {key: np.mean([row[key] for row in rows], axis=0).round(4).tolist() for key in rows[0]}
 

@@ -18,7 +18,7 @@ from enum import StrEnum
 from statistics import NormalDist
 
 import numpy as np
-from scipy.special import erfcx, log_ndtr, ndtri_exp
+from scipy.special import erfcx, log_ndtr, ndtr, ndtri_exp
 
 from equalizer.signals.signal import FloatArray
 
@@ -53,6 +53,13 @@ def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, 
     q = -ndtri_exp(log_rest - math.log(2.0))
     mills = math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2.0))
     return q, -mills * h1, mills * (q * mills - 1.0) * h1**2 - mills * h2
+
+
+def share_right(evidence: FloatArray, lapse: float) -> FloatArray:
+    """P(right) in the shape of evidence, the mean q(t) - side * criterion in units of d'; half of all lapses are right
+    by chance."""
+    share: FloatArray = lapse + (1.0 - 2.0 * lapse) * ndtr(evidence)
+    return share
 
 
 def _log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:

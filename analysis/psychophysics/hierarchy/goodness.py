@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, sensitivity
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, sensitivity, share_right
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
@@ -58,5 +57,4 @@ def predicted_shares(fit: HierarchicalFit) -> FloatArray:
     person = cells.person
     pace = np.exp(fit.latent[person, k]) * NEPER_PER_DB
     t = AT_THRESHOLD[fit.family] + pace * (cells.level_db - fit.latent[:, :k].ravel()[cells.run])
-    sure: FloatArray = ndtr(sensitivity(t, fit.family)[0] - cells.side * fit.latent[person, k + 1])
-    return fit.lapse + (1.0 - 2.0 * fit.lapse) * sure
+    return share_right(sensitivity(t, fit.family)[0] - cells.side * fit.latent[person, k + 1], fit.lapse)

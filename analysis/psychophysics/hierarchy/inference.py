@@ -21,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 BOUND_ROOT, BOUND_STEPS = 0.03, 8
 """A bound is found when its likelihood root, some 1.8, is met this closely: 95 % is then 94.8 to 95.2 %. The steps end
 a search on a likelihood that is no line at all, on the safe side."""
-FAR_DB = 40.0
+FAR_DB = 32.0
 """No bound is looked for further below the estimate than this."""
 
 
@@ -31,7 +31,8 @@ class MedianThreshold:
 
     frequency_hz: float
     db: float
-    lower_db: float
+    lower_db: float | None
+    """None: the answers do not contradict a median `FAR_DB` below the estimate."""
     upper_db: float | None
     """None where the median is above the cap: then lower_db is a one-sided bound, and no size is known."""
     above_cap: bool
@@ -41,8 +42,8 @@ class MedianThreshold:
         return float(10.0 ** (self.db / 20.0))
 
     @property
-    def lower_n(self) -> float:
-        return float(10.0 ** (self.lower_db / 20.0))
+    def lower_n(self) -> float | None:
+        return None if self.lower_db is None else float(10.0 ** (self.lower_db / 20.0))
 
     @property
     def upper_n(self) -> float | None:
@@ -87,8 +88,11 @@ def median_thresholds(
     return tuple(medians)
 
 
-def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prior) -> float:
-    """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's."""
+def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prior) -> float | None:
+    """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's.
+
+    None where no bound is found within `FAR_DB` below the estimate.
+    """
     objective = Objective(fit.answers, fit.family, prior)
     best = objective(fit.numbers)[0]
     wanted = float(student.ppf(confidence, fit.answers.persons - 1))
@@ -106,7 +110,7 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
     while (far_root := root(far)) < wanted:
         near, near_root, far = far, far_root, 2.0 * far
         if far > FAR_DB:
-            return float(fit.numbers[place] - FAR_DB)
+            return None
     for _ in range(BOUND_STEPS):
         middle = near + (far - near) * (wanted - near_root) / (far_root - near_root)
         if abs((middle_root := root(middle)) - wanted) < BOUND_ROOT:

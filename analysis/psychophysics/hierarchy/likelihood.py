@@ -9,10 +9,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
 from equalizer.signals.signal import FloatArray
 
 
@@ -113,12 +112,12 @@ class _Evidence:
     """Per cell, all by the mean of the evidence a: probabilities and their derivatives (m,)."""
 
     def __init__(self, a: FloatArray, right: FloatArray, wrong: FloatArray, lapse: float) -> None:
-        sure, density = ndtr(a), np.exp(-(a**2) / 2) / math.sqrt(2.0 * math.pi)
-        attentive = 1.0 - 2.0 * lapse
-        self.p = lapse + attentive * sure
+        density, attentive = np.exp(-(a**2) / 2) / math.sqrt(2.0 * math.pi), 1.0 - 2.0 * lapse
+        self.p = share_right(a, lapse)
         self.rest = 1.0 - self.p
         self.p1 = attentive * density
-        self.p_by_lapse, self.p1_by_lapse = 1.0 - 2.0 * sure, -2.0 * density
+        # 1 - 2 Phi(a), because 1 - 2 p = (1 - 2 lapse) (1 - 2 Phi(a)).
+        self.p_by_lapse, self.p1_by_lapse = (1.0 - 2.0 * self.p) / attentive, -2.0 * density
         self.value = right * np.log(self.p) + wrong * np.log(self.rest)
         self.score = right / self.p - wrong / self.rest
         self.score_by_p = -right / self.p**2 - wrong / self.rest**2

@@ -86,7 +86,7 @@ def primary_analysis(
         limit=direction_limit(frequencies, pseudo, cap_db, confidence),
         persons=(persons := _persons(fit, cap_db)),
         runs=run_likelihoods(
-            answers, [(one.slope, one.criterion) for one in persons], fit.lapse, cap_db, family, confidence
+            answers, [(person.slope, person.criterion) for person in persons], fit.lapse, cap_db, family, confidence
         ),
         person_sd_db=float(sds[0]),
         frequency_sd_db=float(sds[1]),

@@ -3,6 +3,9 @@
 One run of some 60 trials does not tell a slope: slope, criterion and lapse rate are the person's from the model of all
 answers. The threshold is the run's alone, not drawn towards anything, and so is the interval.
 
+A run with only right answers has no most probable threshold: the lower, the more probable. It gets no size and only an
+upper bound, as a run whose most probable threshold is above the cap gets only a lower one.
+
 Source: S. S. Wilks, Ann. Math. Stat. 9 (1938), 60-62 (half the chi-squared quantile below the highest log-likelihood).
 """
 
@@ -11,15 +14,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
 from equalizer.signals.signal import FloatArray
 
 GRID_DB, BEYOND_DB = 0.1, 30.0
-"""Thresholds are looked for in such steps, so far beyond the levels played on both sides."""
+"""Thresholds are looked for in such steps, so far below the levels played and so far above them and the cap."""
+SAME_HEIGHT = 1e-9
+"""Log-likelihoods closer than this differ by rounding alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +35,15 @@ class RunLikelihood:
     trials: int
     """All runs of the person at this frequency together."""
     db: float | None
-    """None where the most probable threshold is above the cap: then lower_db is a one-sided bound."""
+    """None where the most probable threshold is above the cap: then lower_db is a one-sided bound. None, too, where
+    `below` is True: then upper_db is one."""
     lower_db: float | None
     """None: no lower end within 30 dB below the levels played."""
     upper_db: float | None
     """None: no upper end; the answers do not contradict a participant who feels no direction at all."""
+    below: bool
+    """True where no threshold within 30 dB below the levels played is more probable than a lower one, as after right
+    answers only."""
 
 
 def run_likelihoods(
@@ -51,7 +59,7 @@ def run_likelihoods(
     found = []
     for run in np.unique(answers.run):
         person, place = divmod(int(run), k)
-        grid, height = _likelihood(answers, int(run), people[person], lapse, family)
+        grid, height = _likelihood(answers, int(run), people[person], lapse, cap_db, family)
         trials = int((answers.right + answers.wrong)[answers.run == run].sum())
         ends = _ends(grid, height, cap_db, confidence)
         found.append(RunLikelihood(answers.subjects[person], answers.frequencies_hz[place], trials, *ends))
@@ -59,28 +67,30 @@ def run_likelihoods(
 
 
 def _likelihood(
-    answers: Answers, run: int, person: tuple[float, float], lapse: float, family: Family
+    answers: Answers, run: int, person: tuple[float, float], lapse: float, cap_db: float, family: Family
 ) -> tuple[FloatArray, FloatArray]:
     """Thresholds (g,) in dB, and the log-likelihood at each."""
     cells = answers.run == run
     level = answers.level_db[cells]
-    grid = np.arange(level.min() - BEYOND_DB, level.max() + BEYOND_DB, GRID_DB)
+    grid = np.arange(level.min() - BEYOND_DB, max(level.max(), cap_db) + BEYOND_DB, GRID_DB)
     t = AT_THRESHOLD[family] + person[0] * NEPER_PER_DB * (level[None, :] - grid[:, None])
-    p = lapse + (1.0 - 2.0 * lapse) * ndtr(sensitivity(t, family)[0] - answers.side[cells] * person[1])
+    p = share_right(sensitivity(t, family)[0] - answers.side[cells] * person[1], lapse)
     return grid, np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells]
 
 
 def _ends(
     grid: FloatArray, height: FloatArray, cap_db: float, confidence: float
-) -> tuple[float | None, float | None, float | None]:
-    """Most probable threshold, lower and upper end."""
+) -> tuple[float | None, float | None, float | None, bool]:
+    """Most probable threshold, lower and upper end, and whether it is below what was looked at."""
     best = float(grid[height.argmax()])
-    above = best > cap_db
-    drop = norm.ppf(confidence) ** 2 / 2 if above else chi2.ppf(confidence, 1) / 2
+    below, above = bool(height[0] >= height.max() - SAME_HEIGHT), best > cap_db
+    drop = norm.ppf(confidence) ** 2 / 2 if above or below else chi2.ppf(confidence, 1) / 2
     inside = np.flatnonzero(height >= height.max() - drop)
     lower = float(grid[inside[0]]) if inside[0] > 0 else None
     upper = float(grid[inside[-1]]) if inside[-1] < len(grid) - 1 else None
-    return (None, lower, None) if above else (best, lower, upper)
+    if below:
+        return None, None, upper, True
+    return (None, lower, None, False) if above else (best, lower, upper, False)
 
 
 def newton_or_none(db: float | None) -> float | None:

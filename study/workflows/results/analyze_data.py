@@ -10,7 +10,7 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
-from analysis.reports.primary_tables import limit_words
+from analysis.reports.primary_tables import interval_words, limit_words
 from analysis.reports.study_report import render_study_report
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -93,7 +93,8 @@ def _primary_lines(analysis: StudyAnalysis) -> list[str]:
     lines = [f"{'frequency':>10}  {'median':>10}  {'95 % interval, all answers in one model':>10}"]
     for median in analysis.primary.medians:
         size = f"{median.newton:.3f} N" if median.upper_n is not None else "above cap"
-        end = f"{median.lower_n:.3f} to {median.upper_n:.3f} N" if median.upper_n else f"above {median.lower_n:.3f} N"
+        unit = " N" if median.lower_n is not None else ""
+        end = interval_words(median.lower_n, median.upper_n, 3) + unit
         lines.append(f"{median.frequency_hz:7g} Hz  {size:>10}  {end}")
     return [*lines, limit_words(analysis.primary), analysis.compared]
 

@@ -6,9 +6,10 @@ from dataclasses import replace
 import pytest
 
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
-from analysis.psychophysics.two_analyses import analyses_compared, declared_words
+from analysis.psychophysics.two_analyses import SIMULATED_RULE, analyses_compared, declared_words
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
+from study.workflows.results.analyze_data import text_table
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +26,25 @@ def test_what_the_cap_hides_is_said(analysis):
     assert "their interval covers 3 %" in analysis.compared
 
 
+def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis):
+    parts = analysis.primary, analysis.mean_contrasts, analysis.comparisons, analysis.table
+    assert analyses_compared(*parts, SIMULATED_RULE) == analysis.compared
+    for other in (replace(SIMULATED_RULE, cap_n=2.0), replace(SIMULATED_RULE, down_after_right=2)):
+        said = analyses_compared(*parts, other)
+        assert "Near the cap the published intervals do not hold" in said
+        assert "covers 3 %" not in said and "0.4 %" not in said
+
+
+def test_a_missing_lower_bound_is_said_on_the_page_and_in_the_terminal(analysis):
+    *low, high = analysis.primary.medians
+    assert high.above_cap
+    primary = replace(analysis.primary, medians=(*low, replace(high, lower_db=None)))
+    unbounded = replace(analysis, primary=primary)
+    for shown in (lambda a: render_study_report(a, (), {}, "2026-01-02T03:04:05Z"), lambda a: "".join(text_table(a))):
+        assert "no lower bound" in shown(unbounded)
+        assert "no lower bound" not in shown(analysis)
+
+
 def test_far_below_the_cap_the_two_agree(simulate_study, protocol):
     low = analyse_study(simulate_study(true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
     assert "agree within 1 dB" in low.compared
@@ -35,7 +55,7 @@ def test_one_participant_leaves_the_published_analysis_alone(simulate_study, pro
     alone = analyse_study(simulate_study(subjects=1), protocol)
     assert alone.primary is None
     assert "stands alone" in alone.compared
-    assert analyses_compared(None, (), alone.comparisons, alone.table) == alone.compared
+    assert analyses_compared(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
 
 
 def test_what_was_declared_and_what_was_not_is_said():

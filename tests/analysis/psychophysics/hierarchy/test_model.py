@@ -6,7 +6,7 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from analysis.psychophysics.hierarchy.answers import count_answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, TARGET, Family, sensitivity
+from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, TARGET, Family, sensitivity, share_right
 from analysis.psychophysics.hierarchy.fit import Objective, Prior
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -34,6 +34,10 @@ def test_a_curve_passes_through_the_target_and_has_the_stated_slopes(family):
     np.testing.assert_allclose(q2, (sensitivity(t + 1e-5, family)[1] - sensitivity(t - 1e-5, family)[1]) / 2e-5, 1e-4)
     assert norm.cdf(sensitivity(np.array([AT_THRESHOLD[family]]), family)[0][0]) == pytest.approx(TARGET)
     assert all(np.isfinite(part).all() for part in sensitivity(np.array([-700.0, 700.0]), family))
+
+
+def test_a_share_runs_from_lapse_to_lapse():
+    np.testing.assert_allclose(share_right(np.array([-40.0, 0.0, 1.0, 40.0]), 0.04), [0.04, 0.5, 0.8140370, 0.96], 1e-6)
 
 
 def test_the_likelihood_is_the_sum_over_trials():

@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
-from analysis.psychophysics.hierarchy.answers import count_answers
+from analysis.psychophysics.hierarchy.answers import count_answers, tally
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.inference import direction_limit, pseudo_thresholds
+from analysis.psychophysics.hierarchy.fit import Prior, fit_hierarchy
+from analysis.psychophysics.hierarchy.inference import (
+    direction_limit,
+    lower_bound,
+    median_thresholds,
+    pseudo_thresholds,
+)
 from analysis.psychophysics.hierarchy.primary import primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulated_run
@@ -64,6 +69,17 @@ def test_above_the_cap_there_is_a_bound_and_no_size():
     assert high.above_cap and high.upper_db is None and high.upper_n is None
     assert high.lower_db < 20 * np.log10(8.0)
     assert high.lower_n > 2.0
+
+
+def test_answers_that_contradict_nothing_give_no_lower_bound():
+    """Two people with one wrong answer each at 45 Hz: even a median of 0.05 N may have given them."""
+    level = np.concatenate([np.tile([0.0, -3.0, -6.0, -9.0], 6), [9.0, 9.0]])
+    right = np.concatenate([np.tile([True, True, True, False], 6), [False, False]])
+    run = np.concatenate([np.repeat([0, 2], 12), [1, 3]])
+    fit = fit_hierarchy(tally(("a", "b"), (5.0, 45.0), run, level, np.tile([1.0, -1.0], 13), right))
+    assert lower_bound(fit, 1, 0.95, Prior()) is None
+    median = median_thresholds(fit, fit.means_db[1] - 0.1, 0.95)[1]
+    assert median.above_cap and median.lower_db is None and median.lower_n is None
 
 
 def test_guessers_leave_everything_finite():

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from analysis.psychophysics.hierarchy.answers import tally
+from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.run_likelihood import newton_or_none, run_likelihoods
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
+from analysis.reports.primary_tables import run_words
 from tests.analysis.conftest import PUBLISHED
 
 CAP_DB = 20 * np.log10(3.0)
@@ -38,3 +41,44 @@ def test_a_guesser_has_no_upper_end_and_newtons_are_of_decibels():
     assert sum(r.upper_db is None for r in found) >= 19
     assert newton_or_none(20.0) == pytest.approx(10.0)
     assert newton_or_none(None) is None
+
+
+def one_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
+    levels_db, n = 20 * np.log10(np.asarray(levels_n)), len(levels_n)
+    side = np.where(np.arange(n) % 2, 1.0, -1.0)
+    answers = tally(("a",), (35.0,), np.zeros(n, dtype=np.intp), levels_db, side, np.asarray(right))
+    (run,) = run_likelihoods(answers, [(slope, 0.1)], 0.02, CAP_DB, family)
+    return run
+
+
+@pytest.mark.parametrize(("family", "slope"), [(Family.WEIBULL, 2.0), (Family.LOGISTIC, 1.0), (Family.GAUSS, 1.9)])
+def test_right_answers_alone_give_an_upper_bound_and_no_size(family, slope):
+    levels = np.repeat([1.0, 0.8, 0.5, 0.4], 3)
+    run = one_run(levels, np.ones(12, dtype=bool), family, slope)
+    assert run.below and run.db is None and run.lower_db is None
+    more = one_run(np.tile(levels, 2), np.ones(24, dtype=bool), family, slope)
+    assert -25.0 < more.upper_db < run.upper_db < 0.0
+    size, interval = run_words(run)
+    assert size == "below the levels played" and interval.startswith("below 0.")
+
+
+def test_an_upper_bound_after_right_answers_alone_excludes_what_it_should():
+    """At the bound, so many right answers have the probability exp(-1.35) of the highest possible: one-sided 95 %."""
+    run = one_run(np.full(10, 0.5), np.ones(10, dtype=bool))
+    t = np.log(-np.log(2 - 2 * 0.5 ** (1 / 3))) + 2.0 * np.log(0.5 / newton_or_none(run.upper_db))
+    share = 0.02 + 0.96 * (1.0 - 0.5 * np.exp(-np.exp(t)))
+    assert 10 * np.log(share / 0.98) == pytest.approx(-(1.645**2) / 2, abs=0.1)  # the criterion of 0.1 left out here
+
+
+def test_one_right_answer_bounds_nothing_and_a_wrong_one_ends_the_case():
+    nothing = one_run([1.0], [True])
+    assert nothing.below and nothing.upper_db is None
+    assert run_words(nothing) == ("below the levels played", "–")
+    some = one_run(np.repeat([1.0, 0.5, 0.25], 4), [True] * 8 + [True, False, False, True])
+    assert not some.below and some.db is not None
+
+
+def test_wrong_answers_far_below_the_cap_give_no_size_either():
+    run = one_run(np.full(12, 0.02), np.zeros(12, dtype=bool))
+    assert not run.below and run.db is None and run.lower_db is not None
+    assert run_words(run)[0] == "above the cap"
