@@ -42,7 +42,7 @@ def failed(context: SearchContext, of: Discovered, rivals: Sequence[FittedCandid
 
 
 def _failed(context: SearchContext, of: Discovered, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
-    if not tested_otherwise(context.whole.records):
+    if not held_out_kinds(context.whole.records):
         yield SAME_KIND
     for number, found in enumerate(of.rounds):
         first = found.sums[0]
@@ -96,9 +96,10 @@ def _say_the_same(without: FittedCandidate, law: FittedCandidate, other: FittedC
     """Whether two laws foretell the same of all samples, the sealed ones included: then they are one law, written in
     two ways, as a relaxation by place or by speed."""
     apart = added = 0.0
-    for base, one, two in zip(without.fitted.residuals, law.fitted.residuals, other.fitted.residuals, strict=True):
-        apart += float(np.nansum((one - two) ** 2))
-        added += float(np.nansum((one - base) ** 2))
+    left = without.fitted.residuals, law.fitted.residuals, other.fitted.residuals
+    for base, of_law, of_other in zip(*left, strict=True):
+        apart += float(np.nansum((of_law - of_other) ** 2))
+        added += float(np.nansum((of_law - base) ** 2))
     return apart <= LAW_SAME**2 * added
 
 
@@ -111,17 +112,25 @@ def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
     return excess(law) <= LAW_BEATS * excess(rival)
 
 
-def tested_otherwise(records: Sequence[Observed]) -> tuple[str, ...]:
-    """What sealed stretches are that those are not which laws are found in; none where they are alike."""
+def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
+    """What sealed stretches are that those are not which laws are found in; none where they are alike. A segment of
+    which the end alone is sealed is among both; rest is among neither."""
     found: list[tuple[str, tuple[int, ...], float]] = []
     sealed: list[tuple[str, tuple[int, ...], float]] = []
     for record in records:
         for segment in record.recording.segments:
             part = slice(segment.start, segment.stop)
             told = _told(segment, record.command[part])
-            (sealed if record.test[part].any() else found).append(told)
+            if not told[1]:
+                continue
+            if record.test[part].any():
+                sealed.append(told)
+            if (record.fit | record.choose)[part].any():
+                found.append(told)
+    if not found:
+        return ()
     kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
-    loudest = max((level for _, _, level in found), default=np.inf)
+    loudest = max(level for _, _, level in found)
     said = [
         (any(level > 1.05 * loudest for _, _, level in sealed), "louder commands"),
         (any(driven not in axes and len(driven) > 1 for _, driven, _ in sealed), "axes driven together"),
@@ -140,7 +149,7 @@ def proved(context: SearchContext, found: Explanation, rivals: Sequence[FittedCa
     sentence or two."""
     whole, after = context.whole, found.after
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
-    where = listed(tested_otherwise(whole.records))
+    where = listed(held_out_kinds(whole.records))
     said = f"The formula was tested on {where}, which nothing was fitted to: {_left(context, found, after)}"
     closest = min((_remains(context, found, rival) for rival in rivals), default=None)
     if closest is not None:

@@ -221,4 +221,4 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     return tick, record
 
 
-tick, record = _entry_points(fingerprint(Path(__file__).parent))
+tick, record = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))

@@ -41,5 +41,5 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
     return sense, advance, pose
 
 
-sense, advance, pose = _entry_points(fingerprint(Path(__file__).parent))
+sense, advance, pose = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
 """`sense` and `advance` as `study.devices.rig.CompiledRig` wants them; `pose` is `inverse_kinematics`."""

@@ -1,0 +1,44 @@
+"""Whether what was held out differs in kind from what a law was fitted to, by the split that recordings get."""
+
+import numpy as np
+
+from analysis.diagnosis.data.observed import observed
+from analysis.diagnosis.discovery.proof import held_out_kinds
+from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.signal import Signal
+
+SAMPLES = 1000
+
+
+def said(*segments: tuple[str, float, tuple[int, ...], str]) -> tuple[str, ...]:
+    """Of a recording of equal segments: (kind, peak, driven axes, role)."""
+    random = np.random.default_rng(1)
+    command = np.zeros((SAMPLES * len(segments), 2))
+    told = []
+    for number, (kind, peak, axes, role) in enumerate(segments):
+        start = number * SAMPLES
+        command[start : start + SAMPLES, axes] = peak * random.uniform(-1, 1, (SAMPLES, len(axes)))
+        told.append(Segment(start, start + SAMPLES, kind, peak, 0, role))
+    force = Signal(command, 1000.0, "force", "N", ("fx", "fy"))
+    position = Signal(np.cumsum(command, axis=0), 1000.0, "position", "m", ("x", "y"))
+    return held_out_kinds([observed(Recording("rig", force, position, segments=tuple(told)), 2)])
+
+
+def test_ends_of_the_same_segments_are_no_other_kind():
+    assert said(("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
+    assert said(("multisine", 1.0, (0,), "")) == ()
+
+
+def test_rest_tells_nothing():
+    assert said(("rest", 0.0, (), ""), ("multisine", 1.0, (0,), ""), ("multisine", 2.0, (0,), "")) == ()
+
+
+def test_louder_joint_and_other_commands_are_told():
+    fitted = ("multisine", 1.0, (0,), "fit"), ("multisine", 1.0, (1,), "fit")
+    assert said(*fitted, ("multisine", 3.0, (0,), "test")) == ("louder commands",)
+    assert "axes driven together" in said(*fitted, ("multisine", 0.9, (0, 1), "test"))
+    assert "another kind of command" in said(*fitted, ("sweep", 0.9, (0,), "test"))
+
+
+def test_without_anything_to_fit_nothing_is_told():
+    assert said(("sweep", 1.0, (0,), "test")) == ()
