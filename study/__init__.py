@@ -3,9 +3,10 @@
 Layers, each knowing only those after it: `cli`, `tui`, `workflows`, then `devices`, `store` and `participants`
 beside each other, then `session`, which is pure, then `errors`.
 
-Read in this order: `session.events` (the facts), `session.state` (their fold), `session.machine` (what is next),
-`workflows.run_session` and `workflows.present_trial` (doing it), `devices.device` (the port) and `devices.govern`
-(what keeps the force within its limits), `store.event_log` (on the disk before it is acted on).
+Read in this order: `session.facts.events` (the facts), `session.state.fold` (what they come to),
+`session.state.machine` (what is next), `workflows.session.run_session` and `workflows.trial.present_trial` (doing it),
+`devices.device` (the port) and `devices.governor.govern` (what keeps the force within its limits),
+`store.sessions.event_log` (on the disk before it is acted on).
 
 Decisions:
 

@@ -87,7 +87,7 @@ CLOCK_LEAST_SHARE = 1e-3  # of the misfit that a trial of clock drift must take
 
 # What of a periodic recording laws are compared on first (`short_recordings`).
 RUN_IN_CONSTANTS = 7.0  # time constants of the model's run-in; principle: exp(-7) is below a thousandth
-BRIEF_SHARE = 0.7  # of the samples, above which the whole is simulated at once; by hand
+SHORT_SHARE = 0.7  # of the samples, above which the whole is simulated at once; by hand
 
 # Whether a further effect is looked for, and added (`explain`). By hand.
 MOST_EFFECTS = 3
@@ -126,11 +126,11 @@ SEALED_TOO_SMALL = 0.05  # unless it is smaller there than this
 SEALED_ALONE_ERROR, SEALED_ALONE_TIMES = 1.25, 1.5  # on sealed samples, and over that on all others: half are opened
 
 # Faults that a recording shows by itself (`model_free_faults`). By hand.
-STEP_FACTOR = 1.5  # times a sound device's steps, from which on steps are others
+STEP_FACTOR = 1.5  # times a reference device's steps, from which on steps are others
 READINGS_LEAST = 8  # readings at a limit, or there twice, that are no chance,
-READINGS_FACTOR = 3.0  # times what a sound device has of them,
+READINGS_FACTOR = 3.0  # times what a device in order has of them,
 READINGS_DEVIATIONS = 5.0  # and by so many standard deviations of such a count
-LEARNED_TOO_MUCH = 0.3  # share of the signal from which what a sound device differs by hides too much
+LEARNED_TOO_MUCH = 0.3  # share of the signal from which what a device in order differs by hides too much
 
 # Rattling play (`impacts`). By hand.
 VARIES_ERROR = 3.0  # rms between periods, over the noise, from which a response is irregular

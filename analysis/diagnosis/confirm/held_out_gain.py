@@ -31,7 +31,7 @@ class HeldOutGain:
 
 
 def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: FittedCandidate) -> HeldOutGain | None:
-    """measure: with the sealed samples, as both fitted_candidates' fits. None where too little is held out."""
+    """measure: with the sealed samples, as both candidates' fits. None where too little is held out."""
     left, right = (_powers(measure, each) for each in (without, with_it))
     if len(left) < LEAST_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
         return None

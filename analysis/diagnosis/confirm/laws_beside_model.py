@@ -117,7 +117,7 @@ def _told_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
 
 
 def _unconfirmed(seen: Searched, why_not: str) -> tuple[Unconfirmed, ...]:
-    """The best fitted_candidates of the round in which the search ended, the largest gain first."""
+    """The best candidates of the round in which the search ended, the largest gain first."""
     rounds = [fitted_candidates for fitted_candidates in seen.found.rounds if fitted_candidates]
     if not rounds:
         return ()

@@ -55,7 +55,12 @@ def has_law(searched: Searched) -> bool:
 def _wanted(searched: Searched) -> bool:
     """Only whole simulations prove a law; where noise alone is left, there is none to be found."""
     context, found = searched.context, searched.found
-    if context.measure.name != "free simulation" or context.sound is not None or context.certain or found.ended_early:
+    if (
+        context.measure.name != "free simulation"
+        or context.references is not None
+        or context.certain
+        or found.ended_early
+    ):
         return False
     left = found.after if searched.judged.named else found.retuned
     sealed = float(np.nanmax(left.score.test, initial=0.0))

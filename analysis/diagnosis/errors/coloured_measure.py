@@ -1,4 +1,4 @@
-"""Error measure with prewhitened residuals: its noise has the spectrum of a sound device's model error."""
+"""Error measure with prewhitened residuals: its noise has the spectrum of a reference device's model error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ class ColouredMeasure:
     colour: WhiteningFilter
     unit: FloatArray
     noise: FloatArray
-    """(c,): rms of a sound device's whitened residual, in each channel's own unit."""
+    """(c,): rms of a reference device's whitened residual, in each channel's own unit."""
     least: float = 0.0
 
     @property

@@ -1,4 +1,4 @@
-"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves of a sound device.
+"""Prewhitening filter: an autoregression of the residual that a re-tuned model leaves of a device in order.
 
 The whitened residual is the one-step prediction error (Yule 1927, Walker 1931): each frequency is weighted by the
 inverse of the residual's spectrum on a device in order.

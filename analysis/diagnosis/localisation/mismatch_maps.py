@@ -59,11 +59,11 @@ def maps_of(
     return Maps({stage: beyond_error(cells[id(fitted)], error) for stage, fitted in stages.items()})
 
 
-def whole_mismatch(measure: ErrorMeasure, stands: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
+def whole_mismatch(measure: ErrorMeasure, score: FitScore, fitted: Fitted) -> tuple[Mismatch, ...]:
     """One row for the worst channel over the whole band, where no place stands out. Its p-value is that of more than
     noise, in the mean over stretches (one-sided t test)."""
     record = measure.records[0].recording
-    errors = np.fmax(np.maximum(stands.fit, stands.choose), stands.test)
+    errors = np.fmax(np.maximum(score.fit, score.choose), score.test)
     worst = int(np.argmax(errors))
     names = (*record.response.channels, *(() if record.position is None else record.position.channels))
     signal = np.sqrt(np.nanmean(measure.records[0].measured[:, worst] ** 2))

@@ -59,9 +59,9 @@ def contrast_of(
     shown = seen_directly(recordings, clean, effects)
     if shown:
         return Contrast(shown[0], None, None, None)
-    faulty, sound = taken_of(recordings), taken_of(clean)
+    faulty, references = taken_of(recordings), taken_of(clean)
     for name, look in ((HUM, hum_of), (STEPS, steps_of), (NOISE, noise_of)):
-        line = look(faulty, sound) if faulty and sound and name not in without else None
+        line = look(faulty, references) if faulty and references and name not in without else None
         if line is not None:
             return Contrast(None, line, None, None)
     found = compared(recordings, clean, without, time_left)

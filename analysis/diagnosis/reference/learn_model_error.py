@@ -1,4 +1,4 @@
-"""The residual of a sound device from its re-tuned model, learned from clean recordings: it counts as noise."""
+"""The residual of a device in order from its re-tuned model, learned from clean recordings: it counts as noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +60,7 @@ class Learned:
     colour: WhiteningFilter
     share: FloatArray
     """(c,): rms of the whitened residual over the signal's; see `_signal`."""
-    sound: ReferenceRecordings
+    references: ReferenceRecordings
 
     def beside(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
         """The error measure of the recordings to diagnose, with this residual as coloured noise."""
@@ -113,7 +113,7 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
         for lesson in lessons
     ]
     share = np.max(shares, axis=0)
-    sound = [
+    learned = [
         reference_recording(
             coloured(floored(lesson.measure, floor), colour, share * lesson.signal),
             lesson.tuning,
@@ -122,7 +122,7 @@ def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) ->
         )
         for lesson in lessons
     ]
-    return Learned(floor, colour, share, ReferenceRecordings(tuple(sound), floor.beyond))
+    return Learned(floor, colour, share, ReferenceRecordings(tuple(learned), floor.beyond))
 
 
 def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
@@ -148,8 +148,8 @@ def _lesson(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: 
 
 def _channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:
     """(c,): the largest over the samples to fit, to choose and to test by."""
-    stands = retuned.score
-    times = np.nanmax(np.maximum([stands.fit, stands.choose, stands.test], 1.0), axis=0)
+    score = retuned.score
+    times = np.nanmax(np.maximum([score.fit, score.choose, score.test], 1.0), axis=0)
     return np.asarray(np.sqrt(times**2 - 1) * measure.noise / np.maximum(_size(measure), np.finfo(float).tiny))
 
 
@@ -170,10 +170,10 @@ def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
     shares = listed([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
     count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
     said = (
-        f"What a sound device differs by from its re-tuned model was learned from {count}: {shares} of the channel's "
-        f"signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise here, more "
-        "of it where in frequency more of it lies. Named is only what explains more of what is diagnosed than "
-        f"{floor.beyond:.2g} times what it explains of a clean recording."
+        f"What a device in order differs by from its re-tuned model was learned from {count}: {shares} of the "
+        f"channel's signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise "
+        "here, more of it where in frequency more of it lies. Named is only what explains more of what is diagnosed "
+        f"than {floor.beyond:.2g} times what it explains of a clean recording."
     )
     if max(floor.channels) <= LEARNED_TOO_MUCH:
         return said

@@ -1,5 +1,5 @@
 """Faults of a converter or a line that a recording shows by itself, without any model: readings that take steps only,
-that stay at a limit, or that are there twice. Recordings of the sound device say what of that is usual.
+that stay at a limit, or that are there twice. Recordings of the device in order say what of that is usual.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ LONG_RUNS = 2.0
 CATCHES_UP = 0.75
 """Times the median step that the one after lost samples must be: a reading that play held goes half of one or less."""
 STRETCHES = 3
-"""Of each sound recording: what is usual in any of them is no fault."""
+"""Of each reference recording: what is usual in any of them is no fault."""
 SAME = 1e-9
 """Share of its largest reading by which a channel's readings at a limit may differ."""
 
@@ -32,9 +32,11 @@ def seen_directly(
     """At most one: rounded readings also repeat and have a largest value. effects: those that may be named."""
     known = {effect.name: effect for effect in effects}
     new = _readings(recordings)
-    sound = [part for recording in clean for part in np.array_split(_readings([recording]), STRETCHES) if len(part)]
+    references = [
+        part for recording in clean for part in np.array_split(_readings([recording]), STRETCHES) if len(part)
+    ]
     for name, look in (("quantization", _steps), ("sensor_clipping", _limit), ("lost_samples", _twice)):
-        found = look(new, sound)
+        found = look(new, references)
         if found is not None:
             return (_claimed(known[name], *found),) if name in known else ()
     return ()
@@ -55,24 +57,24 @@ def _readings(recordings: Sequence[Recording]) -> FloatArray:
     return np.asarray(samples[np.isfinite(samples).all(axis=1)])
 
 
-def _steps(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+def _steps(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
     found = {}
     for c in range(new.shape[1]):
         step = lattice_step(new[:, c])
-        if step is not None and all(step > STEP_FACTOR * own_step(readings[:, c], step) for readings in sound):
+        if step is not None and all(step > STEP_FACTOR * own_step(readings[:, c], step) for readings in references):
             found[c] = step
     alike = bool(found) and min(found.values()) > (1 - ALIKE) * max(found.values())
     return _where(found, alike and len(found) == new.shape[1], new.shape[1], "step")
 
 
-def _limit(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+def _limit(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
     """A limit is reached on both sides where both are asked for, and holds more readings than the place below it."""
     found = {}
     for c in range(new.shape[1]):
         limit, count = _at_the_top(new[:, c])
-        usual = max(_at_the_top(readings[:, c])[1] / len(readings) for readings in sound) * len(new)
-        beyond = max(float(np.abs(readings[:, c]).max()) for readings in sound)
-        elsewhere = max(_elsewhere(readings[:, c]) / len(readings) for readings in sound) * len(new)
+        usual = max(_at_the_top(readings[:, c])[1] / len(readings) for readings in references) * len(new)
+        beyond = max(float(np.abs(readings[:, c]).max()) for readings in references)
+        elsewhere = max(_elsewhere(readings[:, c]) / len(readings) for readings in references) * len(new)
         if limit < beyond and _unusual(count, usual) and not _unusual(_elsewhere(new[:, c]), elsewhere):
             found[c] = limit
     within = bool(found) and bool(np.all(np.abs(new) <= max(found.values()) * (1 + SAME)))
@@ -95,10 +97,10 @@ def _at_the_top(values: FloatArray) -> tuple[float, int]:
     return limit, int(np.count_nonzero(there)) - below
 
 
-def _twice(new: FloatArray, sound: Sequence[FloatArray]) -> Found | None:
+def _twice(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
     """Repeated samples that are scattered: a sensor at rest for a while has not lost samples."""
     repeated = _repeats(new)
-    usual = max(float(_begun(_repeats(readings)).mean()) for readings in sound) * len(repeated)
+    usual = max(float(_begun(_repeats(readings)).mean()) for readings in references) * len(repeated)
     begun = int(_begun(repeated).sum())
     if not _unusual(begun, usual) or repeated.sum() > LONG_RUNS * begun or not _catches_up(new, repeated):
         return None

@@ -21,10 +21,10 @@ from equalizer.effects.effect import Effect
 def searched_beside_reference(
     context: SearchContext, learned: Learned, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Searched:
-    """context: as without sound recordings, but for what is certain. What is found has its residuals by the context's
-    own measure, with what a sound device differs by counted as noise.
+    """context: as without reference recordings, but for what is certain. What is found has its residuals by its own
+    measure, with what a device in order differs by counted as noise.
 
-    Where much more is left than on a sound device, its colour is of little use: then what is simply larger than that
+    Where much more is left than on a device in order, its colour is of little use: then what is simply larger than that
     is looked for, too, and whichever leaves less stands.
     """
     fine = _by_contrast(context, learned, catalogue, progress, time_left)
@@ -57,7 +57,7 @@ def _by_contrast(
 ) -> Searched:
     plain = floored(context.whole, learned.floor)
     whole = learned.beside(plain, context.tuning.model)
-    beside = replace(context, measure=whole.shortened(), whole=whole, sound=learned.sound)
+    beside = replace(context, measure=whole.shortened(), whole=whole, references=learned.references)
     seen = searched(beside, catalogue, progress, time_left)
     plain = plain.with_records(seen.context.whole.records)
     back = replace(context, measure=plain.shortened(), whole=plain)
@@ -69,7 +69,7 @@ def _by_contrast(
 
 
 def _judged(found: Explanation, named: bool, beyond: float) -> Judgement:
-    """The bars are raised by the factor `beyond`, because a sound device differs from day to day, too."""
+    """The bars are raised by the factor `beyond`, because a device in order differs from day to day, too."""
     if named:
         return Judgement(
             "explained" if found.after.score.worst_channel <= beyond * EXPLAINED_ERROR else "partly_explained", True

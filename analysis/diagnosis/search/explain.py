@@ -46,7 +46,8 @@ def fits_on_short_recordings(
     timeless: Sequence[Hypothesis],
     timed: Sequence[Hypothesis],
 ) -> list[Fitted]:
-    """On all samples, the best first. timed: what hangs on when a sample was taken, which the brief cannot judge."""
+    """On all samples, the best first. timed: what hangs on when a sample was taken, which short recordings cannot
+    judge."""
     short, guard = short_form.context, context.guard
     there = evaluated(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis)
@@ -62,7 +63,7 @@ def fits_on_short_recordings(
         repeats = short_form.repeated(known)
         screened = screen(context.measure, context.tuning, base, repeats, timed, guard.over(context.map_, SCREENING))
         fits += first_fits(context, base, repeats, _promising(base, fits, screened))
-    # A law that the brief leaves open may run away on the whole.
+    # A law that the short recordings leave open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
 
 
@@ -74,7 +75,7 @@ def _promising(base: Fitted, fits: Sequence[Fitted], screened: Sequence[Screened
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Statistic:
-    """What fitted_candidates were compared by where waveforms cannot be predicted: a statistic of the response."""
+    """What candidates were compared by where waveforms cannot be predicted: a statistic of the response."""
 
     words: str
     chance: FloatArray
@@ -92,13 +93,13 @@ class Explanation:
     after: FittedCandidate
     """and with what was found; the same as re-tuned where nothing was."""
     rounds: tuple[tuple[FittedCandidate, ...], ...]
-    """The fitted_candidates for the first effect, the second, …; the best first. The last may have brought nothing."""
+    """The candidates for the first effect, the second, …; the best first. The last may have brought nothing."""
     steps: tuple[FittedCandidate, ...]
     """What stood after each effect that was added."""
     statistic: Statistic | None = None
     """None where samples were compared, in units of their noise."""
     ended_early: bool = False
-    """TimeBudget ran out before the search was done."""
+    """The time limit was reached before the search was done."""
     barred: str = ""
     """An effect that was not to be named, where nothing but refinements of it explains as much."""
     undetermined: tuple[str, ...] = ()
@@ -120,7 +121,7 @@ def explain(
     retuned = _retuned_from(context, before)
     base = context.candidate(retuned)
     confirmed = context.confirmed(base)
-    surprised = context.sound is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > SEALED_SURPRISE)
+    surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > SEALED_SURPRISE)
     rounds: list[tuple[FittedCandidate, ...]] = []
     steps: list[FittedCandidate] = []
     barred, ended_early = "", False
@@ -129,7 +130,7 @@ def explain(
         base = _with(context, base, certain)
         rounds.append((base,))
         steps.append(base)
-    more = SEARCH_ON * (1.0 if context.sound is None else context.sound.beyond)
+    more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
     while (
         not context.certain
         and len(rounds) < MOST_EFFECTS
@@ -222,7 +223,7 @@ def _suggested(
         for hypothesis in candidates(catalogue, evidence, context.guard.over(context.map_, STARTING))
         if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
     ]
-    if context.sound is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
+    if context.references is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
         suggested += context.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
     return suggested
 

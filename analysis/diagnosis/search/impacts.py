@@ -112,14 +112,14 @@ def _apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Comparison:
-    """Compares fitted_candidates by band power on all samples, the sealed ones included."""
+    """Compares candidates by band power on all samples, the sealed ones included."""
 
     context: SearchContext
     power: BandPower
     chance: FloatArray
     """(c,)"""
 
-    def stands(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
+    def scored(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
         whole = evaluated(self.context.whole, self.context.tuning, deviations, hypothesis)
         off = self.power.misfits(self.power.measured - self.power.predicted(whole.residuals))
         return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
@@ -133,15 +133,15 @@ def _judged(
     context: SearchContext, found: Explanation, best: Foreseen, others: Sequence[Hypothesis]
 ) -> Explanation | None:
     comparison = _comparison(context, best)
-    named = comparison.stands(best.deviations, best.hypothesis)
+    named = comparison.scored(best.deviations, best.hypothesis)
     given = np.zeros_like(best.deviations)
-    before = comparison.stands(given, NOTHING)
-    linear = [before, *(comparison.stands(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
+    before = comparison.scored(given, NOTHING)
+    linear = [before, *(comparison.scored(at, NOTHING) for at in (found.retuned.fitted.deviations, best.deviations))]
     retuned = min(linear, key=lambda candidate: candidate.score.mean_log_error)
-    rivals = [comparison.stands(given, rival) for rival in others]
+    rivals = [comparison.scored(given, rival) for rival in others]
     earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
     rivals += [
-        comparison.stands(candidate.fitted.deviations, candidate.fitted.hypothesis)
+        comparison.scored(candidate.fitted.deviations, candidate.fitted.hypothesis)
         for candidate in earlier
         if candidate.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
     ]

@@ -55,7 +55,7 @@ class ReferenceRecording:
 class ReferenceRecordings:
     each: tuple[ReferenceRecording, ...]
     beyond: float
-    """A gain counts by what is more than so many times that on the sound ones: the fewer, the more."""
+    """A gain counts by what is more than so many times that on the reference ones: the fewer, the more."""
     seen: dict[object, FloatArray] = field(default_factory=dict)
 
     def gained(self, hypothesis: Hypothesis) -> FloatArray:
@@ -63,7 +63,7 @@ class ReferenceRecordings:
         if not hypothesis.claims:
             return np.zeros(1)
         if hypothesis.key not in self.seen:
-            gains = np.max([sound.gained(hypothesis) for sound in self.each], axis=0)
+            gains = np.max([each.gained(hypothesis) for each in self.each], axis=0)
             self.seen[hypothesis.key] = self.beyond * np.maximum(gains, 0.0)
         return self.seen[hypothesis.key]
 

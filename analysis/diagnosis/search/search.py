@@ -26,7 +26,7 @@ def pruned(context: SearchContext, found: Explanation, time_left: TimeBudget) ->
         return found
     if len(found.steps) == 2 and time_left():
         found = _without_former(context, found)
-    if context.sound is None:
+    if context.references is None:
         found = _without_little(context, found)
     return identified(context, found, time_left)
 

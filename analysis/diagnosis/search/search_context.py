@@ -51,7 +51,7 @@ class SearchContext:
     barred: frozenset[str] = frozenset()
     """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
     only where its refinement shows, and without it that law is the barred one."""
-    sound: ReferenceRecordings | None = None
+    references: ReferenceRecordings | None = None
     """Clean recordings: what a candidate gains on them is counted against it."""
     certain: tuple[Hypothesis, ...] = ()
     """Faults that a recording shows by itself (`model_free_faults`): added without a search."""
@@ -74,9 +74,9 @@ class SearchContext:
 
     def _scored(self, fitted: Fitted, measure: ErrorMeasure) -> FittedCandidate:
         score = fit_score(measure, fitted.residuals)
-        if self.sound is None:
+        if self.references is None:
             return FittedCandidate(fitted, score)
-        gained = self.sound.gained(fitted.hypothesis)
+        gained = self.references.gained(fitted.hypothesis)
         return FittedCandidate(fitted, score.larger(np.exp(gained)), 2 * float(gained.mean()))
 
 

@@ -22,7 +22,7 @@ from analysis.diagnosis.forces.needed_force import band_motion
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.settings import BRIEF_SHARE, RUN_IN_CONSTANTS
+from analysis.diagnosis.settings import RUN_IN_CONSTANTS, SHORT_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -82,14 +82,14 @@ def short_recordings_of(context: SearchContext, held: Hypothesis) -> ShortRecord
     """None where little would be saved, where what is held hangs on when a sample was taken, and where the first
     record, of which evidence is taken, has nothing to fit."""
     measure = context.measure
-    if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.sound is not None:
+    if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
         return None
     if any(placed.effect.of_time for placed in (*measure.known, *held.placed())):
         return None
     around = _around(measure, context.tuning.model)
     cut = [_cut(record, around) for record in measure.records]
     before = sum(len(record.command) for record in measure.records)
-    if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > BRIEF_SHARE * before:
+    if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > SHORT_SHARE * before:
         return None
     short = _in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _spliced(measure, cut)
     if short is None:

@@ -40,6 +40,8 @@ def scatter_over_lines(response: ComplexArray) -> FloatArray:
 
 def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
+    if not len(power):
+        return power
     lines = max(1, min(lines, len(power)))
     around = np.pad(power, [(lines // 2, (lines - 1) // 2), *[(0, 0)] * (power.ndim - 1)], mode="edge")
     # No running sum: where strong lines have left one, it keeps their rounding.

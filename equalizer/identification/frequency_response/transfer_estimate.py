@@ -139,14 +139,14 @@ def _check_alike(recordings: Sequence[Recording]) -> None:
         raise TransferEstimateError("there is no recording to estimate from")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
-        for what, each, two in (
+        for what, wanted, found in (
             ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
             ("command channels", _channels(first.command), _channels(other.command)),
             ("response channels", _channels(first.response), _channels(other.response)),
         ):
-            if each != two:
+            if wanted != found:
                 raise TransferEstimateError(
-                    f"recording {number} has the {what} {two}, but the first has {each}; estimate them apart"
+                    f"recording {number} has the {what} {found}, but the first has {wanted}; estimate them apart"
                 )
 
 

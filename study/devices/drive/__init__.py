@@ -1,6 +1,7 @@
 """The loop that plays forces once a millisecond, and what it saw.
 
-`realtime_drive` runs on the wall clock, `virtual_drive` on a simulated one; `runner` and `stepped_runner` step the
-device through the governor, `block` a block of ticks at once; `standby` holds between trials; `played`, `seen` and
-`glances` are what they hand out. Begin at `runner.py`.
+`realtime_drive` runs on the wall clock (its `Glances` are readings while nothing moves), `virtual_drive` on a simulated
+one; `runner` steps a compiled device through the governor, blocks of ticks at once, `stepped_runner` one that is driven
+from Python (its `Standby` is the thread that does one last thing when a driver hangs); `played` and `seen` are what
+they hand out. Begin at `runner.py`.
 """

@@ -125,7 +125,7 @@ def answered(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnos
         findings = engine(found.recordings, held, settings, forked_map, _within(on_progress, begun, DIAGNOSED))
     except NothingLearned as refusal:
         raise nothing_to_diagnose(
-            (str(refusal),), "Leave --clean out, or record the sound device in the same way."
+            (str(refusal),), "Leave --clean out, or record the device in order in the same way."
         ) from refusal
     except np.linalg.LinAlgError as problem:
         raise nothing_to_diagnose(

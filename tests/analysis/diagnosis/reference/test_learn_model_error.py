@@ -48,7 +48,7 @@ def test_what_a_sound_device_differs_by_is_named_only_where_nobody_knows_that_it
     assert (named(known), known.diagnosis.verdict) == ([], "no_mismatch")
     assert not any(cell.significant for cell in known.maps["before"])
     assert known.remarks[0].startswith(
-        "What a sound device differs by from its re-tuned model was learned from 2 clean"
+        "What a device in order differs by from its re-tuned model was learned from 2 clean"
     )
 
 
@@ -79,9 +79,9 @@ def test_a_hum_below_what_a_sound_device_differs_by_is_named(diagnosed, clean):
 def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean):
     learned = learned_from(clean, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, quiet)
     lag, rubbing = (claimed(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING))
-    assert learned.sound.gained(lag).mean() > 0.2
-    assert learned.sound.gained(rubbing).mean() < 0.01
-    assert not learned.sound.gained(NOTHING).any()
+    assert learned.references.gained(lag).mean() > 0.2
+    assert learned.references.gained(rubbing).mean() < 0.01
+    assert not learned.references.gained(NOTHING).any()
 
 
 def test_a_device_that_is_its_model_teaches_next_to_nothing(diagnosed):

@@ -1,4 +1,4 @@
-"""What a converter or a line does to readings is seen in them, where a sound device's lack it."""
+"""What a converter or a line does to readings is seen in them, where a reference device's lack it."""
 
 from dataclasses import replace
 
