@@ -132,6 +132,9 @@ class _Shared:
                 return False
             if not process:
                 try:
+                    # Else its own answers would wait for ever to be read, once the process that forked it is gone.
+                    for other in (answers, *(theirs for _, theirs in children)):
+                        os.close(other)
                     self._work_there(end, parent, spent_s)
                 finally:
                     os._exit(0)

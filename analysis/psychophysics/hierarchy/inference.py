@@ -25,6 +25,10 @@ FAR_DB = 32.0
 """No bound is looked for further below the estimate than this."""
 
 
+FEWEST_PEOPLE = 3
+"""For an interval of a mean over people."""
+
+
 @dataclass(frozen=True, slots=True)
 class MedianThreshold:
     """The median participant's threshold at one frequency, in dB re 1 N."""
@@ -74,7 +78,8 @@ def pseudo_thresholds(fit: HierarchicalFit) -> FloatArray:
 def median_thresholds(
     fit: HierarchicalFit, cap_db: float, confidence: float, prior: Prior | None = None
 ) -> tuple[MedianThreshold, ...]:
-    """Two-sided intervals below the cap, one-sided profile bounds above it."""
+    """Two-sided intervals below the cap, one-sided profile bounds above it. With two people there is no interval: a t
+    distribution with one degree of freedom holds nearly every threshold."""
     pseudo, n = pseudo_thresholds(fit), fit.answers.persons
     half = student.ppf(0.5 + confidence / 2, n - 1) * pseudo.std(axis=0, ddof=1) / math.sqrt(n)
     medians = []
@@ -83,6 +88,8 @@ def median_thresholds(
         if db > cap_db:
             bound = lower_bound(fit, place, confidence, prior or Prior())
             medians.append(MedianThreshold(frequency_hz, db, bound, None, True))
+        elif n < FEWEST_PEOPLE:
+            medians.append(MedianThreshold(frequency_hz, db, None, None, False))
         else:
             medians.append(MedianThreshold(frequency_hz, db, db - float(half[place]), db + float(half[place]), False))
     return tuple(medians)

@@ -31,7 +31,18 @@ def two_cores_and_nothing_known(monkeypatch):
 
 
 def children() -> list[int]:
-    return [int(pid) for pid in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+    """Processes that this one has, but for those that tests before it have left to the libraries."""
+    found = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    return [int(pid) for pid in found if int(pid) not in _there_before]
+
+
+_there_before: set[int] = set()
+
+
+@pytest.fixture(autouse=True)
+def others():
+    _there_before.clear()
+    _there_before.update(children())
 
 
 def slow(number: float) -> tuple[float, int]:
@@ -282,3 +293,27 @@ def test_ctrl_c_ends_a_program_and_all_its_processes():
     for worker in workers:
         with pytest.raises(ProcessLookupError):
             os.kill(worker, 0)
+
+
+def test_a_process_whose_parent_is_killed_ends_though_its_answers_fill_the_pipe(tmp_path):
+    program = f"""
+import os, pathlib, signal, time
+from study.workflows.forked_map import forked_map
+place = pathlib.Path({str(tmp_path)!r})
+def piece(number):
+    if os.getpid() == here:
+        time.sleep(0.3)
+        while not list(place.iterdir()):
+            time.sleep(0.01)
+        os.kill(here, signal.SIGKILL)
+    (place / str(os.getpid())).touch()
+    return b"x" * 1_000_000
+here = os.getpid()
+forked_map(piece, range(2), workers=2)
+"""
+    subprocess.run([sys.executable, "-c", program], check=False, timeout=60)
+    (child,) = (int(path.name) for path in tmp_path.iterdir())
+    until = time.monotonic() + 10
+    while Path(f"/proc/{child}").exists() and "Z" not in Path(f"/proc/{child}/stat").read_text().split()[2]:
+        assert time.monotonic() < until, "it waits for its answers to be read"
+        time.sleep(0.05)
