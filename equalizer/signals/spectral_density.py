@@ -20,9 +20,9 @@ def spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[F
     return frequency_hz, np.asarray(power.real)
 
 
-def cross_density(one: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
+def cross_density(first: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
     """The same of two signals of one shape: mean of the first's conjugate with the other."""
-    return _averaged(one, other, rate_hz, length)
+    return _averaged(first, other, rate_hz, length)
 
 
 def hann(length: int) -> FloatArray:
@@ -30,18 +30,18 @@ def hann(length: int) -> FloatArray:
     return np.asarray(0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
 
 
-def _averaged(one: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
-    length = min(length, len(one))
-    window = hann(length).reshape(-1, *[1] * (one.ndim - 1))
-    starts = range(0, len(one) - length + 1, length - length // 2)
-    total = np.zeros((length // 2 + 1, *one.shape[1:]), dtype=np.complex128)
+def _averaged(first: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
+    length = min(length, len(first))
+    window = hann(length).reshape(-1, *[1] * (first.ndim - 1))
+    starts = range(0, len(first) - length + 1, length - length // 2)
+    total = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
     for start in starts:
-        lines = _lines(one[start : start + length], window)
-        total += lines.conj() * (lines if other is one else _lines(other[start : start + length], window))
+        lines = _lines(first[start : start + length], window)
+        total += lines.conj() * (lines if other is first else _lines(other[start : start + length], window))
     density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
     # Each line but those at zero and at half the rate stands for its negative frequency, too.
     density[1 : len(density) - (length % 2 == 0)] *= 2
-    return np.asarray(np.arange(length // 2 + 1) * (rate_hz / length), dtype=np.float64), np.asarray(density)
+    return np.asarray(np.fft.rfftfreq(length, 1 / rate_hz), dtype=np.float64), np.asarray(density)
 
 
 def _lines(stretch: FloatArray, window: FloatArray) -> ComplexArray:

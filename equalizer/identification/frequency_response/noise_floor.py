@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from equalizer.identification.frequency_response.experiments import instrument_of
 from equalizer.signals.lockin import ComplexArray
@@ -44,8 +43,16 @@ def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
         return power
     lines = max(1, min(lines, len(power)))
     around = np.pad(power, [(lines // 2, (lines - 1) // 2), *[(0, 0)] * (power.ndim - 1)], mode="edge")
-    # No running sum: where strong lines have left one, it keeps their rounding.
-    return np.asarray(sliding_window_view(around, lines, axis=0).mean(axis=-1))
+    # A running sum: what comes in, and what goes out, one after the other.
+    changes = np.empty((lines + 2 * (len(power) - 1), *power.shape[1:]))
+    changes[:lines], changes[lines::2], changes[lines + 1 :: 2] = (
+        around[:lines],
+        around[lines:],
+        -around[: len(power) - 1],
+    )
+    smooth = np.cumsum(changes, axis=0)[lines - 1 :: 2] / lines
+    # Where strong lines have left the sum, their rounding stays, which may be below zero.
+    return np.asarray(np.maximum(smooth, 0.0))
 
 
 def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
