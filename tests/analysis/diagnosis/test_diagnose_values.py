@@ -1,0 +1,69 @@
+"""The diagnosis as a call of values: what it refuses, and what it fits where no model is given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis import diagnose_values as module
+from analysis.diagnosis.data.input_checks import NothingToDiagnose
+from analysis.diagnosis.diagnose import DiagnosisSettings
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ = 500.0
+MODEL = MechanicalModel(
+    "cart", "position", np.eye(1), np.eye(1), 100 * np.eye(1), input=np.eye(1), output=np.eye(1)
+)  # fmt: skip
+
+
+def recording(seed: int, scale: float = 1.0, channel: str = "x") -> Recording:
+    random = np.random.default_rng(seed)
+    force = random.standard_normal((4000, 1))
+    position = scale * np.cumsum(np.cumsum(force, axis=0), axis=0) / RATE_HZ**2
+    return Recording(
+        "cart", Signal(force, RATE_HZ, "force", "N", ("fx",)), Signal(position, RATE_HZ, "position", "m", (channel,))
+    )
+
+
+def test_a_recording_without_motion_has_no_verdict():
+    with pytest.raises(NothingToDiagnose):
+        module.diagnose_values(recording(1, scale=0.0), MODEL)
+
+
+def test_recordings_that_are_not_alike_are_refused_clean_ones_too():
+    with pytest.raises(NothingToDiagnose):
+        module.diagnose_values([recording(1), recording(2, channel="y")], MODEL)
+    with pytest.raises(NothingToDiagnose):
+        module.diagnose_values(recording(1), MODEL, DiagnosisSettings(clean=(recording(2, channel="y"),)))
+
+
+def test_the_same_recording_twice_is_refused():
+    with pytest.raises(NothingToDiagnose):
+        module.diagnose_values([recording(1), recording(1)], MODEL)
+
+
+def test_without_a_model_the_first_one_is_of_the_clean_recordings(monkeypatch):
+    seen = {}
+
+    def fitted(recordings, on_progress, whose):
+        seen["fitted to"] = recordings
+        return MODEL, ("fitted",)
+
+    def diagnosed(recordings, model, settings, map_, progress):
+        seen.update(settings=settings, model=model)
+        return FINDINGS
+
+    monkeypatch.setattr(module, "fitted_model", fitted)
+    monkeypatch.setattr(module, "diagnose", diagnosed)
+    monkeypatch.setattr(module, "replace", lambda found, **new: new if found is FINDINGS else replace(found, **new))
+    clean = recording(2)
+    found = module.diagnose_values(recording(1), settings=DiagnosisSettings(clean=(clean,)))
+    assert np.array_equal(seen["fitted to"][0].response.samples, clean.response.samples)
+    assert (seen["model"], seen["settings"].fitted) == (MODEL, True)
+    assert "fitted" in found["remarks"]
+
+
+class FINDINGS:
+    remarks = ()
