@@ -122,7 +122,7 @@ def _placed_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
     width, height = figure.get_size_inches()
     longest = max(len(_row_label(channel, level, layout)) for channel in layout.channels for level in layout.levels)
     left = (0.33 if any(layout.levels) and _upright(layout) else 0.1) + _LETTER_IN * longest
-    bottom, top, right = 0.5 / height, 1 - 0.26 / height, 1 - 1.0 / width
+    bottom, top, right = 0.5 / height, 1 - 0.26 / height, 1 - 1.15 / width
     axes = figure.add_axes((left / width, bottom, right - left / width, top - bottom))
     beside = figure.add_axes((right + 0.09 / width, bottom + 0.05 * (top - bottom), 0.22 / width, 0.9 * (top - bottom)))
     return axes, beside
