@@ -271,12 +271,15 @@ def pull_at(governor, x_m: float, stamp_s: float) -> float:
 
 def test_the_kept_code_of_the_tick_is_outdated_when_any_file_of_the_safety_layer_changes(tmp_path):
     folder = Path(govern.__file__).parent
-    expected = compiling.fingerprint(folder)
+    rig = folder.parent / "rig.py"
+    expected = compiling.fingerprint(folder, rig)
     for entry in (govern.tick, govern.record):
         assert expected in [cell.cell_contents for cell in entry.py_func.__closure__]
     for name in ("cells", "compiling", "confine", "feedback", "govern", "plausibility", "rig"):
         for source in folder.glob("*.py"):
             (tmp_path / source.name).write_bytes(source.read_bytes())
-        with (tmp_path / f"{name}.py").open("a") as file:
+        beyond = tmp_path / "beyond.txt"
+        beyond.write_bytes(rig.read_bytes())
+        with (beyond if name == "rig" else tmp_path / f"{name}.py").open("a") as file:
             file.write("# changed")
-        assert compiling.fingerprint(tmp_path) != expected
+        assert compiling.fingerprint(tmp_path, beyond) != expected
