@@ -41,17 +41,11 @@ def over_neighbours(power: FloatArray, lines: int) -> FloatArray:
     """Running mean over an odd number of lines. power: (lines, ...)."""
     if not len(power):
         return power
-    lines = max(1, min(lines, len(power)))
-    around = np.pad(power, [(lines // 2, (lines - 1) // 2), *[(0, 0)] * (power.ndim - 1)], mode="edge")
-    # A running sum: what comes in, and what goes out, one after the other.
-    changes = np.empty((lines + 2 * (len(power) - 1), *power.shape[1:]))
-    changes[:lines], changes[lines::2], changes[lines + 1 :: 2] = (
-        around[:lines],
-        around[lines:],
-        -around[: len(power) - 1],
-    )
-    smooth = np.cumsum(changes, axis=0)[lines - 1 :: 2] / lines
-    # Where strong lines have left the sum, their rounding stays, which may be below zero.
+    # Takes longer to import than many an estimate.
+    from scipy.ndimage import uniform_filter1d
+
+    smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
+    # A running sum that strong lines have left keeps their rounding, which may be below zero.
     return np.asarray(np.maximum(smooth, 0.0))
 
 
