@@ -12,7 +12,7 @@ def test_units_are_those_of_the_recording_as_it_was_given(diagnosed):
     forces = replace(recording, response=replace(recording.response, quantity="force", unit="N"))
     measure = SimpleNamespace(records=(SimpleNamespace(recording=forces),), shortened=lambda: None)
     look = SimpleNamespace(model=diagnosed.device(1), chosen=SimpleNamespace(measure=measure))
-    context = engine._arena(recording, look, DiagnosisSettings(), map)
+    context = engine._search_context(recording, look, DiagnosisSettings(), map)
     assert context.tuning.model.units is None
-    wrongly = engine._arena(forces, look, DiagnosisSettings(), map)
+    wrongly = engine._search_context(forces, look, DiagnosisSettings(), map)
     assert wrongly.tuning.model.units is not None
