@@ -124,8 +124,9 @@ $(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
 $(VENV)/.installed-test: $(VENV)/bin/python pyproject.toml constraints.txt
 	@echo "Installing hapteq, what it needs and the test tools (a minute or two)"
 	@$(PIP) install --quiet --no-compile -c constraints.txt -e '.[test]'
-	@# The driver's tests compile a stub of the vendor's library: by the system's compiler, else by one from pip.
-	@command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null || \
+	@# Tests compile a stub of the vendor's library and exported controllers: by the system's compilers, else by pip's.
+	@{ command -v cc || command -v gcc || command -v clang; } >/dev/null && \
+		{ command -v c++ || command -v g++ || command -v clang++; } >/dev/null || \
 		$(PIP) install --quiet -c constraints.txt -e '.[compiler]'
 	@$(COMPILE)
 	@touch $(VENV)/.installed $@

@@ -26,14 +26,18 @@ SOURCE = Path(__file__).parent / "study" / "devices" / "force_dimension" / "dhd_
 FILE = "libdrd.so.3.17.5"
 
 
-def compiler() -> list[str]:
+def compiler(names: tuple[str, ...] = ("cc", "gcc", "clang"), of_zig: str = "cc") -> list[str]:
     """The system's, or the one that pip installs. Without one these tests fail: none of them is skipped."""
-    found = next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
+    found = next((path for name in names if (path := shutil.which(name))), None)
     if found:
         return [found]
     if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise RuntimeError("No C compiler is here: install one, or `pip install '.[compiler]'`.")
+        return [sys.executable, "-m", "ziglang", of_zig]
+    raise RuntimeError(f"No compiler ({names[0]}) is here: install one, or `pip install '.[compiler]'`.")
+
+
+def cpp_compiler() -> list[str]:
+    return compiler(("c++", "g++", "clang++"), "c++")
 
 
 def compile_stub(out: Path, with_compiler: list[str] | None = None) -> Path:

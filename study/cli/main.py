@@ -23,6 +23,7 @@ from study.cli import (
     effect,
     equalize,
     export,
+    export_controller,
     identify,
     import_recording,
     kit,
@@ -109,6 +110,9 @@ app.command("identify", short_help="Fit a stable state-space model to a band, an
     identify.identify
 )
 app.command("equalize", short_help="Turn wanted accelerations into forces", rich_help_panel="Device")(equalize.equalize)
+app.command(
+    "export-controller", short_help="A model's controller as C11, for loops of your own", rich_help_panel="Device"
+)(export_controller.export_controller)
 app.command(
     "effect",
     short_help="Keep a discovered law as an effect of your own",

@@ -163,7 +163,7 @@ class CausalSplit:
         return float(np.abs(self.response(lines)).max())
 
     def _above(self, edge_hz: float, x: FloatArray) -> FloatArray:
-        pole = self._one_pole(edge_hz)
+        pole = self.one_pole(edge_hz)
         total = np.zeros_like(x)
         for power in range((self.order + 1) // 2, self.order + 1):
             term = x
@@ -175,11 +175,12 @@ class CausalSplit:
         return total
 
     def _gain_above(self, edge_hz: float, frequency_hz: FloatArray) -> ComplexArray:
-        q = freqz(*self._one_pole(edge_hz), worN=frequency_hz, fs=self.sample_rate_hz)[1]
+        q = freqz(*self.one_pole(edge_hz), worN=frequency_hz, fs=self.sample_rate_hz)[1]
         powers = range((self.order + 1) // 2, self.order + 1)
         return np.asarray(sum(comb(self.order, j) * (1 - q) ** j * q ** (self.order - j) for j in powers))
 
-    def _one_pole(self, edge_hz: float) -> tuple[FloatArray, FloatArray]:
+    def one_pole(self, edge_hz: float) -> tuple[FloatArray, FloatArray]:
+        """Numerator and denominator, each (2,), of q."""
         w = np.tan(np.pi * edge_hz / self.sample_rate_hz)
         return np.array([w, w]) / (1 + w), np.array([1.0, (w - 1) / (1 + w)])
 

@@ -94,15 +94,19 @@ def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSet
 
 def within_band(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
     """(N, p): the part of `wanted` within the model's band, without delay."""
+    split = LinearPhaseSplit(edges_around(model), model.sample_rate_hz)
+    bands = split.split(wanted)
+    return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
+
+
+def edges_around(model: IdentifiedModel) -> BandEdges:
+    """Beside the model's band, with room; None where the band reaches to the end."""
     low, high = model.band_hz
     nyquist = model.sample_rate_hz / 2
-    edges = BandEdges(
+    return BandEdges(
         low - EDGE_ROOM_HZ if low > 2 * EDGE_ROOM_HZ else None,
         high + EDGE_ROOM_HZ if high + 2 * EDGE_ROOM_HZ < nyquist else None,
     )
-    split = LinearPhaseSplit(edges, model.sample_rate_hz)
-    bands = split.split(wanted)
-    return bands.middle[bands.latency_samples : bands.latency_samples + len(wanted)]
 
 
 def solved_causally(

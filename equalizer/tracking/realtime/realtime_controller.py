@@ -1,0 +1,98 @@
+"""A model's tracker as numbers that a loop in another language can run: two ways to get a force each tick.
+
+`transient`: a table of accelerations that is known beforehand, turned into any direction while it is played (stored
+gains and rotation basis). `stream`: accelerations that arrive while they are played, split causally into bands, the
+model's own band tracked with limited preview. Neither feeds a measured signal back.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.band_split import Bands, CausalSplit
+from equalizer.tracking.feedforward.feedforward import edges_around
+from equalizer.tracking.lqr.lqr import Tracked, stored_gains
+from equalizer.tracking.lqr.padding import CAUSAL
+from equalizer.tracking.lqr.preview import PreviewLoss, PreviewTracker, preview_loss, preview_tracker, stream
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, TrackingWeights, augmented
+from equalizer.tracking.lqr.turning import TurningTransient, turning_transient
+
+TAP_S, TAP_DECAY_S = 0.2, 0.04
+"""The transient where none is given: five time constants of a tap such as contacts leave behind."""
+
+
+@dataclass(frozen=True, slots=True)
+class RealtimeSettings:
+    """Raises TrackingError for what no loop can run."""
+
+    weight: float = 1e-3
+    """Of |force|² against |error|²."""
+    preview_s: float = 0.2
+    """How long ahead a stream is known: by so much, less a tick, it is played late."""
+    cap_n: float = 3.0
+    """Of the force's length."""
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.preview_s) and self.preview_s >= 0):
+            raise TrackingError(f"the preview is {self.preview_s:g} s; it must not be negative")
+        if not (np.isfinite(self.cap_n) and self.cap_n > 0):
+            raise TrackingError(f"the cap is {self.cap_n:g} N; it must be above zero")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RealtimeController:
+    tracker: PreviewTracker
+    split: CausalSplit
+    transient: TurningTransient
+    loss: PreviewLoss
+    """Of the stream, by the model's own prediction, without that of the causal split."""
+    cap_n: float
+
+    @property
+    def problem(self) -> TrackingProblem:
+        return self.tracker.problem
+
+    def streamed(self, wanted: FloatArray) -> tuple[Bands, Tracked]:
+        """What a stream of wanted (N, p) comes to from rest: its bands, and the forces for the middle one.
+
+        Row k is of the tick at which row k of what is wanted arrives; played is then the row that came before it by
+        the preview less a sample. The cap is not kept here.
+        """
+        bands = self.split.split(wanted)
+        late = len(self.tracker) - 1
+        tracked = stream(self.tracker, np.pad(bands.middle, ((late, 0), (0, 0))))
+        return bands, Tracked(tracked.forces[: len(wanted)], tracked.predicted[: len(wanted)], tracked.final_state)
+
+
+def realtime_controller(
+    model: IdentifiedModel, transient: FloatArray | None = None, settings: RealtimeSettings | None = None
+) -> RealtimeController:
+    """transient: (N, p), m/s², before it is rotated; None = a tap along the last output. Room to come to rest is added.
+
+    Raises TrackingError for a model without stationary gains and for settings that no loop can run.
+    """
+    settings = settings or RealtimeSettings()
+    problem = augmented(model, TrackingWeights(settings.weight))
+    wanted = tap(model) if transient is None else transient
+    _, after = CAUSAL.samples(model.sample_rate_hz)
+    played = np.pad(np.asarray(wanted, dtype=np.float64), ((0, after), (0, 0)))
+    preview = max(1, round(settings.preview_s * model.sample_rate_hz))
+    return RealtimeController(
+        preview_tracker(problem, preview),
+        CausalSplit(edges_around(model), model.sample_rate_hz),
+        turning_transient(stored_gains(problem, len(played)), played),
+        preview_loss(problem, preview),
+        settings.cap_n,
+    )
+
+
+def tap(model: IdentifiedModel) -> FloatArray:
+    """(N, p): a decaying oscillation in the middle of the model's band, 1 m/s², along the last output."""
+    low_hz, high_hz = model.band_hz
+    time_s = np.arange(round(TAP_S * model.sample_rate_hz)) / model.sample_rate_hz
+    wanted = np.zeros((len(time_s), model.C.shape[0]))
+    middle_hz = (low_hz + high_hz) / 2
+    wanted[:, -1] = np.exp(-time_s / TAP_DECAY_S) * np.sin(2 * np.pi * middle_hz * time_s)
+    return wanted

@@ -1,0 +1,136 @@
+"""From a model file to C sources of its controller."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TableError, require_rate
+from equalizer.tracking.lqr.tracking_problem import TrackingError
+from equalizer.tracking.realtime.controller_cases import controller_cases
+from equalizer.tracking.realtime.realtime_controller import RealtimeController, RealtimeSettings, realtime_controller
+from study.errors import StudyError
+from study.store.disk.provenance import sha256_of
+from study.store.disk.text_file import write_text
+from study.store.formats.identified_model_file import read_identified_model
+from study.store.formats.trajectory_file import read_trajectory
+from study.workflows.equalizer.controller.c_text import CHECK, EXAMPLE, HEADER, check_text, example_text, header_text
+from study.workflows.free_name import require_free
+
+TITLE = "The controller was not exported"
+LONGEST_ROWS = 5000
+"""Of a transient: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
+LONGEST_PREVIEW_S = 2.0
+TRY = "Such as --preview 200 --cap 3."
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerPlan:
+    model: Path
+    out: Path
+    transient: Path | None = None
+    """A table of wanted accelerations; None = a tap."""
+    settings: RealtimeSettings = field(default_factory=RealtimeSettings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExportedController:
+    plan: ControllerPlan
+    model: IdentifiedModel
+    controller: RealtimeController
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        return tuple(self.plan.out / name for name in (HEADER, EXAMPLE, CHECK))
+
+
+def export_controller(plan: ControllerPlan) -> ExportedController:
+    """Computes and writes. Raises StudyError; nothing is written then."""
+    require_free(plan.out, title=TITLE, kind="controllers")
+    model = read_identified_model(plan.model)
+    try:
+        _require_plain(model)
+        wanted = None if plan.transient is None else _wanted(plan.transient, model)
+        controller = realtime_controller(model, wanted, plan.settings)
+    except (TrackingError, TableError) as problem:
+        raise _refused(_sentence(problem), "Correct what it says, or choose another model.") from problem
+    exported = ExportedController(plan, model, controller)
+    sources = (header_text(controller, _origin(plan, model)), example_text(), check_text(controller_cases(controller)))
+    plan.out.mkdir()
+    for path, text in zip(exported.files, sources, strict=True):
+        write_text(path, text)
+    return exported
+
+
+def controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
+    """Raises StudyError for what no loop can run."""
+    if not preview_s <= LONGEST_PREVIEW_S:
+        raise _refused(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
+    try:
+        return RealtimeSettings(weight, preview_s, cap_n)
+    except TrackingError as problem:
+        raise _refused(_sentence(problem), TRY) from problem
+
+
+def exported_summary(exported: ExportedController) -> dict[str, Any]:
+    controller, rate_hz = exported.controller, exported.model.sample_rate_hz
+    return {
+        "files": [str(path) for path in exported.files],
+        "sample_rate_hz": rate_hz,
+        "band_hz": list(exported.model.band_hz),
+        "states": controller.problem.order,
+        "transient_rows": len(controller.transient),
+        "preview_samples": len(controller.tracker),
+        "stream_late_s": (len(controller.tracker) - 1) / rate_hz,
+        "stream_error": controller.loss.error,
+        "stream_error_without_limit": controller.loss.full_error,
+        "cap_n": controller.cap_n,
+    }
+
+
+def exported_lines(exported: ExportedController) -> tuple[str, ...]:
+    found, (low_hz, high_hz) = exported_summary(exported), exported.model.band_hz
+    return (
+        *found["files"],
+        f"Transient: {found['transient_rows']} rows with their room to come to rest, turned by any rotation.",
+        f"Stream: {1000 * found['stream_late_s']:.0f} ms late; as the model itself predicts, error "
+        f"{100 * found['stream_error']:.2g} % from {low_hz:g} to {high_hz:g} Hz "
+        f"({100 * found['stream_error_without_limit']:.2g} % with all of it known), and what the bands' overlap adds.",
+        f"Check it where it shall run: cc -std=c11 -O2 {CHECK} -o check -lm && ./check",
+    )
+
+
+def _wanted(path: Path, model: IdentifiedModel) -> FloatArray:
+    table = read_trajectory(path)
+    if table.kind is not TRAJECTORY:
+        raise TableError((f"{path.name} holds forces; a transient is a table of accelerations",))
+    require_rate(table, model.sample_rate_hz)
+    if len(table.signal) > LONGEST_ROWS:
+        raise TableError((f"{path.name} has {len(table.signal)} rows; a controller takes {LONGEST_ROWS}",))
+    return table.signal.samples
+
+
+def _require_plain(model: IdentifiedModel) -> None:
+    """A force in three axes and an acceleration in three: what the loop is told and what its cap means."""
+    if model.D.shape != (3, 3) or model.input_unit != "N" or model.output_unit != "m/s^2":
+        raise TrackingError("the model is not of three forces (N) and three accelerations (m/s^2)")
+
+
+def _origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
+    low_hz, high_hz = model.band_hz
+    table = "a tap along the last axis, 1 m/s^2" if plan.transient is None else plan.transient.name
+    place = "" if model.place_m is None else f", at {', '.join(f'{each:g}' for each in model.place_m)} m"
+    return (
+        f"Of {plan.model.name} (SHA-256 {sha256_of(plan.model)[:16]}), {low_hz:g} to {high_hz:g} Hz{place}.",
+        f"Forces {', '.join(model.input_channels)} in N; accelerations {', '.join(model.output_channels)} in m/s^2.",
+        f"The transient: {table}. Weight {plan.settings.weight:g}.",
+    )
+
+
+def _sentence(problem: Exception) -> str:
+    return f"{str(problem)[:1].upper()}{str(problem)[1:]}."
+
+
+def _refused(happened: str, do_now: str) -> StudyError:
+    return StudyError(TITLE, happened, do_now, saved="Nothing was written.")
