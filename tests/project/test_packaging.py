@@ -41,6 +41,12 @@ def test_the_wheel_carries_the_maps_for_imports(wheel):
     assert {f"study/importing/maps/{name}.toml" for name in shipped_maps()} <= set(zipfile.ZipFile(wheel).namelist())
 
 
+def test_the_wheel_carries_the_sources_of_an_exported_controller(wheel):
+    folder = "study/workflows/equalizer/controller"
+    names = {f"{folder}/{name}" for name in ("controller.h", "example_loop.c", "check_controller.c")}
+    assert names <= set(zipfile.ZipFile(wheel).namelist())
+
+
 @needs_command
 def test_the_command_works_beside_a_strangers_analysis(tmp_path):
     (tmp_path / "analysis.py").write_text("raise SystemExit('the stranger ran')\n")

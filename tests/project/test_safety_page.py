@@ -1,0 +1,93 @@
+"""docs/safety.md: every hazard has its layers and tests that exist, and every limit there is the code's."""
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+from protocols.definition.apparatus import SafetySettings
+from study.devices.admission import HAND_STIMULUS_CAP_N, HAND_TOTAL_CAP_N
+from study.devices.drive.realtime_drive import LATE_S
+from study.devices.force_dimension.acceptance import VALID_FOR
+from study.devices.force_dimension.connect import WATCHDOG_S
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "safety.md").read_text("utf-8")
+TEST = re.compile(r"`(test_\w+)`")
+
+
+@cache
+def hazards() -> list[list[str]]:
+    rows = [line for line in PAGE.splitlines() if re.match(r"\| H\d+ \|", line)]
+    return [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+
+
+@cache
+def existing() -> dict[str, list[str]]:
+    """Names of tests, and their decorators as they are written."""
+    found: dict[str, list[str]] = {}
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                found[node.name] = [ast.unparse(each) for each in node.decorator_list]
+    return found
+
+
+def test_hazards_are_numbered_and_whole():
+    assert [row[0] for row in hazards()] == [f"H{number}" for number in range(1, len(hazards()) + 1)]
+    assert len(hazards()) > 15
+    for number, hazard, severity, layers, proofs in hazards():
+        assert hazard and severity in ("high", "medium", "low"), number
+        assert layers and TEST.findall(proofs), number
+
+
+def test_a_high_hazard_has_more_than_a_single_layer_or_proof():
+    weak = [row[0] for row in hazards() if row[2] == "high" and len(TEST.findall(row[4])) < 2]
+    assert weak == []
+
+
+def test_every_named_test_exists():
+    named = set(TEST.findall(PAGE))
+    assert len(named) > 40
+    assert sorted(named - existing().keys()) == []
+
+
+def test_every_named_test_runs_with_make_test():
+    """A proof that is marked slow or skipped would stand there and not be run."""
+    assert [name for name in sorted(set(TEST.findall(PAGE))) if is_put_off(existing().get(name, []))] == []
+
+
+def is_put_off(decorators: list[str]) -> bool:
+    """As a whole: a single case among others may be slow."""
+    return any(re.match(r"pytest\.mark\.(slow|skip|skipif|xfail)", each) for each in decorators)
+
+
+def test_the_search_finds_tests_and_what_puts_them_off():
+    known = existing()
+    assert "test_the_search_finds_tests_and_what_puts_them_off" in known
+    assert "test_no_such_test" not in known
+    assert is_put_off(known["test_ten_million_ticks_of_lying_encoders"])
+
+
+def test_the_limits_on_the_page_are_those_of_the_code():
+    def said(name: str) -> str:
+        (row,) = [line for line in PAGE.splitlines() if line.startswith("|") and f"`{name}`" in line.split("|")[3]]
+        return row.split("|")[2]
+
+    settings = SafetySettings(stimulus_cap_n=1.0, total_cap_n=2.0)
+    for name, value, unit in (
+        ("HAND_STIMULUS_CAP_N", HAND_STIMULUS_CAP_N, "N"),
+        ("HAND_TOTAL_CAP_N", HAND_TOTAL_CAP_N, "N"),
+        ("feedback_cap_n", settings.feedback_cap_n, "N"),
+        ("watchdog_s", settings.watchdog_s, "s"),
+        ("longest_trial_s", settings.longest_trial_s, "s"),
+        ("LATE_S", LATE_S, "s"),
+        ("WATCHDOG_S", 1000 * WATCHDOG_S, "ms"),
+        ("VALID_FOR", VALID_FOR.days, "days"),
+    ):
+        assert f" {value:g} {unit}" in said(name), name
+
+
+def test_the_page_is_linked_from_where_a_lab_begins():
+    for page in ("hardware.md", "study_day.md", "site/mkdocs.yml"):
+        assert "safety.md" in (ROOT / "docs" / page).read_text("utf-8"), page
