@@ -136,7 +136,6 @@ LEARNED_TOO_MUCH = 0.3  # share of the signal from which what a device in order 
 VARIES_ERROR = 3.0  # rms between periods, over the noise, from which a response is irregular
 PEAKED_KURTOSIS = 10.0  # or of what is left, where nothing repeats; 3 for noise
 IMPACTS_LEAST_SPREAD = 0.05  # rms of a logarithm of amplitude; principle: no simulation foresees it better
-IMPACTS_CALM_SPREAD = 0.01  # up to which a band teaches the model's own numbers
 IMPACTS_SHARE, IMPACTS_ERROR = 0.6, 3.0  # of the linear model's misfit to be taken, and most that is left over chance
 IMPACTS_AS_GOOD = 1.1  # times the named one's misfit, up to which a rival is as good
 

@@ -24,7 +24,7 @@ MOST_BY_CHANCE = 0.8
 """Of what columns seem to know, the largest share that is taken for chance."""
 LEAST_KNOWN = 1e-6
 """Information on a combination of numbers that nothing moves."""
-SHARES = (1.0, 0.3)
+SHARES = (1.0, 0.3, 0.1, 0.03)
 """Of a step that are tried."""
 FLOOR = 0.04
 """Of the logarithm of an amplitude: no simulation foresees it better."""
@@ -32,6 +32,14 @@ TRUSTED = 2.0
 """What is off by more standard deviations pulls no harder (Huber 1964): the model may lack more than one thing."""
 RESTS = 1e-4
 """Of a cost, that a step must gain to go on."""
+
+
+APART = 1e-9
+"""Initial difference between simulations of one hypothesis, in the logarithm of a number."""
+
+
+def apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
+    return replace(hypothesis, point=hypothesis.point + number * APART)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +53,15 @@ class View:
     """What chance does to the logarithms, standard deviation; (stretches, bands, c) or one for all."""
     by_deviations: FloatArray | None = None
     """(t, stretches, bands, c): what the model's own numbers do; None: they stay as they are."""
+    ensemble: int = 1
+    """Simulations over which a prediction is averaged, from numbers that differ by APART: chance in it falls."""
 
     def predicted(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
-        """NaN throughout where that is no model."""
+        """(stretches, bands, c): mean over the ensemble; NaN throughout where that is no model."""
+        members = range(self.ensemble if len(hypothesis.point) else 1)
+        return np.asarray(np.mean([self._member(deviations, apart(hypothesis, k)) for k in members], axis=0))
+
+    def _member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         try:
             model = self.tuning.tuned(deviations)
             return self.power.predicted(self.power.measure.residuals(model, hypothesis.placed()))
@@ -154,7 +168,7 @@ def _errors(view: View, at: Foreseen, products: FloatArray) -> FloatArray:
     chance = _weighed(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
     information = products.copy()
     for k, number in enumerate(numbers, start=first):
-        by_chance = float(chance @ chance) / (2 * _move(number) ** 2)
+        by_chance = float(chance @ chance) / (2 * view.ensemble * _move(number) ** 2)
         information[k, k] -= min(by_chance, MOST_BY_CHANCE * products[k, k])
     values, vectors = np.linalg.eigh(information)
     values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_KNOWN))

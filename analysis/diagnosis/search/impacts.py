@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.band_power_fit import Foreseen, View, fitted, foreseen
+from analysis.diagnosis.errors.band_power_fit import Foreseen, View, apart, fitted, foreseen
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, claimed
@@ -22,7 +22,6 @@ from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import (
     IMPACTS_AS_GOOD,
-    IMPACTS_CALM_SPREAD,
     IMPACTS_ERROR,
     IMPACTS_LEAST_SPREAD,
     IMPACTS_SHARE,
@@ -34,11 +33,14 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 WORDS = "band power of the response"
-APART, COURSES = 1e-9, 4
-"""Initial difference between simulations of one hypothesis, in the logarithm of a number; and how many are run."""
+COURSES = 4
+"""Simulations of one hypothesis: their spread is what chance does, their mean what the last fit compares."""
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Gaps that are tried, over the estimated one."""
-FIRST_ROUNDS, ROUNDS = 5, 3
+FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
+"""Of the first fit without the model's numbers; linearisations of the last; and its steps for each."""
+GAINED = 0.02
+"""Of a cost, that a linearisation must gain to be followed by another."""
 RIVAL = "loose_joint"
 
 
@@ -58,8 +60,7 @@ def rattling(
     places = sorted((_at(view, evidence, claim) for claim in claims), key=lambda claim: claim.cost)
     if places[0].cost >= foreseen(view, given.deviations, NOTHING).cost:
         return None
-    view = _with_chance(view, places[0])
-    best = fitted(view, foreseen(view, places[0].deviations, places[0].hypothesis), ROUNDS)
+    best = _refined(view, places[0])
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_at(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
@@ -87,27 +88,39 @@ def _is_model(trial: Foreseen) -> bool:
     return bool(trial.hypothesis.claims) and bool(np.isfinite(trial.cost))
 
 
+def _refined(view: View, start: Foreseen) -> Foreseen:
+    """Own and the model's numbers together: with play, the model's numbers do something else than without."""
+    view = _with_chance(view, start)
+    best = foreseen(view, start.deviations, start.hypothesis)
+    for _ in range(ROUNDS):
+        view = replace(view, by_deviations=_by_deviations(view, best))
+        better = fitted(view, best, STEPS)
+        gained = best.cost - better.cost
+        best = better
+        if gained <= GAINED * best.cost:
+            break
+    return best
+
+
 def _with_chance(view: View, at: Foreseen) -> View:
-    """With each band's spread between simulations, and the sensitivity of the calm bands to the model's numbers."""
+    """With the spread of each band between simulations, and ready to average over as many."""
 
     def course(number: int) -> FloatArray:
-        return view.predicted(at.deviations, _apart(at.hypothesis, number))
+        return view.predicted(at.deviations, apart(at.hypothesis, number))
 
     spread = np.std(np.array(list(view.map_(course, range(COURSES)))), axis=0, ddof=1)
-    calm = spread < IMPACTS_CALM_SPREAD
-    linear = view.predicted(at.deviations, NOTHING)
+    return replace(view, spread=spread, ensemble=COURSES)
+
+
+def _by_deviations(view: View, at: Foreseen) -> FloatArray:
+    """(t, stretches, bands, c): a forward difference of one tolerance: a shorter one would drown in chance."""
     ways = np.eye(len(at.deviations))
 
     def moved(number: int) -> FloatArray:
-        change = view.predicted(at.deviations + ways[number], NOTHING) - linear
-        return np.where(calm & np.isfinite(change), change, 0.0)
+        change = view.predicted(at.deviations + ways[number], at.hypothesis) - at.predicted
+        return np.where(np.isfinite(change), change, 0.0)
 
-    columns = np.array(list(view.map_(moved, range(len(ways)))))
-    return replace(view, spread=spread, by_deviations=columns)
-
-
-def _apart(hypothesis: Hypothesis, number: int) -> Hypothesis:
-    return replace(hypothesis, point=hypothesis.point + number * APART)
+    return np.array(list(view.map_(moved, range(len(ways)))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,11 +169,11 @@ def _comparison(context: SearchContext, best: Foreseen) -> _Comparison:
     power, model = BandPower(context.whole), context.tuning.tuned(best.deviations)
 
     def course(number: int) -> FloatArray:
-        return power.predicted(context.whole.residuals(model, _apart(best.hypothesis, number).placed()))
+        return power.predicted(context.whole.residuals(model, apart(best.hypothesis, number).placed()))
 
     first, other = (np.asarray(each) for each in context.map_(course, range(2)))
-    apart = power.misfits(first - other)
-    chance = np.fmax(np.fmax(apart.fit, apart.choose), apart.test)
+    differ = power.misfits(first - other)
+    chance = np.fmax(np.fmax(differ.fit, differ.choose), differ.test)
     return _Comparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
 
