@@ -58,6 +58,20 @@ class Terminal:
                 raise AssertionError(f"the program ended without '{pattern}':\n{fresh[-2000:]}")
         return " ".join(fresh.split())
 
+    def press_until(self, key: str, pattern: str, timeout_s: float = 60.0) -> None:
+        """Presses the key again where nothing came of it: what is typed before a screen can have been read counts
+        for nothing there, and on a busy machine that may last."""
+        until_s = time.monotonic() + timeout_s
+        while True:
+            self.type(key)
+            try:
+                self.wait_for(pattern, min(15.0, timeout_s))
+            except AssertionError:
+                if time.monotonic() > until_s or self.process.poll() is not None:
+                    raise
+            else:
+                return
+
     def drain(self, seconds: float) -> str:
         """What is printed within so many seconds, escape sequences left out."""
         until_s, fresh = time.monotonic() + seconds, ""

@@ -125,8 +125,7 @@ def test_from_the_start_to_the_report_with_a_kill_in_the_middle(at_the_screen, s
     again.sit(until=closed)
     if "Thank you" not in again.terminal.screen:  # it may have come while the log was watched
         again.terminal.wait_for("Thank you")
-    again.terminal.type("\r")
-    again.terminal.wait_for("Leave hapteq")
+    again.terminal.press_until("\r", "Leave hapteq")
     again.terminal.type("q")
     assert again.terminal.end() == 0
     assert "Report:" in again.terminal.screen
