@@ -1,6 +1,6 @@
 """Doing it: the only package with side effects. Sessions, devices, files, people, screens.
 
-Layers, each knowing only those after it: `cli`, `tui`, `workflows`, then `devices`, `store` and `participants`
+Layers, each knowing only those after it: `cli`, `tui`, `workflows`, `devices`, then `store` and `participants`
 beside each other, then `session`, which is pure, then `errors`.
 
 Read in this order: `session.facts.events` (the facts), `session.state.fold` (what they come to),

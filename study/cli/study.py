@@ -10,7 +10,9 @@ from study.cli.seed import checked_seed
 from study.tui.keys.answer_keys import parse_keys
 
 DataOption = Annotated[Path, typer.Option("--data", help="Folder of all sessions.", show_default=True)]
-DeviceOption = Annotated[str, typer.Option("--device", help="simulated, omega3, omega6, omega7, delta3 or sigma7.")]
+DeviceOption = Annotated[
+    str, typer.Option("--device", help="simulated, omega3, omega6, omega7, delta3, sigma7, or replay:FILE.h5.")
+]
 KeysOption = Annotated[
     str, typer.Option(metavar="A,B", help="Keys that answer 1 and 2 beside the digits, such as f,j.")
 ]

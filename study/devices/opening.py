@@ -29,26 +29,30 @@ SIMULATIONS = (SIMULATED, FRICTIONLESS)
 """Those that need no real clock."""
 
 
+REPLAY = "replay:"
+"""Before the path of a recording: its handle moves as it once did, whatever is asked of it."""
+
+
 def needs_real_time(name: str) -> bool:
-    return name not in SIMULATIONS
+    return name not in SIMULATIONS and not name.startswith(REPLAY)
 
 
 def open_device(name: str, settings: DeviceSettings, clock: Clock, seed: int) -> Device:
     """`seed` drives what is random in a simulated device. Raises `DeviceError`."""
-    if name not in SIMULATIONS and name not in REAL:
+    if name not in SIMULATIONS and name not in REAL and not name.startswith(REPLAY):
         raise DeviceError(
             f"There is no device called {name!r}",
-            f"Known are {', '.join(DEVICES)}.",
+            f"Known are {', '.join(DEVICES)}, and {REPLAY}FILE.h5 for a recording.",
             f"Use --device {SIMULATED} where no device is at hand.",
         )
     if name in REAL and clock.virtual:
         raise DeviceError(
             "A real device needs real time", f"'{name}' was to be played faster than time passes.", "Use a real clock."
         )
-    from study.devices.rigs_by_name import RIGS_BY_NAME
+    from study.devices.rigs_by_name import rig_named
     from study.devices.safe import SafeDevice
 
-    rig = RIGS_BY_NAME[name](settings, seed)
+    rig = rig_named(name, settings, seed)
     try:
         return SafeDevice(rig, settings, clock)
     except BaseException:

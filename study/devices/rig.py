@@ -68,6 +68,10 @@ def no_buttons() -> frozenset[int]:
     return frozenset()
 
 
+def not_prepared(rows: FloatArray, repeats: bool, wait: int) -> None:
+    """A device knows nothing of what is to come."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledRig:
     """A simulated device whose two halves of a tick are compiled, so that whole blocks run without Python."""
@@ -84,6 +88,9 @@ class CompiledRig:
     """advance(state, parameters, force_n): holds force_n, shape (3,), for one tick."""
     buttons: Callable[[], frozenset[int]] = no_buttons
     """Numbers of the buttons that are down."""
+    prepare: Callable[[FloatArray, bool, int], None] = not_prepared
+    """prepare(rows, repeats, wait): told before a stimulus begins, for a rig that only acts as if it were driven. rows
+    (n, 3), N: played once or, if it `repeats`, again and again; the first comes after `wait` ticks."""
 
     def close(self) -> None:
         """Nothing to disconnect."""

@@ -2,10 +2,13 @@
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from study.devices.device import DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.rigs import force_dimension_rig
+from study.devices.opening import REPLAY
+from study.devices.replay.replay_rig import replay_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
 from study.errors import DeviceError
@@ -41,3 +44,10 @@ RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
     **{name: partial(_real_rig, name) for name in MODELS},
 }
 """Rig of a name, its settings and a seed; the same names as in `study.devices.opening`."""
+
+
+def rig_named(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
+    """The rig of a known name, or a replay. Raises `DeviceError`."""
+    if name.startswith(REPLAY):
+        return replay_rig(Path(name.removeprefix(REPLAY)))
+    return RIGS_BY_NAME[name](settings, seed)

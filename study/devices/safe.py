@@ -177,7 +177,11 @@ class SafeDevice:
             raise _still_playing()
 
     def _start(self, begin: Callable[[], None]) -> None:
-        started = self._drive.start(begin)
+        def begin_both() -> None:
+            begin()
+            self._runner.prepare()
+
+        started = self._drive.start(begin_both)
         self._must_be_there()
         if not started:
             raise _still_playing()

@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from equalizer.signals.joining import join
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
+from study.store.formats.recording_file import write_recording
 
-KINDS = ("simulated omega.3", "compiled mass", "stepped mass", "driver on the stub")
+KINDS = ("simulated omega.3", "compiled mass", "stepped mass", "driver on the stub", "replay of a recording")
 
 
 @pytest.fixture
@@ -26,10 +28,25 @@ def pressed():
     return set()
 
 
+@pytest.fixture(scope="module")
+def recorded(rigs, tmp_path_factory):
+    """What the simulated device answered to the stimuli of these tests."""
+    played = []
+    with contextlib.closing(open_device("simulated", rigs.SETTINGS, VirtualClock(), seed=4)) as device:
+        for stimulus, loops in ((rigs.sine(1.0), 8), (rigs.sine(1.0, 25), 40), (rigs.sine(1.5, 10), 3)):
+            commands = rigs.force(np.tile(stimulus.loop.samples, (loops, 1)))
+            played.append(device.play(commands).recording)
+    path = tmp_path_factory.mktemp("recorded") / "played.h5"
+    write_recording(path, join(played, {}))
+    return path
+
+
 @pytest.fixture(params=KINDS)
 def device(request, rigs, clock, pressed):
     if request.param == "simulated omega.3":
         opened = open_device("simulated", rigs.SETTINGS, clock, seed=3)
+    elif request.param == "replay of a recording":
+        opened = open_device(f"replay:{request.getfixturevalue('recorded')}", rigs.SETTINGS, clock, seed=3)
     elif request.param == "driver on the stub":
         stub = request.getfixturevalue("stepped_stub")
         opened = SafeDevice(stub.rig(), rigs.SETTINGS, clock)

@@ -13,6 +13,7 @@ from numba.experimental.function_type import _get_wrapper_address
 
 from study.devices.device import Fault
 from study.devices.drive.seen import Seen
+from study.devices.governor import cells
 from study.devices.governor.govern import ROWS, TICK_SIGNATURE, VECTOR, tick
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig
@@ -83,6 +84,10 @@ class Runner(Protocol):
         """What was read last, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
         ...
 
+    def prepare(self) -> None:
+        """Between the governor's beginning and the first tick."""
+        ...
+
     def glance(self) -> None:
         """Read once while nothing moves, and write nothing. Never raises. Only in the thread that runs the ticks."""
         ...
@@ -133,6 +138,11 @@ class CompiledRunner:
     @property
     def seen(self) -> Seen | None:
         return self._seen if self.failure is None else None
+
+    def prepare(self) -> None:
+        state = self._governor.state
+        repeats, wait = bool(np.isinf(state[cells.LENGTH])), int(state[cells.LEAD] - state[cells.TICK])
+        self._rig.prepare(self._governor.steady, repeats, wait)
 
     def glance(self) -> None:
         rig, reading = self._rig, np.zeros(READING_SIZE)

@@ -82,6 +82,9 @@ class SteppedRunner:
     def seen(self) -> Seen | None:
         return None if self._gone.is_set() else self._seen
 
+    def prepare(self) -> None:
+        """What moves by itself needs no telling."""
+
     def glance(self) -> None:
         if self._gone.is_set():
             return

@@ -15,7 +15,9 @@ ROOT = Path(__file__).parents[3]
 NAMED_IN = {
     "SafeDevice": {"study/devices/opening.py"},
     "RIGS_BY_NAME": {"study/devices/opening.py"},
+    "rig_named": {"study/devices/opening.py"},
     "simulated_rig": set(),
+    "replay_rig": {"study/devices/rigs_by_name.py"},
     "build_omega3": {"study/devices/rigs_by_name.py"},
     "force_dimension_rig": {"study/devices/rigs_by_name.py"},
     "ForceDimensionRig": {"study/devices/force_dimension/rigs.py"},
@@ -34,7 +36,7 @@ NAMED_IN = {
 """Where else than at home a name may stand at all: imported, called, under another name or as a string."""
 
 CALLED_IN = {
-    "CompiledRig": {"study/devices/simulated/omega3.py"},
+    "CompiledRig": {"study/devices/simulated/omega3.py", "study/devices/replay/replay_rig.py"},
     "advance": {"study/devices/drive/runner.py"},
     "write": {"study/devices/drive/stepped_runner.py"},
 }

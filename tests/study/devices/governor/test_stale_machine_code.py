@@ -44,6 +44,10 @@ def test_a_change_of_any_watched_file_is_another_fingerprint(tmp_path):
     assert len(set(found)) == 3
 
 
-def test_both_compiled_layers_watch_the_rigs_layout():
-    for path in (DEVICES / "governor" / "govern.py", DEVICES / "simulated" / "compiled.py"):
+def test_compiled_layers_watch_the_rigs_layout():
+    for path in (
+        DEVICES / "governor" / "govern.py",
+        DEVICES / "simulated" / "compiled.py",
+        DEVICES / "replay" / "replay_rig.py",
+    ):
         assert 'parents[1] / "rig.py"' in path.read_text("utf-8")

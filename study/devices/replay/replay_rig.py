@@ -1,0 +1,151 @@
+"""A recording as a rig: whatever force is asked for, the handle moves as it once did.
+
+Before each stimulus the stretch is looked for whose recorded excitation is nearest to what shall be played (least
+squares over the whole stretch). Commands that were recorded so are answered exactly as they were then; others by the
+nearest there is, and no force changes anything. A repeated stimulus repeats its stretch, faded over where it begins
+anew. Between stimuli the handle rests where it is, and its sensor has noise.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit, types
+
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray, Signal
+from study.devices.device import DeviceInfo
+from study.devices.force_dimension.models import MODELS
+from study.devices.governor.compiling import fingerprint
+from study.devices.opening import REPLAY
+from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPPED, TRUE_ACCELERATION, CompiledRig
+from study.errors import DeviceError, StudyError
+from study.store.formats.recording_file import read_recording
+
+REPEATED_S = 0.5
+"""Of a repeated stimulus, whole loops: long enough that a hand's unrest does not look like a stamp."""
+OVER_S = 0.02
+"""Within so long the end of a repeated stretch goes over into its beginning."""
+NOMINAL = MODELS["omega3"]
+
+TICK, FIRST, LENGTH, REPEATS, OVER = range(5)
+"""Of the state: ticks since the first row (negative before), first row of the stretch, its rows, whether it is
+repeated, and rows over which its end goes over into its beginning."""
+
+AX, TRUE_AX = ACCELERATION.start, TRUE_ACCELERATION.start
+
+_VECTOR = types.float64[::1]
+_NOISE = types.uint64[::1]
+
+
+def _entry_points(sources: int) -> tuple[Any, Any]:
+    @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
+    def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
+        """Noise of zero is a tick's. That of a look while nothing is played is not: then all is at rest."""
+        _ = sources
+        first, length, over = int(state[FIRST]), int(state[LENGTH]), int(state[OVER])
+        tick = int(state[TICK])
+        tick = tick % length if state[REPEATS] != 0.0 else min(max(tick, 0), length - 1)
+        share = (tick - (length - over) + 1.0) / (over + 1.0) if over > 0 and tick >= length - over else 0.0
+        now, before = READING_SIZE * (first + tick), READING_SIZE * (first + tick - length)
+        for i in range(READING_SIZE):
+            reading[i] = parameters[now + i]
+            if share > 0.0 and i != SENSOR_CLIPPED:
+                reading[i] = (1.0 - share) * parameters[now + i] + share * parameters[before + i]
+        if noise[0] != 0:
+            for i in range(3):
+                noise[0] ^= noise[0] << np.uint64(13)  # Marsaglia, Xorshift RNGs, 2003
+                noise[0] ^= noise[0] >> np.uint64(7)
+                noise[0] ^= noise[0] << np.uint64(17)
+                reading[AX + i] = parameters[-1] * (2.0 * float(noise[0]) / 2.0**64 - 1.0)
+                reading[TRUE_AX + i] = 0.0
+
+    @njit(types.void(_VECTOR, _VECTOR, _VECTOR), cache=True, nogil=True)
+    def advance(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
+        _ = sources
+        state[TICK] += 1.0
+
+    return sense, advance
+
+
+sense, advance = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
+
+
+def replay_rig(path: Path) -> CompiledRig:
+    """Raises `DeviceError` for a file that cannot be replayed."""
+    try:
+        recording = read_recording(path)
+    except StudyError as problem:
+        raise _refused(f"{problem.title}: {problem.happened}") from problem
+    readings, excitation = _readings(recording, path), _excitation(recording, path)
+    rate_hz, state = recording.sample_rate_hz, np.zeros(OVER + 1)
+    state[LENGTH] = len(readings)
+
+    def prepare(rows: FloatArray, repeats: bool, wait: int) -> None:
+        most = round(REPEATED_S * rate_hz)
+        stretch = np.tile(rows, (max(1, most // len(rows)), 1)) if repeats else rows
+        length = min(len(stretch), len(readings))
+        over = min(round(OVER_S * rate_hz), length - 1, len(readings) - length) if repeats else 0
+        run_in = stretch[:length][length - over :]  # what comes before it anew must have been played before it then
+        first = over + _nearest(excitation, np.concatenate([run_in, stretch[:length]]))
+        state[[TICK, FIRST, LENGTH, REPEATS, OVER]] = -wait, first, length, repeats, over
+
+    return CompiledRig(
+        info=DeviceInfo(
+            name=f"replay of {recording.device or path.name}",
+            simulated=True,
+            sample_rate_hz=rate_hz,
+            max_force_n=NOMINAL.max_force_n,
+            effective_mass_kg=NOMINAL.effective_mass_kg,
+            details=f"{path.name}, {len(readings)} samples; no force changes what is replayed",
+        ),
+        state=state,
+        parameters=np.append(readings.reshape(-1), _noise_mps2(readings[:, ACCELERATION])),
+        noise=np.zeros(1, dtype=np.uint64),
+        sense=sense,
+        advance=advance,
+        prepare=prepare,
+    )
+
+
+def _nearest(excitation: FloatArray, wanted: FloatArray) -> int:
+    """Where in the excitation (N, 3) the stretch begins that differs least from wanted (n, 3), n <= N."""
+    rows = len(excitation) - len(wanted) + 1
+    size = len(excitation) + len(wanted)
+    lines = np.fft.rfft(excitation, size, axis=0) * np.fft.rfft(wanted, size, axis=0).conj()
+    common = np.fft.irfft(lines, size, axis=0).sum(axis=1)[:rows]
+    energy = np.concatenate([[0.0], np.cumsum((excitation**2).sum(axis=1))])
+    return int(np.argmin(energy[len(wanted) :] - energy[:rows] - 2 * common))
+
+
+def _readings(recording: Recording, path: Path) -> FloatArray:
+    """(n, READING_SIZE). Where the sensor clipped is not known any more."""
+    position, response = recording.position, recording.response
+    if position is None or position.samples.shape[1] != 3 or set(position.units) != {"m"}:
+        raise _refused(f"{path.name} has no position of a handle, three channels in metres.")
+    if response.samples.shape[1] != 3 or set(response.units) != {"m/s^2"}:
+        raise _refused(f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2.")
+    readings = np.zeros((len(recording), READING_SIZE))
+    readings[:, POSITION] = position.samples
+    readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = response.samples
+    return readings
+
+
+def _noise_mps2(acceleration: FloatArray) -> float:
+    """Half width of an even noise as strong as the sensor's: what its third differences leave of any smooth motion."""
+    left = np.diff(acceleration, n=3, axis=0) / np.sqrt(20.0)
+    return float(np.sqrt(3.0) * np.nanmedian(np.abs(left)) / 0.6745) if left.size else 0.0
+
+
+def _excitation(recording: Recording, path: Path) -> FloatArray:
+    decided: Signal = recording.command if recording.excitation is None else recording.excitation
+    if decided.samples.shape[1] != 3 or set(decided.units) != {"N"}:
+        raise _refused(f"{path.name} has no force on a handle as its command, three channels in N.")
+    return np.nan_to_num(np.asarray(decided.samples, dtype=np.float64))
+
+
+def _refused(happened: str) -> DeviceError:
+    return DeviceError(
+        "This cannot be replayed", happened, f"Give a recording of `hapteq record`, as --device {REPLAY}FILE.h5."
+    )

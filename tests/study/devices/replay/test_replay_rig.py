@@ -1,0 +1,155 @@
+"""A device that answers with a recording: exactly where it can, nearly elsewhere, and never because of a force."""
+
+import contextlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from equalizer.signals.joining import join
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+from study.cli.main import main
+from study.devices.clock import VirtualClock
+from study.devices.device import Fault
+from study.devices.opening import open_device
+from study.errors import DeviceError
+from study.store.formats.recording_file import read_recording, write_recording
+
+
+def played_on(name: str, rigs, commands: list[np.ndarray]) -> list[Recording]:
+    with contextlib.closing(open_device(name, rigs.SETTINGS, VirtualClock(), seed=4)) as device:
+        return [device.play(rigs.force(samples)).recording for samples in commands]
+
+
+@pytest.fixture(scope="module")
+def commands(rigs):
+    return [np.tile(rigs.sine(1.0, periods).loop.samples, (periods, 1)) for periods in (5, 25, 10)]
+
+
+@pytest.fixture(scope="module")
+def originals(rigs, commands):
+    return played_on("simulated", rigs, commands)
+
+
+@pytest.fixture(scope="module")
+def file(originals, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "lab.h5"
+    write_recording(path, join(originals, {}))
+    return path
+
+
+def test_commands_that_were_recorded_are_answered_as_they_were_in_any_order(rigs, commands, originals, file):
+    replayed = played_on(f"replay:{file}", rigs, [*commands, commands[1], commands[0]])
+    for found, right in zip(replayed, [*originals, originals[1], originals[0]], strict=True):
+        np.testing.assert_array_equal(found.response.samples, right.response.samples)
+        np.testing.assert_array_equal(found.position.samples, right.position.samples)
+        np.testing.assert_allclose(found.excitation.samples, right.excitation.samples, atol=1e-12)
+
+
+def test_a_part_of_what_was_recorded_is_found_in_its_middle(rigs, commands, originals, file):
+    (found,) = played_on(f"replay:{file}", rigs, [0.5 * (commands[1] + np.roll(commands[1], 1, axis=0))])
+    assert len(found) == 1000
+    # 25 Hz: nothing else is near.
+    heard = np.abs(np.fft.rfft(found.response.samples[:, 2] * np.hanning(1000)))
+    assert np.argmax(heard) == 25
+    first = (found.response.samples[0] == join(originals, {}).response.samples).all(axis=1)
+    assert 999 <= np.flatnonzero(first)[0] < 2000
+
+
+def test_no_force_changes_what_is_replayed(rigs, commands, file):
+    (usual,) = played_on(f"replay:{file}", rigs, [commands[0]])
+    settings = replace(rigs.SETTINGS, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
+    with contextlib.closing(open_device(f"replay:{file}", settings, VirtualClock(), seed=1)) as device:
+        without_spring = device.play(rigs.force(commands[0])).recording
+    assert np.abs(usual.command.samples - without_spring.command.samples).max() > 0.01
+    np.testing.assert_array_equal(usual.response.samples, without_spring.response.samples)
+
+
+def test_a_held_stimulus_goes_on_without_a_seam(rigs, file):
+    clock = VirtualClock()
+    with contextlib.closing(open_device(f"replay:{file}", rigs.SETTINGS, clock, seed=1)) as device:
+        device.hold(rigs.sine(1.0, 25))
+        looks = []
+        for _ in range(3000):
+            clock.sleep(0.001)
+            device.keep_alive()
+            looks.append(device.look())
+        assert device.fault() is Fault.NONE
+        device.release()
+    steps = np.diff([look.position_m for look in looks], axis=0)
+    assert np.abs(steps).max() < 2 * np.percentile(np.abs(steps).max(axis=1), 99)
+    accelerations = np.array([look.acceleration_mps2 for look in looks])
+    assert np.std(accelerations[:, 2]) > 1.0
+
+
+def test_a_stretch_of_the_whole_recording_has_nothing_to_go_over_into_and_plays_all_the_same(rigs, commands, tmp_path):
+    (only,) = played_on("simulated", rigs, [commands[0][:200]])
+    write_recording(tmp_path / "short.h5", only)
+    clock = VirtualClock()
+    with contextlib.closing(open_device(f"replay:{tmp_path / 'short.h5'}", rigs.SETTINGS, clock, seed=1)) as device:
+        device.hold(rigs.sine(1.0, 5))
+        for _ in range(20):
+            clock.sleep(0.1)
+            device.keep_alive()
+        assert device.release().health.ticks > 1500
+        # Longer than there is: the end stays, and the safety layer says what that looks like.
+        assert device.play(rigs.force(commands[0])).health.fault is Fault.STALE
+
+
+def test_a_recorded_protocol_recorded_again_is_the_same_recording(tmp_path, capsys):
+    words = ["record", "ellipsoid", "--seed", "3", "--out"]
+    assert main([*words, str(tmp_path / "lab.h5")]) == 0
+    assert main([*words, str(tmp_path / "again.h5"), "--device", f"replay:{tmp_path / 'lab.h5'}"]) == 0
+    first, again = (read_recording(tmp_path / f"{name}.h5") for name in ("lab", "again"))
+    np.testing.assert_array_equal(again.response.samples, first.response.samples)
+    np.testing.assert_array_equal(again.position.samples, first.position.samples)
+    assert again.device == "replay of simulated omega.3"
+
+
+def test_a_simulated_participant_takes_a_study_on_it(rigs, file, small_text, tmp_path, capsys):
+    protocol = tmp_path / "short.toml"
+    protocol.write_text(small_text)
+    data = ["--data", str(tmp_path / "data"), "--observer", "ideal", "--seed", "5"]
+    assert main(["study", "--protocol", str(protocol), "--device", f"replay:{file}", *data]) == 0, (
+        capsys.readouterr().err
+    )
+    rows = (tmp_path / "data" / "ideal1_001" / "trials.csv").read_text().splitlines()
+    assert len(rows) > 8
+    assert not any("void" in row for row in rows[1:])
+
+
+def test_doctor_looks_at_it(file, capsys):
+    assert main(["doctor", "--device", f"replay:{file}"]) in (0, 1)
+    said = capsys.readouterr()
+    assert "replay of simulated omega.3" in said.out + said.err
+
+
+def without(name: str, recording: Recording) -> Recording:
+    if name == "position":
+        return replace(recording, position=None)
+    if name == "response":
+        return replace(
+            recording, response=Signal(recording.response.samples, 1000.0, "velocity", "m/s", ("vx", "vy", "vz"))
+        )
+    volts = Signal(recording.command.samples, 1000.0, "voltage", "V", ("ux", "uy", "uz"))
+    return replace(recording, command=volts, excitation=None)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("position", "no position"), ("response", "no acceleration"), ("command", "no force")]
+)
+def test_what_cannot_be_replayed_is_said(rigs, originals, tmp_path, name, says):
+    write_recording(tmp_path / "lab.h5", without(name, originals[0]))
+    with pytest.raises(DeviceError, match=f"lab.h5 has {says}"):
+        open_device(f"replay:{tmp_path / 'lab.h5'}", rigs.SETTINGS, VirtualClock(), seed=1)
+
+
+@pytest.mark.parametrize("content", [None, b"not a recording"])
+def test_a_file_that_is_no_recording_is_an_error_of_the_device(rigs, tmp_path, content):
+    path = tmp_path / "lab.h5"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DeviceError, match="This cannot be replayed"):
+        open_device(f"replay:{path}", rigs.SETTINGS, VirtualClock(), seed=1)
