@@ -1,0 +1,53 @@
+"""Where no fault explains what sets recordings apart from clean ones, that is said."""
+
+import pytest
+
+from analysis.diagnosis import diagnose as engine
+from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
+from analysis.diagnosis.forces.rigid_model import rigid_model
+from analysis.diagnosis.reference import learn_model_error as learn_clean_floor
+from analysis.diagnosis.reference.compare_with_reference import Contrast, contrast_of
+from analysis.diagnosis.reference.learn_model_error import NothingLearned
+from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, with_contrast
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
+
+
+def test_a_fault_that_the_comparison_cannot_undo_is_left_open(rig):
+    found = rig.contrast("coulomb_friction", 0.6, rig.UNDONE)
+    assert found.left_open
+    assert not set(rig.UNDONE) & set(found.weighed)
+    assert "added_mass" in found.weighed
+
+
+def test_nothing_is_left_open_where_a_fault_is_named(rig):
+    found = rig.contrast("coulomb_friction", 0.6)
+    assert not found.left_open
+    assert found.compared is not None and found.compared.complete
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_nothing_is_left_open_between_recordings_of_the_same_device(rig, seed):
+    assert not rig.contrast(seed=seed).left_open
+
+
+def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_is(rig, monkeypatch):
+    asked = []
+
+    def teaches_nothing(*given):
+        asked.append(given)
+        raise NothingLearned("they were measured otherwise")
+
+    for asks in (engine, learn_clean_floor):
+        monkeypatch.setattr(asks, "learned_from", teaches_nothing)
+    clean = rig.recording(1)
+    settings = DiagnosisSettings(without=rig.UNDONE, clean=(clean,))
+    faulty = rig.recording(2, "coulomb_friction", 0.6)
+    found = diagnose([faulty], rigid_model([clean], "given"), settings, map, lambda said, share: None)
+    assert len(asked) == 2
+    assert found.diagnosis.verdict == "unexplained"
+    assert found.diagnosis.candidates
+    assert not found.diagnosis.effects
+    assert not {NOT_COMPARED, OUT_OF_TIME} & set(found.remarks)
+    assert NOT_COMPARED in with_contrast(found, Contrast(None, None, None, None), faulty, 5.0).remarks
+    part = contrast_of([faulty], [clean], frozenset(), lambda: False)
+    assert OUT_OF_TIME in with_contrast(found, part, faulty, 5.0).remarks

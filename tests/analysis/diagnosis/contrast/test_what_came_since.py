@@ -1,0 +1,95 @@
+"""A fault that came since the clean recordings were made is named, with its place and its number."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.contrast.actuator_faults import actuator_faults
+from analysis.diagnosis.contrast.compare import compared
+from analysis.diagnosis.contrast.stream import FOLDS
+from analysis.diagnosis.contrast.taken import taken_of
+from equalizer.signals.signal import FloatArray
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "number", "place"),
+    [
+        ("added_mass", 0.3, "mass", "mechanism"),
+        ("viscous_damping", 2.0, "damping", "mechanism"),
+        ("coulomb_friction", 0.6, "level", "mechanism"),
+        ("force_gain", 0.75, "gain", "actuator"),
+        ("sensor_gain", 1.3, "gain", "sensor"),
+    ],
+)
+def test_what_came_since_is_named_with_its_place_and_number(rig, change, level, number, place):
+    found = rig.contrast(change, level).decided
+    assert found is not None and found.named is not None
+    assert (found.named.fault.effect, found.named.fault.place) == (change, place)
+    assert found.named.values[number] == pytest.approx(level, rel=0.15)
+
+
+def test_a_law_that_holds_the_named_one_takes_nothing_from_its_probability(rig):
+    found = rig.contrast("coulomb_friction", 0.6).decided
+    assert found is not None and found.named is not None
+    assert found.named.fault.effect == "coulomb_friction"
+    assert "asymmetric_friction" not in found.alike
+    assert found.probability > 0.9
+
+
+def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there_are(rig):
+    """Scaled by its own error, what is left of a set is at least as much as a description of its own leaves: also where
+    there is no time to undo a fault."""
+    for clean in ([rig.recording(1)], [rig.recording(seed) for seed in (1, 3, 4, 5)]):
+        found = compared([rig.recording(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
+        assert found is not None
+        assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
+        assert 1.0 <= found.plain[:FOLDS].sum() / found.faulty_samples < 2.0
+
+
+def behind(gap: float):
+    """A reading that is driven through a gap."""
+
+    def made(y: FloatArray) -> FloatArray:
+        found, read = np.empty_like(y), y[0]
+        for k, here in enumerate(y):
+            read = min(max(read, here - gap / 2), here + gap / 2)
+            found[k] = read
+        return found
+
+    return made
+
+
+def test_play_before_a_sensor_is_named_with_its_gap(rig):
+    found = rig.decided(rig.read_as(2, behind(0.008)))
+    assert found.named is not None and found.named.fault.effect == "sensor_play"
+    assert found.named.values["gap"] == pytest.approx(0.008, rel=0.2)
+
+
+def test_a_drift_that_began_before_the_recording_is_no_offset(rig):
+    found = rig.decided(rig.read_as(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
+    assert found.named is not None and found.named.fault.effect == "sensor_drift"
+
+
+def test_an_offset_is_no_drift(rig):
+    found = rig.decided(rig.read_as(2, lambda y: y + 0.03))
+    best = found.named or found.others[0][0]
+    assert best.fault.effect == "sensor_offset" and "sensor_drift" not in found.alike
+
+
+def test_a_drive_that_follows_slowly_is_named(rig):
+    plain = rig.recording(2)
+    force, limit = plain.command.samples[:, 0].copy(), 40.0 / rig.RATE_HZ
+    held = int(rig.RATE_HZ / 2)
+    asked = np.repeat(force[::held], held)
+    given = np.empty(rig.COUNT)
+    reached = asked[0]
+    for k, wanted in enumerate(asked):
+        reached += np.clip(wanted - reached, -limit, limit)
+        given[k] = reached
+    part = taken_of([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
+    (fault,) = [each for each in actuator_faults(0, "fx", part, True) if each.effect == "slew_limit"]
+    left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
+    best = fault.variants[int(np.argmin(left))]
+    assert best.values(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
+    assert min(left) < 0.3 * np.std(asked - given)
