@@ -28,6 +28,16 @@ time.tzset()
 os.environ["HAPTEQ_STRICT"] = "1"
 
 
+@pytest.fixture(scope="session", autouse=True)
+def power_stays_on() -> Iterator[None]:
+    """Files reach the operating system, not the disk, for which a trial waits several times: tests kill programs, and
+    never cut the power. That the log is synchronised before anything acts on it: `test_order_of_acts.py`. Programs that
+    tests start do it as ever."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(os, "fsync", os.fstat)  # refuses a closed descriptor alike
+        yield
+
+
 @pytest.fixture
 def summer_and_winter(monkeypatch) -> Iterator[None]:
     """The machine stands in central Europe: +01:00, in summer +02:00."""
