@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
 
@@ -163,6 +164,27 @@ def surviving_stub(stub, tmp_path, monkeypatch):
     """It lives on in a file when the program that drives it is killed."""
     monkeypatch.setenv("HAPTEQ_STUB_FILE", str(tmp_path / "device"))
     return stub
+
+
+@pytest.fixture
+def validated_here(monkeypatch) -> None:
+    """By a thread, where a test is not about the process of its own: that one reads files that end their reader, see
+    `test_validate_apart.py`, and takes seconds to start."""
+    from study.workflows.files import validate_apart
+
+    monkeypatch.setattr(validate_apart, "_worker", lambda: ThreadPoolExecutor(max_workers=1))
+
+
+@pytest.fixture
+def sketched(monkeypatch) -> None:
+    """Each figure of a report is a line, where a test is about something else: to draw them is most of what it takes to
+    analyse a session. Fixtures of a module still draw."""
+
+    def sketch(picture) -> tuple[str, bytes]:
+        svg = f'<svg xmlns="http://www.w3.org/2000/svg" id="{picture.name}"><path d="M0 0L9 9"/></svg>'
+        return svg, b"" if picture.folded else b"a sketch"
+
+    monkeypatch.setattr("study.workflows.picture_files._drawn", sketch)
 
 
 @pytest.fixture

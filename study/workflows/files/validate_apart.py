@@ -40,7 +40,14 @@ def _validated(path: Path) -> Validation:
 
 def _worker() -> ProcessPoolExecutor:
     # Spawned: a forked child would inherit HDF5's locks.
-    return ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
+    worker = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
+    # How long it takes to start is the machine's affair, and no fault of a file.
+    worker.submit(_ready).result()
+    return worker
+
+
+def _ready() -> None:
+    """Runs in the worker, once all that it needs is imported."""
 
 
 def _kill(worker: ProcessPoolExecutor) -> None:

@@ -12,6 +12,8 @@ import pytest
 
 from study.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("validated_here")
+
 ROOT = Path(__file__).resolve().parents[3]
 PATHS = os.pathsep.join((str(ROOT), str(ROOT / "study" / "launcher")))
 

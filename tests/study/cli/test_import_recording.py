@@ -5,6 +5,8 @@ import pytest
 
 from study.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("validated_here")
+
 ROWS = [f"{k / 100:.2f},{k % 7},{k % 5}" for k in range(50)]
 
 

@@ -11,6 +11,8 @@ from equalizer.signals.signal import Signal
 from study.cli.main import main
 from study.store.formats.recording_file import write_recording
 
+pytestmark = pytest.mark.usefixtures("validated_here")
+
 RATE_HZ = 500.0
 
 

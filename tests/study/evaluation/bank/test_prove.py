@@ -186,8 +186,8 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(LeftError, match="Interrupted"):
-        prove(tmp_path / "bank", PLAN, Wishes(workers=1), interrupt)
-    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(to_draw(PLAN))
+        prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), Wishes(workers=1), interrupt)
+    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(to_draw(BankPlan(SEED, 1, brief=True)))
 
 
 def test_the_short_bank_is_of_this_kind():

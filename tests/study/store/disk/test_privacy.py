@@ -20,6 +20,8 @@ from study.workflows.checks.check_installation import check_privacy
 from study.workflows.files.validate import validate_file
 from study.workflows.session.plan_sitting import plan_sitting
 
+pytestmark = pytest.mark.usefixtures("validated_here")
+
 CORPUS = Path(__file__).resolve().parents[3] / "frozen" / "v0_1"
 LIVE = Live(
     utc="2026-05-04T09:30:00.000+00:00", activity="idle", since_utc="2026-05-04T09:30:00.000+00:00", fault="",

@@ -19,6 +19,8 @@ from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, answered
 from study.workflows.diagnosis.diagnosed_summary import answer_lines, file_lines, summary
 from study.workflows.diagnosis.diagnosis_input import read_input
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 @pytest.fixture(scope="module")
 def made(module_at):
@@ -78,9 +80,17 @@ def plan(files, out, **more) -> DiagnosePlan:
 
 
 @pytest.fixture(scope="module")
-def done(files, findings, tmp_path_factory):
-    out = tmp_path_factory.mktemp("done") / "out"
-    return diagnose_recordings(plan(files, out), quiet, Scripted(findings))
+def in_two_steps(files, findings, tmp_path_factory):
+    """The answer, what lay in its folder then, and what was written after it."""
+    folder = tmp_path_factory.mktemp("done")
+    answer = answered(plan(files, folder / "out"), quiet, Scripted(findings))
+    there = list(folder.iterdir())
+    return answer, there, written(answer, quiet)
+
+
+@pytest.fixture(scope="module")
+def done(in_two_steps):
+    return in_two_steps[2]
 
 
 def test_the_folder_holds_document_model_page_and_figures(done, findings):
@@ -104,12 +114,12 @@ def test_it_knows_where_it_comes_from(done):
     assert "hapteq" in origin["versions"]
 
 
-def test_the_answer_is_there_before_anything_is_written(files, findings, tmp_path):
-    answer = answered(plan(files, tmp_path / "out"), quiet, Scripted(findings))
+def test_the_answer_is_there_before_anything_is_written(in_two_steps, findings):
+    answer, there, done = in_two_steps
     assert answer_lines(answer.findings) == answer_lines(findings)
-    assert list(tmp_path.iterdir()) == []
-    assert written(answer, quiet).out == tmp_path / "out"
-    assert (tmp_path / "out" / "report.html").is_file()
+    assert there == []
+    assert done.out == answer.plan.out
+    assert (done.out / "report.html").is_file()
 
 
 def test_the_summary_begins_with_the_verdict_and_then_says_where_the_files_are(done):
@@ -280,7 +290,7 @@ def test_without_a_model_the_clean_recordings_are_what_one_is_fitted_to(files, f
     write_recording(tmp_path / "clean.h5", made.recorded(1, (), seed=9))
     engine = Scripted(findings)
     wanted = plan(files, tmp_path / "out", model=None, clean=(tmp_path / "clean.h5",))
-    found = diagnose_recordings(wanted, quiet, engine)
+    found = answered(wanted, quiet, engine)
     assert engine.model.name == "fitted to the clean recordings"
     assert found.findings.remarks[0].startswith("No model was given. A linear one was fitted to the clean recordings")
 
@@ -316,7 +326,9 @@ def test_a_folder_beside_recordings_is_refused(files, findings, tmp_path):
 
 
 def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path, recording):
-    pushed, moved = recording.command.samples, recording.response.samples
+    # A third of it: three commands and two responses are weighed for long before nothing holds.
+    count = len(recording) // 3
+    pushed, moved = recording.command.samples[:count], recording.response.samples[:count]
     three = replace(
         recording,
         command=replace(
@@ -324,6 +336,7 @@ def test_where_no_model_can_be_fitted_it_is_asked_for(files, findings, tmp_path,
         ),
         response=replace(recording.response, samples=np.hstack([moved, 0.5 * moved]), channels=("x", "y")),
         position=None,
+        segments=(),
     )
     write_recording(tmp_path / "three.h5", three)
     error = refused_with(files, findings, tmp_path, sources=(tmp_path / "three.h5",), model=None)

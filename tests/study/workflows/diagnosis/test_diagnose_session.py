@@ -14,6 +14,8 @@ from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import simulated_participant
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 SPRING = pytest.approx(136.5, abs=0.5)
 
 

@@ -11,6 +11,8 @@ from study.errors import ExitCode, StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 
+pytestmark = pytest.mark.usefixtures("validated_here")
+
 SEGMENT = """
 [[segments]]
 kind = "multisine"

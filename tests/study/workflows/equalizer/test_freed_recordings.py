@@ -20,6 +20,8 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 from study.workflows.equalizer.freed_recordings import excited_band_hz
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 RATE_HZ, BAND_HZ, PERIOD, LEVEL_N = 1000.0, (5.0, 35.0), 10_000, 0.1
 
 

@@ -1,0 +1,64 @@
+"""Withdrawing from the command line: what is erased, and what is not."""
+
+import json
+
+import pytest
+
+pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
+
+
+def test_withdrawal_erases_all_sessions_of_the_participant_and_nobody_elses(run, data, small_file):
+    for subject in ("P01", "P02"):
+        who = ("--observer", "ideal", "--subject", subject)
+        assert run("study", "--protocol", small_file, *who, "--data", data)[0] == 0
+    other = {p: p.read_bytes() for p in (data / "P02_001").rglob("*") if p.is_file()}
+    code, out, err = run("withdraw", "P01_002", "--data", data, "--yes")
+    assert code == 0
+    assert "Erased: P01_001, P01_002" in out
+    assert "erase them" in err
+    for name in ("P01_001", "P01_002"):
+        left = {p.name for p in (data / name).iterdir()}
+        assert left <= {"withdrawn.json", "session.lock"}
+        document = json.loads((data / name / "withdrawn.json").read_text())
+        assert set(document) == {"format", "version", "session", "withdrawn_utc", "begun"}
+        assert set(document["begun"]) == {"protocol", "simulated", "number"}
+        assert run("validate", data / name)[0] == 0
+    assert {p: p.read_bytes() for p in (data / "P02_001").rglob("*") if p.is_file()} == other
+    code, _, err = run("resume", "P01_001", "--data", data)
+    assert code == 1
+    assert "withdrew" in err
+    code, _, err = run("analyze", data)
+    assert "P01_001 was withdrawn by the participant." in err
+    # Nobody else gets the code.
+    code, _, err = run("study", "--protocol", small_file, "--observer", "ideal", "--subject", "P01", "--data", data)
+    assert code == 2
+    assert "P01 withdrew" in err
+
+
+def test_a_withdrawal_that_is_not_confirmed_erases_nothing(run, data, monkeypatch):
+    monkeypatch.setattr("typer.confirm", lambda *_, **__: False)
+    code, _, err = run("withdraw", "P01_001", "--data", data)
+    assert code == 0
+    assert "Nothing was erased." in err
+    assert (data / "P01_001" / "events.jsonl").exists()
+
+
+def test_withdrawal_leaves_what_others_put_beside_the_analysis(run, data):
+    assert run("analyze", data)[0] == 0
+    notes = data / "analysis" / "my_notes.R"
+    notes.write_text("mine")
+    code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")
+    assert code == 0
+    assert "and the analysis in" in err.splitlines()[0]
+    assert [p.name for p in (data / "analysis").iterdir()] == ["my_notes.R"]
+
+
+def test_a_session_that_is_being_written_is_not_withdrawn(run, data):
+    from study.store.sessions.event_log import EventLog
+
+    log = EventLog.reopen(data / "P01_001" / "events.jsonl")
+    code, _, err = run("withdraw", "P01_001", "--data", data, "--yes")
+    log.close()
+    assert code == 1
+    assert "Another program is writing to P01_001" in err
+    assert (data / "P01_001" / "trials.csv").exists()

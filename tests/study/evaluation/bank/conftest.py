@@ -1,0 +1,25 @@
+"""Devices of a bank, each of which takes seconds to draw and is drawn again and again."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def drawn_once() -> Iterator[None]:
+    """Under whatever name. That a draw repeats from its seed: `challenge/test_draw_case.py`."""
+    from study.evaluation.bank import seal_cases
+
+    draws = seal_cases.case_of
+    kept = cache(lambda each: draws(each, "kept"))
+
+    def case_of(each, name):
+        case = kept(each)
+        recording, model = replace(case.recording, device=name), replace(case.model, name=name)
+        return replace(case, recording=recording, model=model)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(seal_cases, "case_of", case_of)
+        yield
