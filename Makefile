@@ -25,7 +25,7 @@ equalizer := tests/equalizer
 analysis := tests/analysis
 PARTS := screens workflows evaluation equalizer stories analysis
 rest := tests $(foreach part,$(PARTS),$(addprefix --ignore=,$($(part))))
-TESTED := $(addprefix tested-,real_time screens workflows rest $(filter-out screens workflows,$(PARTS)))
+TESTED := $(addprefix tested-,real_time screens analysis workflows rest evaluation equalizer stories)
 JOBS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2) + 2)
 MARKED := not slow and not real_time
 tested-real_time: MARKED := real_time and not slow

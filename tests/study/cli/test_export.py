@@ -49,6 +49,7 @@ def test_a_psych_ds_dataset_names_all_its_columns(data, tmp_path):
     assert description["hapteq"]["seeds"] == {"P01_001": 1, "P02_001": 2}
 
 
+@pytest.mark.usefixtures("sketched")
 def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, capsys):
     assert main(["export", str(data), "--out", str(tmp_path / "ds")]) == 0
     said = []

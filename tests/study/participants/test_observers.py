@@ -1,6 +1,7 @@
 """Simulated participants do what they are said to do: curves recovered from answers, controls at chance."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ N = 4000
 FOUR_ERRORS = 4 * np.sqrt(0.25 / N)
 
 
+@cache
 def shown(trial: int, seed: int = 1) -> int:
     return draw_trial(ScheduleSettings(), "random", seed, 0, trial, 0).direction
 

@@ -1,0 +1,160 @@
+"""A sensor or a driver that hangs: the force goes all the same."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from study.devices.device import Fault
+from study.devices.drive.stepped_runner import SteppedRunner
+from study.devices.governor import govern
+from study.devices.governor.governor import Governor
+from study.errors import DeviceError
+from tests.study.devices.hung_driver.patience import alive, hold, wait_until
+
+pytestmark = pytest.mark.real_time
+
+
+def in_loop(action):
+    """Only in the haptic loop: other threads get through."""
+    return lambda *_: action() if threading.current_thread().name == "haptic loop" else None
+
+
+def test_a_sensor_that_hangs_loses_the_force_although_the_program_is_alive(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    rig.before_sensing = hang.wait
+    alive(device, 0.3)
+    assert not rig.last_n.any()
+    assert device.fault() is Fault.LOST
+    assert device.release().health.fault is Fault.LOST
+    with pytest.raises(DeviceError, match=r"no sign of life\)\. Its force is off"):
+        device.hold(rigs.push())
+
+
+def test_whoever_only_asks_for_faults_finds_the_hanging_loop_too(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    rig.before_sensing = hang.wait
+    time.sleep(0.15)
+    assert device.fault() is Fault.LOST
+    assert not rig.last_n.any()
+
+
+def test_a_release_does_not_wait_long_for_a_hanging_sensor(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    rig.before_sensing = hang.wait
+    started_s = time.monotonic()
+    assert device.release().health.fault is Fault.LOST
+    assert time.monotonic() - started_s < 0.5
+    assert not rig.last_n.any()
+
+
+def test_an_emergency_stop_needs_no_loop(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    rig.before_sensing = hang.wait
+    time.sleep(0.02)
+    device.stop()
+    assert not rig.last_n.any()
+    assert device.fault() is Fault.STOPPED
+    hang.set()
+    time.sleep(0.05)
+    assert not rig.last_n.any()
+
+
+def test_an_emergency_stop_that_the_loop_hears_is_left_to_it(device, rigs, rig):
+    hold(device, rigs, rig)
+    device.stop()
+    assert not rig.last_n.any()
+    assert device.release().health.fault is Fault.STOPPED
+
+
+def test_commands_end_when_the_sensor_hangs(device, rigs, rig, hang):
+    def hang_in_the_middle(share: float) -> None:
+        if share > 0.6:
+            rig.before_sensing = hang.wait
+
+    with pytest.raises(DeviceError, match="no sign of life"):
+        device.play(rigs.force(np.zeros((1000, 3))), hang_in_the_middle)
+
+
+def test_a_write_that_goes_through_late_is_taken_back(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    rig.before_writing = in_loop(hang.wait)
+    time.sleep(0.02)
+    assert device.release().health.fault is Fault.FORCE_LEFT  # nobody can know what the late write does
+    device.close()
+    assert not rig.last_n.any()
+    late, closed = len(rig.written_n), rig.closed
+    hang.set()
+    wait_until(lambda: rig.closed > closed)
+    assert rig.written_n[late][0] == pytest.approx(2.9, abs=0.2)  # the late one
+    assert not rig.last_n.any()
+
+
+def test_a_late_write_of_a_device_that_is_still_open_is_taken_back_too(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    rig.before_writing = in_loop(hang.wait)
+    alive(device, 0.25)
+    late = len(rig.written_n)
+    hang.set()
+    wait_until(lambda: len(rig.written_n) > late + 1)
+    assert not rig.last_n.any()
+    assert rig.closed == 0
+
+
+def test_a_driver_that_comes_back_and_takes_no_zero_is_worse_than_lost(device, rigs, rig, hang):
+    def fail(force_n) -> None:
+        raise OSError("usb")
+
+    hold(device, rigs, rig)
+    rig.before_sensing = hang.wait
+    alive(device, 0.2)
+    assert device.fault() is Fault.LOST
+    rig.before_writing = fail
+    hang.set()
+    wait_until(lambda: device.fault() is Fault.FORCE_LEFT)
+
+
+def test_a_rig_that_was_given_up_gets_no_force_even_from_a_tick_that_was_under_way(rigs, rig):
+    governor = Governor(rig.info, rigs.SETTINGS)
+    runner = SteppedRunner(rig, governor, catches_up=False)
+    governor.begin_hold(rigs.push())
+    runner.run(20)
+    runner.give_up(OSError("usb"))
+    governor.state[govern.PHASE] = govern.PLAYING  # as a tick leaves it that heard of nothing
+    given = len(rig.written_n)
+    runner.run(20)
+    assert not runner.moving
+    assert not np.any(rig.written_n[given:])
+    runner.disconnect()
+
+
+def test_nothing_begins_while_the_loop_is_being_closed(device, rigs, rig):
+    device._drive._closing = True
+    with pytest.raises(DeviceError, match="cannot do this now"):
+        device.hold(rigs.push())
+    assert rig.written_n == []
+
+
+def test_a_driver_that_hangs_with_its_lock_hangs_nobody_else(device, rigs, rig, hang):
+    hold(device, rigs, rig)
+    lock = threading.Lock()
+
+    def sense() -> None:
+        with lock:
+            hang.wait()
+
+    def write(force_n) -> None:
+        with lock:
+            pass
+
+    rig.before_sensing, rig.before_writing = sense, write
+    time.sleep(0.02)
+    started_s = time.monotonic()
+    assert device.release().health.fault is Fault.FORCE_LEFT
+    with pytest.raises(DeviceError, match="Let go of the handle and switch the device off"):
+        device.hold(rigs.push())
+    device.close()
+    assert time.monotonic() - started_s < 1.5
+    hang.set()
+    wait_until(lambda: not rig.last_n.any())
