@@ -211,7 +211,8 @@ class SafeDevice:
         rate_hz = self._info.sample_rate_hz
         if isinstance(clock, VirtualClock):
             return VirtualDrive(self._runner, self._governor, clock, rate_hz)
-        return RealtimeDrive(self._runner, self._governor, clock, rate_hz, self._limits.watchdog_s)
+        first = not self._info.simulated
+        return RealtimeDrive(self._runner, self._governor, clock, rate_hz, self._limits.watchdog_s, first)
 
 
 def _still_playing() -> DeviceError:

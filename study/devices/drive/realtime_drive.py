@@ -10,12 +10,14 @@ begins meanwhile cannot collide with the reading, and a driver that hangs keeps 
 `PATIENCE_S`.
 """
 
+import contextlib
 import math
 import threading
 from collections.abc import Callable
 
 from study.devices.clock import Clock
 from study.devices.device import Fault
+from study.devices.drive.real_time_class import real_time_class
 from study.devices.drive.runner import Runner
 from study.devices.drive.virtual_drive import ticks_by
 from study.devices.governor.governor import Governor
@@ -79,7 +81,18 @@ SPIN_S = 0.00015
 
 
 class RealtimeDrive:
-    def __init__(self, runner: Runner, governor: Governor, clock: Clock, rate_hz: float, longest_gap_s: float) -> None:
+    """first: whether the loop goes before other programs, where the system allows: for a device that moves."""
+
+    def __init__(
+        self,
+        runner: Runner,
+        governor: Governor,
+        clock: Clock,
+        rate_hz: float,
+        longest_gap_s: float,
+        first: bool = False,
+    ) -> None:
+        self._first = first
         self._runner = runner
         self._governor = governor
         self._clock = clock
@@ -171,6 +184,10 @@ class RealtimeDrive:
         return not self._runner.catches_up and self._clock.now_s() - self._last_s > LATE_S
 
     def _attend(self) -> None:
+        with real_time_class() if self._first else contextlib.nullcontext():
+            self._attend_until_closed()
+
+    def _attend_until_closed(self) -> None:
         while not self._closing:
             try:
                 self._awake.wait()

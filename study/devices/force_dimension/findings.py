@@ -2,6 +2,7 @@
 
 import time
 
+from study.devices.drive.real_time_class import real_time_finding
 from study.devices.force_dimension.connect import CALIBRATE, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, lab_file, read_lab
@@ -32,7 +33,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
         lab = read_lab()
         library = load_library()
         findings.append(DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True))
-        findings += _usb()
+        findings += [*_usb(), real_time_finding()]
         handle = open_model(library, model)
     except DeviceError as error:
         return (*findings, _wrong("Driver", error))

@@ -1,0 +1,150 @@
+"""The loop before all other programs: asked for by real devices only, said where it is refused, and taken back."""
+
+import contextlib
+import os
+import sys
+import threading
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from study.devices.clock import RealClock
+from study.devices.drive import real_time_class as module
+from study.devices.drive.real_time_class import LINUX_ADVICE, PRIORITY, SWITCH_S, real_time_class, real_time_finding
+from study.devices.safe import SafeDevice
+
+linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what Linux grants is asked of Linux")
+
+
+class Library:
+    """The C library's part: whether memory may be locked."""
+
+    def __init__(self, allowed: bool) -> None:
+        self.allowed, self.locked = allowed, False
+
+    def mlockall(self, flags: int) -> int:
+        assert flags == 5
+        self.locked = self.allowed
+        return 0 if self.allowed else -1
+
+    def munlockall(self) -> None:
+        self.locked = False
+
+
+@pytest.fixture
+def allow(monkeypatch):
+    """allow(class, lock): what the system grants from now on. What was asked of the scheduler is in `asked`."""
+    asked: list[tuple[int, int]] = []
+
+    def settle(scheduled: bool, locked: bool) -> tuple[Library, list[tuple[int, int]]]:
+        def sched(thread: int, policy: int, parameters: os.sched_param) -> None:
+            if not scheduled:
+                raise PermissionError(1, "not permitted")
+            asked.append((policy, parameters.sched_priority))
+
+        library = Library(locked)
+        monkeypatch.setattr(module.platform, "system", lambda: "Linux")
+        monkeypatch.setattr(module.os, "sched_setscheduler", sched)
+        monkeypatch.setattr(module.ctypes, "CDLL", lambda name, use_errno: library)
+        return library, asked
+
+    return settle
+
+
+@linux
+def test_what_is_granted_lasts_as_long_as_the_loop_and_is_taken_back(allow):
+    library, asked = allow(True, True)
+    before_s = sys.getswitchinterval()
+    with real_time_class() as granted:
+        assert (granted.scheduled, granted.locked, granted.advice) == (True, True, "")
+        assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
+    assert asked == [(os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, PRIORITY)]
+    assert not library.locked and sys.getswitchinterval() == pytest.approx(before_s)
+
+
+@linux
+@pytest.mark.parametrize(("scheduled", "locked"), [(False, False), (True, False), (False, True)])
+def test_what_is_refused_is_a_warning_with_its_cure_and_hinders_nothing(allow, scheduled, locked):
+    allow(scheduled, locked)
+    finding = real_time_finding()
+    assert (finding.fine, finding.warning, finding.wrong) == (False, True, False)
+    assert finding.advice == LINUX_ADVICE and "rtprio" in finding.advice
+    assert ("may delay" in finding.value) == (not scheduled)
+    assert ("swapped" in finding.value) == (not locked)
+
+
+@linux
+def test_with_all_granted_it_is_fine(allow):
+    allow(True, True)
+    assert real_time_finding().fine and real_time_finding().advice == ""
+
+
+@linux
+def test_an_error_within_takes_all_back_too(allow):
+    library, _ = allow(True, True)
+    with pytest.raises(OSError, match="usb"), real_time_class():
+        raise OSError("usb")
+    assert not library.locked
+
+
+@linux
+def test_only_the_thread_that_asks_is_put_first():
+    """As this system really grants it, or not: then nothing changed."""
+    found: list[tuple[bool, int]] = []
+
+    def ask() -> None:
+        with real_time_class() as granted:
+            found.append((granted.scheduled, os.sched_getscheduler(threading.get_native_id())))
+
+    before = os.sched_getscheduler(0)
+    thread = threading.Thread(target=ask)
+    thread.start()
+    thread.join()
+    ((scheduled, policy),) = found
+    assert (policy & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO) == scheduled
+    assert os.sched_getscheduler(0) == before
+
+
+@pytest.mark.parametrize(("fine_sleep", "priority"), [(True, True), (True, False), (False, True)])
+def test_on_windows_sleeps_are_made_finer_and_the_thread_comes_first(monkeypatch, fine_sleep, priority):
+    ended: list[int] = []
+    winmm = SimpleNamespace(timeBeginPeriod=lambda ms: 0 if fine_sleep else 97, timeEndPeriod=ended.append)
+    kernel = SimpleNamespace(
+        GetCurrentThread=lambda: 2, SetThreadPriority=lambda thread, level: priority and level == 15
+    )
+    kernel.GetCurrentThread = type("Function", (), {"__call__": lambda self: 2})()
+    monkeypatch.setattr(module.platform, "system", lambda: "Windows")
+    monkeypatch.setattr(module.ctypes, "windll", SimpleNamespace(winmm=winmm, kernel32=kernel), raising=False)
+    with real_time_class() as granted:
+        assert granted.scheduled == (fine_sleep and priority)
+        assert not granted.locked and granted.advice.startswith("Windows")
+        assert ended == []
+    assert ended == ([1] if fine_sleep else [])
+
+
+def test_another_system_offers_nothing_and_says_so(monkeypatch):
+    monkeypatch.setattr(module.platform, "system", lambda: "Darwin")
+    monkeypatch.delattr(module.ctypes, "windll", raising=False)
+    assert real_time_finding().advice == "This system offers none: close other programs."
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_real_device_s_loop_asks_in_its_own_thread_and_gives_back_when_it_is_closed(rigs, monkeypatch, simulated):
+    told: list[str] = []
+
+    @contextlib.contextmanager
+    def noted():
+        told.append(threading.current_thread().name)
+        yield
+        told.append("given back")
+
+    monkeypatch.setattr("study.devices.drive.realtime_drive.real_time_class", noted)
+
+    class Rig(rigs.ScriptedRig):
+        info = replace(rigs.INFO, simulated=simulated)
+
+    with contextlib.closing(SafeDevice(Rig(), rigs.SETTINGS, RealClock())) as device:
+        device.look()
+        assert told == ([] if simulated else ["haptic loop"])
+    assert told == ([] if simulated else ["haptic loop", "given back"])
